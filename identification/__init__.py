@@ -1,0 +1,1 @@
+"""Measurements in memory, models of nonlinear modes, and their scores."""

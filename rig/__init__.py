@@ -1,0 +1,1 @@
+"""The bench: drivers, the loop, campaigns, recordings, figures and the command line."""

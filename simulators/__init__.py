@@ -1,0 +1,1 @@
+"""The physics of shaker, stinger and structure: a virtual rig sample by sample."""

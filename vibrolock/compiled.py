@@ -1,0 +1,73 @@
+"""One decorator for every compiled kernel of the distribution.
+
+A kernel is a module-level function in a file called ``kernels.py``: plain arrays, structured arrays and scalars in
+and out, no allocation per sample, never raising. It returns codes; its caller raises.
+
+numba's own cache does not notice when a kernel that is called from another file has changed. The cache folder therefore
+carries a hash of all kernel sources of the distribution, and a changed source starts an empty folder.
+"""
+
+import getpass
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import numba
+
+__all__ = ["kernel", "kernel_cache_folder"]
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_PACKAGES = ("vibrolock", "controller", "simulators", "rig")
+_UNUSED_AFTER_DAYS = 30
+
+
+def _source_hash() -> str:
+    root = Path(__file__).parent.parent
+    sources = sorted(path for name in _PACKAGES for path in (root / name).rglob("kernels.py"))
+    digest = hashlib.sha256(f"numba {numba.__version__}".encode())
+    for path in sources:
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def kernel_cache_folder() -> Path:
+    """Folder that holds the machine code of exactly these kernel sources; made if need be.
+
+    ``NUMBA_CACHE_DIR``, where set, is the parent; else the user's cache folder; else a temporary one where neither
+    can be written.
+    """
+    base = Path(os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for parent in (base / "vibrolock", Path(tempfile.gettempdir()) / f"vibrolock-{getpass.getuser()}"):
+        folder = parent / _source_hash()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            os.utime(folder)
+        except OSError:
+            continue
+        _remove_unused(parent)
+        return folder
+    return Path(tempfile.mkdtemp(prefix="vibrolock-"))
+
+
+def _remove_unused(parent: Path) -> None:
+    oldest = time.time() - _UNUSED_AFTER_DAYS * 86400.0
+    for folder in parent.iterdir():
+        if folder.is_dir() and folder.stat().st_mtime < oldest:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+numba.config.CACHE_DIR = str(kernel_cache_folder())
+
+
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile ``function`` with numba, cached on disk, with IEEE arithmetic only (no fastmath) so that runs repeat bit for bit."""
+    compiled: Callable[P, R] = numba.njit(cache=True, error_model="numpy", fastmath=False)(function)
+    return compiled
