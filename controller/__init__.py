@@ -1,1 +1,6 @@
 """The control law of a phase-locked vibration test: numbers in, numbers out."""
+
+from controller.layout import AmplitudeLaw, Detector, LockState
+from controller.pll import LockRule, PhaseLockedLoop, preset
+
+__all__ = ["AmplitudeLaw", "Detector", "LockRule", "LockState", "PhaseLockedLoop", "preset"]

@@ -15,14 +15,17 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numba
 
-__all__ = ["kernel", "kernel_cache_folder"]
+__all__ = ["Record", "kernel", "kernel_cache_folder"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+Record: TypeAlias = Any
+"""One record of a structured array inside a kernel; numba knows its fields, the type checker does not."""
 
 _PACKAGES = ("vibrolock", "controller", "simulators", "rig")
 _UNUSED_AFTER_DAYS = 30
@@ -68,6 +71,6 @@ numba.config.CACHE_DIR = str(kernel_cache_folder())
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile ``function`` with numba, cached on disk, with IEEE arithmetic only (no fastmath) so that runs repeat bit for bit."""
+    """Compile with numba, cached on disk, in IEEE arithmetic only (no fastmath) so that runs repeat bit for bit."""
     compiled: Callable[P, R] = numba.njit(cache=True, error_model="numpy", fastmath=False)(function)
     return compiled

@@ -1,0 +1,102 @@
+"""A measured backbone: settled periodic states near phase resonance, level by level."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.measurements import PeriodicVibration
+
+__all__ = ["Backbone"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Backbone:
+    """Settled periodic states near phase resonance, in the order they were measured.
+
+    Parameters
+    ----------
+    points
+        The states, all with the same channels and the same number of harmonics.
+    specimen
+        Name of what was tested.
+    drive_mode_shape
+        Mass-normalised deflection shape of the tested linear mode at the drive point, kg^-1/2; None if unknown.
+    directions
+        ``up`` or ``down`` for every point; empty if it was not noted.
+    repeats
+        Number of the pass through the levels for every point, from 1; empty if it was not noted.
+
+    Raises
+    ------
+    IdentificationError
+        Without points, on unequal channels or harmonics, on labels that do not match the points.
+    """
+
+    points: tuple[PeriodicVibration, ...]
+    specimen: str = ""
+    drive_mode_shape: float | None = None
+    directions: tuple[str, ...] = ()
+    repeats: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", tuple(self.points))
+        if not self.points:
+            raise IdentificationError("points: a backbone needs at least one")
+        first = self.points[0]
+        for number, point in enumerate(self.points):
+            if point.channels != first.channels or point.harmonics.shape != first.harmonics.shape:
+                raise IdentificationError(f"points[{number}]: channels or harmonics differ from those of points[0]")
+        if self.drive_mode_shape is not None and not (np.isfinite(self.drive_mode_shape) and self.drive_mode_shape):
+            raise IdentificationError(f"drive_mode_shape: is {self.drive_mode_shape}, must be finite and not zero")
+        for name, labels in (("directions", self.directions), ("repeats", self.repeats)):
+            if labels and len(labels) != len(self.points):
+                raise IdentificationError(f"{name}: {len(labels)} given for {len(self.points)} points")
+        if unknown := set(self.directions) - {"up", "down"}:
+            raise IdentificationError(f"directions: '{sorted(unknown)[0]}' given, allowed are up and down")
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Channels of every point."""
+        return self.points[0].channels
+
+    @property
+    def force_n(self) -> Float:
+        """float[n_points]: peak of the fundamental of the force, N."""
+        return np.array([point.force_n for point in self.points])
+
+    @property
+    def frequency_hz(self) -> Float:
+        """float[n_points]: frequency of the vibration, Hz."""
+        return np.array([point.frequency_hz for point in self.points])
+
+    @property
+    def amplitude_m(self) -> Float:
+        """float[n_points]: peak of the fundamental of the drive-point displacement, m."""
+        return np.array([point.amplitude_m for point in self.points])
+
+    @property
+    def phase_error_deg(self) -> Float:
+        """float[n_points]: measured lag minus the lag asked for, degrees."""
+        return np.array([point.phase_error_deg for point in self.points])
+
+    def select(self, keep: Sequence[bool]) -> "Backbone":
+        """Backbone of the points where ``keep`` is true, with their labels."""
+        if len(keep) != len(self.points):
+            raise IdentificationError(f"keep: {len(keep)} given for {len(self.points)} points")
+        chosen = [index for index, kept in enumerate(keep) if kept]
+        return replace(
+            self,
+            points=tuple(self.points[i] for i in chosen),
+            directions=tuple(self.directions[i] for i in chosen) if self.directions else (),
+            repeats=tuple(self.repeats[i] for i in chosen) if self.repeats else (),
+        )
+
+    def settled(self) -> "Backbone":
+        """Backbone of the settled points alone."""
+        return self.select([point.settled for point in self.points])

@@ -1,0 +1,183 @@
+"""Fourier coefficients of every channel by least squares on the oscillator's own phase.
+
+The record is ``y(t) = Re sum_h Y_h exp(i h theta(t))`` plus what is left over, with the recorded phase theta, so that a
+wandering frequency smears nothing and no whole number of samples per period is needed. A slow drift of the fundamental,
+``(t - t_mid) Re(Z exp(i theta))``, is fitted along as a nuisance. It does not move the fundamental itself (over whole
+periods the two are orthogonal), but without it a drift leaks into the static part and the higher harmonics, which are
+often a thousand times smaller, and counts as noise in the residual. Its size is reported.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.measurements import PeriodicVibration
+from identification.validation import finite_array, positive
+
+__all__ = ["periodic_vibration"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_MAX_BATCHES = 20
+_MIN_BATCHES = 4
+
+
+def periodic_vibration(
+    theta_rad: ArrayLike,
+    samples: ArrayLike,
+    channels: Sequence[Channel],
+    *,
+    sample_rate_hz: float,
+    harmonics: int = 7,
+    phase_lag_target_deg: float = 90.0,
+    settled: bool = True,
+) -> PeriodicVibration:
+    """Periodic vibration in a settled record.
+
+    Parameters
+    ----------
+    theta_rad
+        float[n], phase of the oscillator at the instant that each sample was measured, rising; wrapped or not.
+    samples
+        float[n_channels, n], in the unit of each channel, SI.
+    channels
+        The channels, one per row of ``samples``.
+    sample_rate_hz
+        Samples per second.
+    harmonics
+        Highest harmonic H.
+    phase_lag_target_deg, settled
+        Handed on to the result.
+
+    Returns
+    -------
+    PeriodicVibration
+        From the whole periods at the start of the record. ``harmonics_std`` is the scatter of the residual's
+        coefficients over up to 20 batches of whole periods, which counts coloured noise and slow wander at its full
+        weight; below four periods it takes the residual for white noise. It knows nothing of calibration or of
+        run-to-run scatter.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, unequal lengths, fewer than one period, a phase that falls, too few samples per period for H.
+    """
+    theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
+    data = finite_array("samples", samples, np.float64, 2)
+    rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
+    if data.shape != (len(channels), theta.size):
+        raise IdentificationError(
+            f"samples: shape {data.shape}, needs ({len(channels)}, {theta.size}): channels by samples of theta_rad"
+        )
+    if harmonics < 1:
+        raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
+    frequency_hz, periods, count, warnings = _whole_periods(theta, rate_hz, harmonics)
+    theta, data = theta[:count], data[:, :count]
+    design = _design(theta, harmonics)
+    solution = np.linalg.lstsq(design, data.T, rcond=None)[0]
+    residual = data.T - design @ solution
+    return PeriodicVibration(
+        channels=tuple(channels),
+        frequency_hz=frequency_hz,
+        harmonics=_coefficients(solution, harmonics),
+        periods=periods,
+        residual_rms=np.sqrt(np.mean(residual**2, axis=0)),
+        harmonics_std=_standard_errors(theta, design[:, : 2 * harmonics + 1], residual, periods),
+        drift=_relative_drift(solution, harmonics),
+        phase_lag_target_deg=phase_lag_target_deg,
+        settled=settled,
+        warnings=warnings,
+    )
+
+
+def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float, int, int, tuple[str, ...]]:
+    """Mean frequency, whole periods, samples within them, and warnings."""
+    if theta.size < 2:
+        raise IdentificationError(f"theta_rad: has {theta.size} samples, needs one whole period")
+    if np.any(np.diff(theta) <= 0.0):
+        where = int(np.argmax(np.diff(theta) <= 0.0))
+        raise IdentificationError(f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time")
+    step = (theta[-1] - theta[0]) / (theta.size - 1)
+    # The last sample stands for one sampling interval. Periods seldom hold a whole number of samples, and a
+    # recorder may end up to one sample early: least squares does not mind, and a whole period would be lost.
+    covered = theta.size * step / (2.0 * np.pi)
+    periods = int(covered + step / (2.0 * np.pi) + 1e-6)
+    if periods < 1:
+        raise IdentificationError(f"theta_rad: covers {covered:.3f} periods, needs at least one whole period")
+    needed = 2 * harmonics + 2
+    if 2.0 * np.pi / step <= needed:
+        raise IdentificationError(
+            f"harmonics: {harmonics} need more than {needed} samples per period, the record has {2 * np.pi / step:.2f}"
+        )
+    count = int(np.searchsorted(theta - theta[0], 2.0 * np.pi * periods - 0.5 * step))
+    warnings = []
+    if theta.size - count > 1:
+        warnings.append(f"{theta.size - count} samples beyond {periods} whole periods are left out")
+    if periods < _MIN_BATCHES:
+        warnings.append(
+            f"{periods} periods only: standard errors take the residual for white noise, drift is not fitted"
+        )
+    return float(step * rate_hz / (2.0 * np.pi)), periods, count, tuple(warnings)
+
+
+def _design(theta: Float, harmonics: int) -> Float:
+    """float[n, 2 H + 3]: 1, cosines, minus sines (they belong to Re and Im of Y_h), and the drift of the fundamental.
+
+    The drift is left out (its columns are zero) below four periods, where it cannot be told from the harmonics.
+    """
+    columns = np.zeros((theta.size, 2 * harmonics + 3))
+    columns[:, 0] = 1.0
+    rotation = np.exp(1j * theta)
+    power = np.ones_like(rotation)
+    for harmonic in range(1, harmonics + 1):
+        power = power * rotation
+        columns[:, harmonic] = power.real
+        columns[:, harmonics + harmonic] = -power.imag
+    if theta[-1] - theta[0] > 2.0 * np.pi * (_MIN_BATCHES - 0.5):
+        position = np.linspace(-0.5, 0.5, theta.size)
+        columns[:, -2] = position * rotation.real
+        columns[:, -1] = -position * rotation.imag
+    return columns
+
+
+def _coefficients(solution: Float, harmonics: int) -> Complex:
+    """complex[n_channels, H + 1] from the columns of the least-squares solution."""
+    result = np.zeros((solution.shape[1], harmonics + 1), dtype=np.complex128)
+    result[:, 0] = solution[0]
+    result[:, 1:] = (solution[1 : harmonics + 1] + 1j * solution[harmonics + 1 : 2 * harmonics + 1]).T
+    return result
+
+
+def _relative_drift(solution: Float, harmonics: int) -> Complex:
+    """complex[n_channels]: drift over the record relative to the fundamental; zero where there is no fundamental."""
+    fundamental = solution[1] + 1j * solution[harmonics + 1]
+    drift = solution[-2] + 1j * solution[-1]
+    result: Complex = np.divide(drift, fundamental, out=np.zeros_like(drift), where=fundamental != 0.0)
+    return result
+
+
+def _standard_errors(theta: Float, design: Float, residual: Float, periods: int) -> Float:
+    """float[n_channels, H + 1]: standard error of Re and of Im of each coefficient."""
+    n, columns = design.shape
+    harmonics = (columns - 1) // 2
+    if periods < _MIN_BATCHES:
+        variance = np.sum(residual**2, axis=0) / max(n - columns, 1)
+        white = np.sqrt(np.outer(variance, np.r_[1.0, np.full(harmonics, 2.0)]) / n)
+        return np.asarray(white)
+    batches = min(_MAX_BATCHES, periods)
+    borders = theta[0] + 2.0 * np.pi * np.round(np.linspace(0, periods, batches + 1))
+    edges = np.searchsorted(theta, borders)
+    means = np.empty((batches, columns, residual.shape[1]))
+    for batch, (start, stop) in enumerate(pairwise(edges)):
+        means[batch] = design[start:stop].T @ residual[start:stop] / (stop - start)
+    # Cosine and sine means are half the amplitude; residual means vanish over the record, so batches - 1 are free.
+    squared = np.sum(means**2, axis=0) / ((batches - 1) * batches)
+    result = np.empty((residual.shape[1], harmonics + 1))
+    result[:, 0] = np.sqrt(squared[0])
+    result[:, 1:] = np.sqrt(2.0 * (squared[1 : harmonics + 1] + squared[harmonics + 1 :])).T
+    return result

@@ -1,0 +1,131 @@
+"""Measured stepped-sine frequency responses, one per level."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+
+__all__ = ["Controlled", "FrequencyResponse", "pack_frequency_responses", "unpack_frequency_responses"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+Controlled = Literal["force", "response", "voltage", "none"]
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Stepped-sine response at one level; fundamental harmonics only.
+
+    Parameters
+    ----------
+    frequency_hz
+        float[n], in the order of measurement.
+    force
+        complex[n], fundamental of the force, peak, N; the reference of the phase is free.
+    response
+        complex[n], fundamental of the response, peak, in SI units of ``kind``, against the same phase reference.
+    kind
+        What was measured: ``displacement``, ``velocity`` or ``acceleration``.
+    controlled
+        What the controller held at its level: ``force``, ``response``, ``voltage`` or ``none``.
+    level
+        Nominal level of the controlled quantity, peak, SI.
+    label
+        Name of the level.
+    specimen
+        Name of what was tested.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, unequal shapes, no points, unknown kinds, a force or response that is zero.
+    """
+
+    frequency_hz: Float
+    force: Complex
+    response: Complex
+    kind: Motion
+    controlled: Controlled
+    level: float
+    label: str = ""
+    specimen: str = ""
+
+    def __post_init__(self) -> None:
+        for name, dtype in (("frequency_hz", np.float64), ("force", np.complex128), ("response", np.complex128)):
+            array = finite_array(name, getattr(self, name), dtype, 1)
+            object.__setattr__(self, name, array)
+            if array.shape != self.frequency_hz.shape or not array.size:
+                raise IdentificationError(
+                    f"{name}: {array.size} values for {self.frequency_hz.size} frequencies, needs at least one of each"
+                )
+            refused = array <= 0.0 if name == "frequency_hz" else array == 0.0
+            if refused.any():
+                where = int(np.argmax(refused))
+                allowed = "be above zero" if name == "frequency_hz" else "not be zero"
+                raise IdentificationError(f"{name}: value at [{where}] is {array[where]}, must {allowed}")
+        if self.kind not in get_args(Motion):
+            raise IdentificationError(f"kind: is '{self.kind}', allowed are {', '.join(get_args(Motion))}")
+        if self.controlled not in get_args(Controlled):
+            raise IdentificationError(
+                f"controlled: is '{self.controlled}', allowed are {', '.join(get_args(Controlled))}"
+            )
+        positive("level", self.level)
+
+    @property
+    def level_unit(self) -> str:
+        """Unit of ``level``; empty where nothing was controlled."""
+        units = {"force": "N", "voltage": "V", "response": MOTION_UNIT[self.kind], "none": ""}
+        return units[self.controlled]
+
+    @property
+    def force_n(self) -> Float:
+        """float[n]: peak of the force, N."""
+        return np.abs(self.force)
+
+    @property
+    def displacement_m(self) -> Complex:
+        """complex[n]: fundamental of the displacement, m."""
+        return np.asarray(self.response / (2j * np.pi * self.frequency_hz) ** MOTION_ORDER[self.kind])
+
+    @property
+    def amplitude_m(self) -> Float:
+        """float[n]: peak of the displacement, m."""
+        return np.abs(self.displacement_m)
+
+    @property
+    def phase_lag_deg(self) -> Float:
+        """float[n]: lag of the displacement behind the force, degrees, in (-180, 180]."""
+        return np.asarray(np.degrees(np.angle(self.force / self.displacement_m)))
+
+
+def pack_frequency_responses(responses: Sequence[FrequencyResponse]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Arrays (levels one after another, ``points_per_level`` says where they part) and JSON-able attributes of them."""
+    if not responses:
+        raise IdentificationError("responses: is empty, needs at least one level")
+    arrays: dict[str, NDArray[Any]] = {
+        name: np.concatenate([getattr(item, name) for item in responses])
+        for name in ("frequency_hz", "force", "response")
+    }
+    arrays["points_per_level"] = np.array([item.frequency_hz.size for item in responses])
+    arrays["level"] = np.array([item.level for item in responses])
+    texts = ("kind", "controlled", "label", "specimen")
+    return arrays, {"levels": [{name: getattr(item, name) for name in texts} for item in responses]}
+
+
+def unpack_frequency_responses(
+    arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]
+) -> tuple[FrequencyResponse, ...]:
+    """Inverse of `pack_frequency_responses`; raises `IdentificationError` on anything else."""
+    try:
+        ends = np.cumsum(arrays["points_per_level"])[:-1]
+        columns = [np.split(arrays[name], ends) for name in ("frequency_hz", "force", "response")]
+        rows = zip(*columns, arrays["level"], attributes["levels"], strict=True)
+        return tuple(FrequencyResponse(f, force, y, level=float(v), **texts) for f, force, y, v, texts in rows)
+    except (KeyError, TypeError) as error:
+        raise IdentificationError(f"frequency responses: {error} is missing or unknown") from None

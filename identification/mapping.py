@@ -1,0 +1,211 @@
+"""Turning measured frequency responses that others stored their own way into `FrequencyResponse`s.
+
+A mapping says where things are in a nested structure (as ``scipy.io.loadmat(..., simplify_cells=True)`` gives it) and
+what they mean: units, peak or RMS, whose phase, against what. It is a small pydantic model, written as TOML by the
+user.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
+from identification.errors import IdentificationError
+from identification.frequency_responses import Controlled, FrequencyResponse
+from identification.nested import as_levels, numbers, value_at
+
+__all__ = ["FrequencyResponseMapping", "LevelSet", "PhaseConvention", "Units", "map_frequency_responses"]
+
+Complex = NDArray[np.complex128]
+Path = Annotated[str, Field(min_length=1)]
+PositiveFloat = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+_GRAVITY = 9.80665
+_FREQUENCY: dict[str, float] = {"Hz": 1.0, "rad/s": 1.0 / (2.0 * np.pi)}
+_FORCE: dict[str, float] = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+_RESPONSE: dict[str, tuple[Motion, float]] = {
+    "m": ("displacement", 1.0),
+    "mm": ("displacement", 1e-3),
+    "um": ("displacement", 1e-6),
+    "m/s": ("velocity", 1.0),
+    "mm/s": ("velocity", 1e-3),
+    "m/s2": ("acceleration", 1.0),
+    "m/s^2": ("acceleration", 1.0),
+    "g": ("acceleration", _GRAVITY),
+}
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+
+class Units(_Table):
+    """Units of the stored numbers."""
+
+    frequency: Literal["Hz", "rad/s"]
+    """Unit of the frequencies."""
+    force: Literal["N", "mN", "kN"]
+    """Unit of the forces."""
+    response: Literal["m", "mm", "um", "m/s", "mm/s", "m/s2", "m/s^2", "g"]
+    """Unit of the response amplitudes; it also says whether they are displacement, velocity or acceleration."""
+    values: Literal["peak", "rms"]
+    """Whether forces, responses and level values are stored as peak or as RMS."""
+
+
+class PhaseConvention(_Table):
+    """What the stored phases mean."""
+
+    unit: Literal["deg", "rad"]
+    """Unit of the phases."""
+    of: Motion
+    """Whose phase against the force is stored; need not be the quantity whose amplitude is stored."""
+    sense: Literal["response-minus-force", "force-minus-response"]
+    """``response-minus-force`` falls from 0 to -180 degrees through a displacement resonance."""
+
+
+class LevelSet(_Table):
+    """Levels that were measured the same way.
+
+    Paths are names joined by dots, with ``[3]`` for the fourth entry of a list. With ``levels``, the others start at
+    each of its entries; without, they start at the top, and columns of two-dimensional arrays are levels.
+    """
+
+    levels: Path | None = None
+    """Path of the list of levels."""
+    frequency: Path
+    """Path of the frequencies."""
+    force: Path
+    """Path of the force amplitudes, or complex forces."""
+    response: Path
+    """Path of the response amplitudes; of complex responses if ``phase`` is left out."""
+    phase: Path | None = None
+    """Path of the phases between force and response."""
+    controlled: Controlled
+    """What the controller held constant."""
+    level_values: tuple[PositiveFloat, ...] = ()
+    """Nominal level of each, in the unit of the controlled quantity; left out: the median of what was measured."""
+    label: str = "{value:g} {unit}"
+    """Name of each level; ``{value}``, ``{unit}`` (SI, peak) and ``{number}`` (from 1) are filled in."""
+
+
+class FrequencyResponseMapping(_Table):
+    """A whole mapping: what the file holds, and in which terms."""
+
+    specimen: str = ""
+    """Name of what was tested."""
+    source: str = ""
+    """Where the data comes from; for the reader."""
+    units: Units
+    """Units of the stored numbers."""
+    phase: PhaseConvention | None = None
+    """What stored phases mean; needed where a set names a path of phases."""
+    sets: Annotated[tuple[LevelSet, ...], Field(min_length=1)]
+    """The levels, in groups."""
+
+
+def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tuple[FrequencyResponse, ...]:
+    """Frequency responses in ``data``, in the order of the mapping.
+
+    Parameters
+    ----------
+    data
+        Nested dictionaries, lists and arrays.
+    mapping
+        Where things are in it and what they mean.
+
+    Returns
+    -------
+    tuple of FrequencyResponse
+        In SI, peak, the force's phase zero unless complex forces are stored.
+
+    Raises
+    ------
+    IdentificationError
+        On a path that is not there, on a shape or number that does not fit; the message names set, level and path.
+    """
+    found: list[FrequencyResponse] = []
+    for number, group in enumerate(mapping.sets):
+        where = f"sets[{number}]"
+        if group.phase is not None and mapping.phase is None:
+            raise IdentificationError(f"{where}.phase: is '{group.phase}', but the mapping has no [phase] table")
+        levels = _levels(data, group, where)
+        if group.level_values and len(group.level_values) != len(levels):
+            raise IdentificationError(
+                f"{where}.level_values: {len(group.level_values)} given, the data has {len(levels)} levels"
+            )
+        found += [_response(level, index, group, mapping, where) for index, level in enumerate(levels)]
+    return tuple(found)
+
+
+def _levels(data: Any, group: LevelSet, where: str) -> Sequence[dict[str, NDArray[Any]]]:
+    """Arrays of every level of a set, by the name of their entry in the mapping."""
+    paths = {name: getattr(group, name) for name in ("frequency", "force", "response", "phase")}
+    paths = {name: path for name, path in paths.items() if path is not None}
+    if group.levels is not None:
+        entries = as_levels(value_at(data, group.levels, f"{where}.levels"), f"{where}.levels '{group.levels}'")
+        return [
+            {name: _stored(entry, path, 1, f"{where}.{name}, level {k + 1}") for name, path in paths.items()}
+            for k, entry in enumerate(entries)
+        ]
+    stored = {name: _stored(data, path, 2, f"{where}.{name}") for name, path in paths.items()}
+    columns = {array.shape[1] for array in stored.values()} - {1}
+    if len(columns) > 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in stored.items())
+        raise IdentificationError(f"{where}: arrays have different numbers of columns ({shapes})")
+    count = columns.pop() if columns else 1
+    return [{name: array[:, min(k, array.shape[1] - 1)] for name, array in stored.items()} for k in range(count)]
+
+
+def _stored(data: Any, path: str, ndim: int, where: str) -> NDArray[Any]:
+    """Numbers at ``path`` as a vector (``ndim`` 1) or a matrix with one column per level (2)."""
+    return numbers(value_at(data, path, where), ndim, f"{where} '{path}'")
+
+
+def _response(
+    stored: dict[str, NDArray[Any]], index: int, group: LevelSet, mapping: FrequencyResponseMapping, where: str
+) -> FrequencyResponse:
+    """One level in SI, peak, with the phase in the house's convention."""
+    units = mapping.units
+    peak = np.sqrt(2.0) if units.values == "rms" else 1.0
+    kind, response_scale = _RESPONSE[units.response]
+    sizes = {name: array.size for name, array in stored.items()}
+    if len(set(sizes.values())) > 1:
+        raise IdentificationError(f"{where}, level {index + 1}: unequal lengths ({sizes})")
+    if (group.phase is None) != np.iscomplexobj(stored["response"]):
+        state = "left out, but '{}' holds real" if group.phase is None else "given, but '{}' holds complex"
+        raise IdentificationError(f"{where}.phase: is {state.format(group.response)} numbers")
+    for name in ("force", "response"):
+        if not np.iscomplexobj(stored[name]) and np.any(stored[name] < 0.0):
+            raise IdentificationError(f"{where}.{name}, level {index + 1}: an amplitude is below zero; check the path")
+    force = np.asarray(stored["force"] * (_FORCE[units.force] * peak), dtype=np.complex128)
+    response = np.asarray(stored["response"] * (response_scale * peak), dtype=np.complex128)
+    if group.phase is not None and mapping.phase is not None:
+        force, response = np.abs(force) + 0j, np.abs(response) * _turn(stored["phase"], mapping.phase, kind)
+    scales: dict[Controlled, tuple[float, float, str]] = {
+        "force": (_FORCE[units.force] * peak, float(np.median(np.abs(force))), "N"),
+        "response": (response_scale * peak, float(np.median(np.abs(response))), MOTION_UNIT[kind]),
+        "voltage": (1.0, float(index + 1), "V"),
+        "none": (1.0, float(index + 1), ""),
+    }
+    scale, measured, unit = scales[group.controlled]
+    level = group.level_values[index] * scale if group.level_values else measured
+    try:
+        label = group.label.format(value=level, unit=unit, number=index + 1).strip()
+        frequency_hz = stored["frequency"] * _FREQUENCY[units.frequency]
+        return FrequencyResponse(
+            frequency_hz, force, response, kind, group.controlled, level, label, specimen=mapping.specimen
+        )
+    except (AttributeError, KeyError, IndexError, ValueError) as error:
+        raise IdentificationError(f"{where}, level {index + 1}: {error}") from None
+
+
+def _turn(phase: NDArray[Any], convention: PhaseConvention, kind: Motion) -> Complex:
+    """``exp(i (arg Y - arg F))`` of the motion ``kind`` from stored phases."""
+    angle = np.radians(phase) if convention.unit == "deg" else phase
+    if convention.sense == "force-minus-response":
+        angle = -angle
+    quarter_turns = MOTION_ORDER[kind] - MOTION_ORDER[convention.of]
+    return np.asarray(np.exp(1j * angle) * 1j**quarter_turns, dtype=np.complex128)

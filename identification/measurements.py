@@ -1,0 +1,150 @@
+"""Measured periodic vibrations: one settled state.
+
+Conventions, everywhere: ``y(t) = Re sum_h Y_h exp(i h theta)``, amplitudes are peak values in SI units, the phase lag
+is ``arg F_1 - arg Q_1`` with the force F and the displacement Q at the drive point, +90 degrees at phase resonance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER, Channel, find_role
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+
+__all__ = ["PeriodicVibration", "wrapped_deg"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+def wrapped_deg(angle_deg: float) -> float:
+    """``angle_deg`` brought into (-180, 180]."""
+    return 180.0 - (180.0 - angle_deg) % 360.0
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicVibration:
+    """One settled periodic state.
+
+    Parameters
+    ----------
+    channels
+        One per row of ``harmonics``; exactly one of role ``force`` and one of role ``drive``.
+    frequency_hz
+        Mean frequency of the oscillator over the record.
+    harmonics
+        complex[n_channels, H + 1], peak, in the unit of each channel; column h belongs to ``exp(i h theta)``, H >= 1.
+    periods
+        Whole periods that the coefficients were taken from.
+    residual_rms
+        float[n_channels], what the harmonics leave over, in the unit of each channel.
+    harmonics_std
+        float[n_channels, H + 1], standard error of the real part and of the imaginary part alike; None if unknown.
+    drift
+        complex[n_channels], change of the fundamental over the periods used, relative to it: real part
+        amplitude, imaginary part phase in rad; None if unknown.
+    phase_lag_target_deg
+        Lag of the displacement that was asked for; 90 is phase resonance.
+    settled
+        Whether the controller had settled before the record began.
+    warnings
+        What a user should know about the record, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, shapes that do not agree, missing roles, no whole period.
+    """
+
+    channels: tuple[Channel, ...]
+    frequency_hz: float
+    harmonics: Complex
+    periods: int
+    residual_rms: Float
+    harmonics_std: Float | None = None
+    drift: Complex | None = None
+    phase_lag_target_deg: float = 90.0
+    settled: bool = True
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        names = [channel.name for channel in self.channels]
+        if len(set(names)) != len(names):
+            raise IdentificationError(f"channels: names are not unique ({', '.join(names)})")
+        find_role(self.channels, "force")
+        find_role(self.channels, "drive")
+        positive("frequency_hz", self.frequency_hz, "Hz")
+        if self.periods < 1:
+            raise IdentificationError(f"periods: is {self.periods}, needs at least 1")
+        self._check("harmonics", np.complex128, 2)
+        if self.harmonics.shape[1] < 2:
+            raise IdentificationError(f"harmonics: shape {self.harmonics.shape}, needs harmonics 0 and 1 at least")
+        self._check("residual_rms", np.float64, 1)
+        if self.drift is not None:
+            self._check("drift", np.complex128, 1)
+        if self.harmonics_std is not None:
+            self._check("harmonics_std", np.float64, 2)
+            if self.harmonics_std.shape != self.harmonics.shape:
+                raise IdentificationError(
+                    f"harmonics_std: shape {self.harmonics_std.shape}, harmonics have {self.harmonics.shape}"
+                )
+
+    def _check(self, name: str, dtype: type[np.generic], ndim: int) -> None:
+        array = finite_array(name, getattr(self, name), dtype, ndim)
+        if array.shape[0] != len(self.channels):
+            raise IdentificationError(f"{name}: shape {array.shape} for {len(self.channels)} channels")
+        object.__setattr__(self, name, array)
+
+    def index(self, name: str) -> int:
+        """Row of the channel called ``name``."""
+        for index, channel in enumerate(self.channels):
+            if channel.name == name:
+                return index
+        raise IdentificationError(f"no channel '{name}'; channels: {', '.join(c.name for c in self.channels)}")
+
+    @property
+    def force(self) -> Complex:
+        """complex[H + 1]: harmonics of the force, N."""
+        return np.asarray(self.harmonics[find_role(self.channels, "force")])
+
+    @property
+    def drive_m(self) -> Complex:
+        """complex[H + 1]: harmonics of the displacement at the drive point, m."""
+        return self.displacement_m(self.channels[find_role(self.channels, "drive")].name)
+
+    def displacement_m(self, name: str) -> Complex:
+        """complex[H + 1]: harmonics of the displacement at the channel called ``name``, m.
+
+        The static part (harmonic 0) of a velocity or acceleration channel says nothing of the displacement: it is NaN.
+        """
+        index = self.index(name)
+        order = MOTION_ORDER[self.channels[index].motion]
+        displacement: Complex = np.full(self.harmonics.shape[1], complex(np.nan, np.nan))
+        harmonic = np.arange(1, self.harmonics.shape[1])
+        displacement[1:] = self.harmonics[index, 1:] / (2j * np.pi * self.frequency_hz * harmonic) ** order
+        if order == 0:
+            displacement[0] = self.harmonics[index, 0]
+        return displacement
+
+    @property
+    def force_n(self) -> float:
+        """Peak of the fundamental of the force, N."""
+        return float(abs(self.force[1]))
+
+    @property
+    def amplitude_m(self) -> float:
+        """Peak of the fundamental of the displacement at the drive point, m."""
+        return float(abs(self.drive_m[1]))
+
+    @property
+    def phase_lag_deg(self) -> float:
+        """Lag of the displacement behind the force, fundamental, at the drive point, in (-180, 180]."""
+        return wrapped_deg(float(np.degrees(np.angle(self.force[1]) - np.angle(self.drive_m[1]))))
+
+    @property
+    def phase_error_deg(self) -> float:
+        """Measured lag minus the lag asked for, in (-180, 180]."""
+        return wrapped_deg(self.phase_lag_deg - self.phase_lag_target_deg)

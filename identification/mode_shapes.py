@@ -1,0 +1,79 @@
+"""Linear mass-normalised mode shapes, as a modal analysis at low level gives them, and what they turn motion into."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.measurements import PeriodicVibration
+from identification.validation import finite_array
+
+__all__ = ["ModeShapes", "mac"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ModeShapes:
+    """Mass-normalised deflection shapes at the channels of a measurement.
+
+    Parameters
+    ----------
+    channels
+        Names of the drive and response channels, one per row of ``shapes``.
+    shapes
+        float[n_channels, n_modes], kg^-1/2; no more modes than channels, linearly independent.
+    mode
+        Column of the mode that is tested.
+    """
+
+    channels: tuple[str, ...]
+    shapes: Float
+    mode: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        shapes = finite_array("shapes", self.shapes, np.float64, 2)
+        object.__setattr__(self, "shapes", shapes)
+        if shapes.shape[0] != len(self.channels):
+            raise IdentificationError(f"shapes: shape {shapes.shape} for {len(self.channels)} channels")
+        if not shapes.shape[1] or np.linalg.matrix_rank(shapes) < shapes.shape[1]:
+            raise IdentificationError(
+                f"shapes: {shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes"
+            )
+        if not 0 <= self.mode < shapes.shape[1]:
+            raise IdentificationError(f"mode: is {self.mode}, allowed are 0 to {shapes.shape[1] - 1}")
+
+    @property
+    def tested(self) -> Float:
+        """float[n_channels]: shape of the tested mode."""
+        return np.asarray(self.shapes[:, self.mode])
+
+    def fundamental_m(self, point: PeriodicVibration) -> Complex:
+        """complex[n_channels]: fundamental of the displacement at the channels of the shapes, m."""
+        return np.array([point.displacement_m(name)[1] for name in self.channels])
+
+    def modal_amplitude(self, point: PeriodicVibration) -> tuple[float, float]:
+        """Modal amplitude q (kg^1/2 m) and its standard error (NaN if the point has none).
+
+        ``q^2 = psi^H (Phi^T)^+ Phi^+ psi``, psi the fundamental of the deflection shape (Scheel et al. 2018; the
+        founding paper's equation for the modal amplitude).
+        """
+        inverse = np.linalg.pinv(self.shapes)
+        psi = self.fundamental_m(point)
+        modal = inverse @ psi
+        amplitude = float(np.linalg.norm(modal))
+        if point.harmonics_std is None or amplitude == 0.0:
+            return amplitude, np.nan
+        rows = [point.index(name) for name in self.channels]
+        std_m = point.harmonics_std[rows, 1] * np.abs(psi) / np.abs(point.harmonics[rows, 1])
+        sensitivity = np.abs(inverse.T @ modal) / amplitude
+        return amplitude, float(np.linalg.norm(sensitivity * std_m))
+
+
+def mac(linear: Float, measured: Complex) -> float:
+    """Modal assurance criterion ``|a^T b|^2 / ((a^T a) (b^H b))`` of a linear shape and a measured one, in [0, 1]."""
+    product = abs(np.dot(linear, measured)) ** 2
+    return float(product / (np.dot(linear, linear) * np.vdot(measured, measured).real))

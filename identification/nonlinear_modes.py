@@ -1,0 +1,141 @@
+"""A nonlinear mode as identified: modal frequency and damping ratio over the vibration level."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.validation import read_only
+
+__all__ = ["NonlinearMode"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_TABLE = (
+    *("force_n", "frequency_hz", "amplitude_m", "phase_lag_deg", "modal_frequency_hz", "modal_frequency_std_hz"),
+    *("damping_ratio", "damping_ratio_std", "damping_ratio_total_power", "damping_ratio_uncorrected"),
+    *("modal_amplitude", "mac", "force_purity", "response_purity", "fit_residual"),
+)
+_TEXT = ("source", "specimen")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NonlinearMode:
+    """Properties of one nonlinear mode, one entry per measured point or level; NaN marks what could not be had.
+
+    Parameters
+    ----------
+    force_n
+        float[n], peak of the fundamental of the force (at the modal frequency, where it comes from a fit).
+    frequency_hz
+        float[n], frequency of the vibration that was measured.
+    phase_lag_deg
+        float[n], lag of the displacement behind the force at ``frequency_hz``; 90 is phase resonance.
+    amplitude_m
+        float[n], peak of the fundamental of the displacement at the drive point (or of the measured response).
+    modal_frequency_hz, modal_frequency_std_hz
+        float[n], undamped modal frequency with its standard error.
+    damping_ratio, damping_ratio_std
+        float[n], modal damping ratio from the active power of the fundamental, with its standard error.
+    damping_ratio_total_power
+        float[n], the same from the active power of all harmonics.
+    damping_ratio_uncorrected
+        float[n], the same as ``damping_ratio`` with the vibration's frequency taken for the modal frequency.
+    modal_amplitude
+        float[n], q, kg^1/2 m.
+    apparent_mass_kg
+        float[n], ``1 / (phi_force phi_response)``: ``(w^2 - W^2 + 2 i W w z) X = F / apparent_mass`` near resonance.
+    mac
+        float[n], MAC of the fundamental of the deflection shape against the linear one.
+    force_purity, response_purity
+        float[n], ``|Y_1| / sqrt(sum_{h>=1} |Y_h|^2)`` of the force and of the drive-point displacement.
+    fit_residual
+        float[n], what a fit leaves of the measured data, relative, RMS; NaN where nothing was fitted.
+    force_harmonics, response_harmonics_m
+        complex[n, H + 1], N and m at the drive point.
+    source
+        ``backbone`` or ``stepped sine``.
+    specimen
+        Name of what was tested.
+    notes
+        What a user should know about these numbers, one line each.
+    """
+
+    force_n: Float
+    frequency_hz: Float
+    phase_lag_deg: Float
+    amplitude_m: Float
+    modal_frequency_hz: Float
+    modal_frequency_std_hz: Float
+    damping_ratio: Float
+    damping_ratio_std: Float
+    damping_ratio_total_power: Float
+    damping_ratio_uncorrected: Float
+    modal_amplitude: Float
+    apparent_mass_kg: Float
+    mac: Float
+    force_purity: Float
+    response_purity: Float
+    fit_residual: Float
+    force_harmonics: Complex
+    response_harmonics_m: Complex
+    source: str
+    specimen: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in _ARRAYS:
+            harmonic = name in _HARMONICS
+            array = read_only(getattr(self, name), np.complex128 if harmonic else np.float64)
+            object.__setattr__(self, name, array)
+            if array.ndim != (2 if harmonic else 1) or len(array) != len(self.force_n):
+                raise IdentificationError(f"{name}: shape {array.shape} does not fit {len(self.force_n)} points")
+        if not len(self.force_n):
+            raise IdentificationError("force_n: a nonlinear mode needs at least one point")
+
+    @property
+    def frequency_shift(self) -> float:
+        """Modal frequency at the largest amplitude over that at the smallest, minus one."""
+        smallest, largest = int(np.argmin(self.amplitude_m)), int(np.argmax(self.amplitude_m))
+        return float(self.modal_frequency_hz[largest] / self.modal_frequency_hz[smallest] - 1.0)
+
+    def force_harmonic_ratio(self, harmonic: int) -> Float:
+        """float[n]: ``|F_h / F_1|``; NaN if that harmonic was not measured."""
+        if not 0 <= harmonic < self.force_harmonics.shape[1]:
+            return np.full(len(self.force_n), np.nan)
+        return np.asarray(np.abs(self.force_harmonics[:, harmonic] / self.force_harmonics[:, 1]))
+
+    def table(self) -> list[dict[str, float | None]]:
+        """One dictionary per point, with None for what could not be had: ready for JSON."""
+        columns = {name: getattr(self, name) for name in _TABLE}
+        columns["f2_over_f1"] = self.force_harmonic_ratio(2)
+        columns["f3_over_f1"] = self.force_harmonic_ratio(3)
+        rows = range(len(self.force_n))
+        return [{name: _number(values[row]) for name, values in columns.items()} for row in rows]
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        return arrays, {**{name: getattr(self, name) for name in _TEXT}, "notes": list(self.notes)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "NonlinearMode":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        missing = [name for name in _ARRAYS if name not in arrays] + [name for name in _TEXT if name not in attributes]
+        if missing:
+            raise IdentificationError(f"nonlinear mode: {', '.join(missing)} missing")
+        values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
+        values |= {name: str(attributes[name]) for name in _TEXT}
+        return cls(**values, notes=tuple(attributes.get("notes", ())))
+
+
+_ARRAYS = tuple(field.name for field in fields(NonlinearMode) if field.name not in (*_TEXT, "notes"))
+_HARMONICS = ("force_harmonics", "response_harmonics_m")
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,198 @@
+"""Modal frequency and damping from stepped-sine responses, one level at a time.
+
+Where the controller holds the response amplitude, stiffness and damping of the mode are those of that amplitude at
+every frequency of the level: its response is that of a linear mode, and a fit of one mode with constant w and z is
+legitimate (under force control the amplitude passes through a range, and it is not). With the dynamic stiffness S = F
+/ X, X the displacement,
+
+    S exp(-i beta) = m (w^2 - W^2 + 2 i W w z),
+
+where m is the apparent mass (``1 / (phi_force phi_response)``) and beta turns the modal constant. For a given beta
+this is linear in ``m w^2``, ``m`` and ``2 m w z``; eliminating these leaves ``cos beta, sin beta`` as the smaller
+eigenvector of a 2 x 2 matrix, so the fit needs neither start values nor iterations. Equations are weighted by ``1 /
+|S|``, that is for noise in proportion to the force.
+
+Why beta: damping localised in a joint makes the modal constant complex, and a skew between the two sensors or a
+drifting resonance looks the same. Holding it at zero forces the mismatch into the modal frequency.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.frequency_responses import FrequencyResponse
+from identification.nonlinear_modes import NonlinearMode
+
+__all__ = ["stepped_sine_mode"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_LEVEL_TOLERANCE = 0.02
+_MIN_POINTS = 5
+
+
+@dataclass(frozen=True)
+class _LevelFit:
+    """One mode fitted to one level: w in rad/s, z, m in kg, beta in rad, standard errors, relative RMS residual."""
+
+    omega: float
+    damping: float
+    mass_kg: float
+    beta: float
+    omega_std: float
+    damping_std: float
+    residual: float
+    points: int
+
+
+def stepped_sine_mode(
+    responses: Sequence[FrequencyResponse], *, phase_window_deg: float = 60.0, complex_constant: bool = True
+) -> NonlinearMode:
+    """Nonlinear mode from the response-controlled levels of a stepped-sine test.
+
+    Parameters
+    ----------
+    responses
+        Measured levels; those not response-controlled are left out and named in the notes.
+    phase_window_deg
+        Points whose phase lag is within this of 90 degrees are used, if the response held its level within 2 %.
+    complex_constant
+        Whether the modal constant may be complex (beta above); False holds beta at zero.
+
+    Returns
+    -------
+    NonlinearMode
+        One entry per level, in the given order; ``amplitude_m`` is the displacement of the measured response at its
+        level, ``frequency_hz`` the modal frequency, ``phase_lag_deg`` is ``90 + beta``, ``force_n`` the fitted force
+        there. Without a mass-normalised shape ``modal_amplitude`` is NaN: amplitudes are those of the measured point,
+        which is enough to predict responses there together with ``apparent_mass_kg``. Power, purity and MAC are NaN:
+        fundamentals alone say nothing of them. Standard errors come from the residual of the fit as if it were noise;
+        where the model is what does not fit, they are no interval.
+
+    Raises
+    ------
+    IdentificationError
+        Without response-controlled levels, or with fewer than five usable points or no resonance in one of them.
+    """
+    if not 0.0 < phase_window_deg <= 90.0:
+        raise IdentificationError(f"phase_window_deg: is {phase_window_deg:g}, allowed is above 0 to 90")
+    levels = [item for item in responses if item.controlled == "response"]
+    if not levels:
+        kinds = ", ".join(sorted({item.controlled for item in responses})) or "no levels"
+        raise IdentificationError(
+            f"responses: none is response-controlled ({kinds} given); a fit of one linear mode per level needs a "
+            "constant response amplitude"
+        )
+    fits = [_fit_level(level, phase_window_deg, complex_constant) for level in levels]
+    unknown = np.full(len(fits), np.nan)
+    omega, damping = np.array([fit.omega for fit in fits]), np.array([fit.damping for fit in fits])
+    mass, beta = np.array([fit.mass_kg for fit in fits]), np.array([fit.beta for fit in fits])
+    motion = np.array([_held_amplitude_m(level, fit.omega) for level, fit in zip(levels, fits, strict=True)])
+    force = 2j * mass * np.exp(1j * beta) * damping * omega**2 * motion
+    return NonlinearMode(
+        force_n=np.abs(force),
+        frequency_hz=omega / (2.0 * np.pi),
+        phase_lag_deg=np.degrees(np.angle(force)),
+        amplitude_m=motion,
+        modal_frequency_hz=omega / (2.0 * np.pi),
+        modal_frequency_std_hz=np.array([fit.omega_std for fit in fits]) / (2.0 * np.pi),
+        damping_ratio=damping,
+        damping_ratio_std=np.array([fit.damping_std for fit in fits]),
+        damping_ratio_total_power=unknown,
+        damping_ratio_uncorrected=unknown,
+        modal_amplitude=unknown,
+        apparent_mass_kg=mass,
+        mac=unknown,
+        force_purity=unknown,
+        response_purity=unknown,
+        fit_residual=np.array([fit.residual for fit in fits]),
+        force_harmonics=np.column_stack([unknown.astype(complex), force]),
+        response_harmonics_m=np.column_stack([unknown.astype(complex), motion.astype(complex)]),
+        source="stepped sine",
+        specimen=levels[0].specimen,
+        notes=_notes(responses, levels, fits),
+    )
+
+
+def _fit_level(level: FrequencyResponse, window_deg: float, complex_constant: bool) -> _LevelFit:
+    """Weighted linear least squares for m w^2, m and 2 m w z, with beta eliminated; see the module's head."""
+    name = f"level '{level.label}'" if level.label else f"level {level.level:g} {level.level_unit}"
+    held = np.abs(np.abs(level.response) / np.median(np.abs(level.response)) - 1.0) <= _LEVEL_TOLERANCE
+    used = held & (np.abs(level.phase_lag_deg - 90.0) <= window_deg)
+    if np.count_nonzero(used) < _MIN_POINTS:
+        raise IdentificationError(
+            f"{name}: {np.count_nonzero(used)} of {used.size} points lie within {window_deg:g} deg of phase resonance "
+            f"with the response at its level within {100 * _LEVEL_TOLERANCE:g} %, needs at least {_MIN_POINTS}"
+        )
+    omega = 2.0 * np.pi * level.frequency_hz[used]
+    stiffness = level.force[used] / level.displacement_m[used]
+    scale = float(np.mean(omega))
+    x = omega / scale
+    weight = 1.0 / np.abs(stiffness)
+    design = _stacked(np.column_stack([np.ones_like(x), -(x**2), 1j * x]) * weight[:, None])
+    unit = stiffness * weight
+    pair = _stacked(np.column_stack([unit, -1j * unit]))  # exp(-i beta) S = cos(beta) S + sin(beta) (-i S)
+    solution = np.linalg.lstsq(design, pair, rcond=None)[0]
+    turn = np.array([1.0, 0.0])
+    if complex_constant:
+        left = pair - design @ solution
+        turn = np.linalg.eigh(left.T @ left)[1][:, 0]
+    a, mass, c = solution @ turn
+    if mass < 0.0:
+        a, mass, c, turn = -a, -mass, -c, -turn
+    if a <= 0.0 or c <= 0.0:
+        raise IdentificationError(f"{name}: no damped resonance fits; check sign and reference of the phase")
+    w = float(np.sqrt(a / mass))
+    z = float(c / (2.0 * mass * w))
+    misfit = design @ np.array([a, mass, c]) - pair @ turn
+    covariance = _covariance(x, w, z, mass, weight, misfit, complex_constant)
+    return _LevelFit(
+        omega=w * scale,
+        damping=z,
+        mass_kg=float(mass) / scale**2,
+        beta=float(np.arctan2(turn[1], turn[0])),
+        omega_std=float(np.sqrt(covariance[0, 0])) * scale,
+        damping_std=float(np.sqrt(covariance[1, 1])),
+        residual=float(np.linalg.norm(misfit) / np.sqrt(x.size)),
+        points=int(x.size),
+    )
+
+
+def _stacked(values: Complex | Float) -> Float:
+    """Real parts above imaginary parts."""
+    return np.concatenate([values.real, values.imag])
+
+
+def _covariance(x: Float, w: float, z: float, mass: float, weight: Float, misfit: Float, turned: bool) -> Float:
+    """Covariance of w, z, m (and beta) from the misfit taken as white noise."""
+    model = mass * (w**2 - x**2 + 2j * x * w * z)
+    columns = [mass * (2.0 * w + 2j * x * z), 2j * mass * x * w, model / mass]
+    if turned:
+        columns.append(1j * model)
+    jacobian = _stacked(np.column_stack(columns) * weight[:, None])
+    variance = float(np.sum(misfit**2)) / (misfit.size - len(columns))
+    return np.asarray(variance * np.linalg.inv(jacobian.T @ jacobian))
+
+
+def _held_amplitude_m(level: FrequencyResponse, omega: float) -> float:
+    """Displacement at ``omega`` (rad/s) of the amplitude that the controller held."""
+    held = float(np.median(np.abs(level.response)))
+    return held / omega ** {"displacement": 0, "velocity": 1, "acceleration": 2}[level.kind]
+
+
+def _notes(
+    responses: Sequence[FrequencyResponse], levels: Sequence[FrequencyResponse], fits: Sequence[_LevelFit]
+) -> tuple[str, ...]:
+    notes = ["modal amplitude, harmonics, power and MAC cannot be had from fundamentals at one point alone"]
+    if len(levels) < len(responses):
+        notes.append(f"{len(responses) - len(levels)} of {len(responses)} levels left out: not response-controlled")
+    for level, fit in zip(levels, fits, strict=True):
+        if not level.frequency_hz.min() <= fit.omega / (2.0 * np.pi) <= level.frequency_hz.max():
+            notes.append(
+                f"level {level.level:g} {level.level_unit}: its modal frequency lies outside the measured range"
+            )
+    return tuple(notes)

@@ -1,0 +1,39 @@
+"""Checks that every measurement type of this package shares."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from identification.errors import IdentificationError
+
+__all__ = ["finite_array", "positive", "read_only"]
+
+
+def read_only(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
+    """Copy of ``values`` as an array that cannot be written to."""
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+def finite_array(name: str, values: ArrayLike, dtype: DTypeLike, ndim: int) -> NDArray[Any]:
+    """Read-only copy of ``values``; raises `IdentificationError` unless it has ``ndim`` dimensions and is finite."""
+    try:
+        array = read_only(values, dtype)
+    except (TypeError, ValueError) as error:
+        raise IdentificationError(f"{name}: not an array of numbers ({error})") from None
+    if array.ndim != ndim:
+        raise IdentificationError(f"{name}: has {array.ndim} dimensions (shape {array.shape}), needs {ndim}")
+    if not np.all(np.isfinite(array)):
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise IdentificationError(f"{name}: value at {list(index)} is {array[index]}, must be finite")
+    return array
+
+
+def positive(name: str, value: float, unit: str = "") -> float:
+    """``value`` as a float; raises `IdentificationError` unless it is finite and above zero."""
+    number = float(value)
+    if not (np.isfinite(number) and number > 0.0):
+        raise IdentificationError(f"{name}: is {number:g}{unit and ' '}{unit}, must be finite and above zero")
+    return number

@@ -1,0 +1,85 @@
+"""The bench from Python: what ``rig run`` and ``rig resume`` do, in one call each."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from identification import Backbone
+from rig.bench import Bench, load_bench
+from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.plans import bench_of, load_plan
+from rig.campaigns.runner import Progress, carry_out, take_up
+from rig.errors import ConfigurationError
+from rig.measurements import backbone
+from rig.recording.reader import Recording
+
+__all__ = ["Run", "resume", "run"]
+
+
+class Run:
+    """A recording that was just made, and its measurements. Without an output file it lives as long as this object."""
+
+    def __init__(self, recording: Recording, folder: "TemporaryDirectory[str] | None" = None) -> None:
+        self.recording = recording
+        self._folder = folder
+
+    @property
+    def complete(self) -> bool:
+        """Whether every point of the plan was measured and accepted."""
+        return self.recording.complete
+
+    def backbone(self) -> Backbone:
+        """The accepted points as a backbone."""
+        return backbone(self.recording)
+
+    def close(self) -> None:
+        """Let go of the file; a temporary one is removed."""
+        self.recording.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def __enter__(self) -> "Run":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        self.close()
+
+
+def run(
+    plan: BackbonePlan | str | Path,
+    *,
+    bench: Bench | str | Path | None = None,
+    output: str | Path | None = None,
+    seed: int = 0,
+    realtime: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Run:
+    """Carry out a plan: a plan object, the name of a shipped one (``"magnet-beam/backbone"``) or a TOML file.
+
+    ``bench`` replaces the bench that the plan names. ``seed`` draws the noise of a virtual rig; the same seed gives the
+    same recording bit for bit. ``realtime`` holds a virtual rig back to the wall clock.
+
+    Raises `rig.errors.ConfigurationError` for a plan or bench that is not allowed, `rig.errors.RecordingError` for a
+    file that cannot be written, `rig.errors.DaqError` for a device that cannot be started. A run that ends early
+    raises nothing; ``complete`` is false and the recording says why.
+    """
+    if not 0 <= seed < 2**63:
+        raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
+    source = "" if isinstance(plan, BackbonePlan) else plan
+    plan = plan if isinstance(plan, BackbonePlan) else load_plan(plan)
+    if bench is None:
+        bench = bench_of(plan, source)
+    elif not isinstance(bench, Bench):
+        bench = load_bench(bench)
+    folder = TemporaryDirectory(prefix="vibrolock-") if output is None else None
+    path = Path(output) if output is not None else Path(folder.name if folder else "") / "run.h5"
+    recording = carry_out(plan, bench, path, seed=seed, realtime=realtime, overwrite=overwrite, progress=progress)
+    return Run(recording, folder)
+
+
+def resume(output: str | Path, *, realtime: bool = False, progress: Progress | None = None) -> Run:
+    """Finish an interrupted run: points that were accepted stay, the others are measured in a further part."""
+    return Run(take_up(Path(output), realtime=realtime, progress=progress))

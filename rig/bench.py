@@ -1,0 +1,153 @@
+"""What a bench is: driver, rate, channels, limits and the facts known of the specimen; read from TOML."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from rig.configuration import Configured, read_toml, validated
+from rig.daq import Channel
+from rig.errors import ConfigurationError
+
+__all__ = ["Bench", "DriverChoice", "Limits", "SpecimenFacts", "load_bench", "shipped_benches"]
+
+
+class DriverChoice(Configured):
+    """Which driver stands between the loop and the rig."""
+
+    name: str = Field(min_length=1)
+    """Name of the driver's entry point, for instance ``virtual``."""
+    options: dict[str, Any] = Field(default_factory=dict)
+    """What this driver wants to know; the driver checks it."""
+
+
+class Limits(Configured):
+    """What the bench may be asked for. A voltage is clamped to its limit; anything else beyond its limit trips."""
+
+    voltage_v: float = Field(gt=0, le=100)
+    """Largest output amplitude, V."""
+    force_n: float = Field(gt=0)
+    """Largest instantaneous force, N."""
+    acceleration_m_s2: float = Field(gt=0)
+    """Largest instantaneous acceleration of any drive or response channel, m/s^2."""
+    displacement_m: float = Field(gt=0)
+    """Largest displacement amplitude of any drive or response channel, m; from the acceleration's fundamental."""
+    frequency_hz: tuple[float, float]
+    """Lowest and highest frequency of the oscillator, Hz."""
+    slew_v_per_s: float = Field(100.0, gt=0)
+    """Largest rate of change of the output amplitude, V/s."""
+    overload_fraction: float = Field(0.98, gt=0, le=1)
+    """Part of a channel's range from which on a reading counts as overload."""
+    overload_s: float = Field(0.002, ge=0, le=10)
+    """Time of uninterrupted overload that trips, s."""
+    stuck_s: float = Field(0.5, gt=0, le=3600)
+    """Time without any change of a reading, at a held level, that trips, s."""
+    ramp_down_s: float = Field(0.5, gt=0, le=60)
+    """Time of the ramp to 0 V that ends every run, s."""
+
+    @field_validator("frequency_hz")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not 0 < value[0] < value[1]:
+            raise ValueError(f"[{value[0]:g}, {value[1]:g}]: allowed is two positive frequencies, the lower one first")
+        return value
+
+
+class SpecimenFacts(Configured):
+    """What is known of the specimen before the test."""
+
+    name: str
+    """Name, for files and figures."""
+    linear_frequency_hz: float = Field(gt=0)
+    """Frequency of the mode under test at low level, Hz."""
+    drive_mode_shape: float | None = Field(None)
+    """Mass-normalised shape of this mode at the drive channel, kg^-1/2; from a modal test. Damping needs it."""
+
+    @field_validator("drive_mode_shape")
+    @classmethod
+    def _not_zero(cls, value: float | None) -> float | None:
+        if value == 0.0:
+            raise ValueError("0: a mode cannot be driven at its node, allowed is any other number")
+        return value
+
+
+class Bench(Configured):
+    """A rig as a laboratory has it."""
+
+    name: str = Field(min_length=1)
+    """Name, used in plan names and files."""
+    description: str = ""
+    """What it is, and where its numbers come from."""
+    driver: DriverChoice
+    """The driver and its options."""
+    sample_rate_hz: float = Field(gt=0, le=1e6)
+    """Rate of the loop, Hz."""
+    block: int = Field(1, ge=1, le=65536)
+    """Samples swapped a call."""
+    output_range_v: float = Field(10.0, gt=0, le=100)
+    """Range of the output converter, V."""
+    channels: tuple[Channel, ...] = Field(min_length=2)
+    """The input channels, in the device's order."""
+    limits: Limits
+    """What the bench may be asked for."""
+    specimen: SpecimenFacts
+    """What is known of the specimen."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        names = [channel.name for channel in self.channels]
+        for role in ("force", "drive"):
+            count = sum(channel.role == role for channel in self.channels)
+            if count != 1:
+                raise ValueError(f"channels: {count} with role {role!r}, allowed is exactly 1")
+        doubled = sorted({name for name in names if names.count(name) > 1})
+        if doubled:
+            raise ValueError(f"channels: the name {doubled[0]!r} is used twice")
+        if self.limits.voltage_v > self.output_range_v:
+            raise ValueError(
+                f"limits.voltage_v = {self.limits.voltage_v:g}: allowed is up to output_range_v = {self.output_range_v:g}"
+            )
+        if self.limits.frequency_hz[1] > self.sample_rate_hz / 4.0:
+            raise ValueError(
+                f"limits.frequency_hz = {list(self.limits.frequency_hz)}: allowed is up to a quarter of "
+                f"sample_rate_hz, {self.sample_rate_hz / 4.0:g} Hz"
+            )
+        for channel in self.channels:
+            limit = self.limits.force_n if channel.role == "force" else self.limits.acceleration_m_s2
+            if channel.role != "monitor" and limit > channel.range_in_unit:
+                raise ValueError(
+                    f"limits: {limit:g} {channel.unit} is beyond the range of channel {channel.name!r}, "
+                    f"allowed is up to {channel.range_in_unit:g} {channel.unit}"
+                )
+        return self
+
+    def index_of(self, role: str) -> int:
+        """Index of the first channel with a role."""
+        return next(index for index, channel in enumerate(self.channels) if channel.role == role)
+
+
+def _folder() -> Path:
+    return Path(str(resources.files("rig"))) / "benches"
+
+
+def shipped_benches() -> list[str]:
+    """Names of the benches that come with the product."""
+    return sorted(path.stem for path in _folder().glob("*.toml"))
+
+
+def load_bench(name_or_path: str | Path) -> Bench:
+    """A shipped bench by its name, or a bench from a TOML file."""
+    text = str(name_or_path)
+    path = Path(text)
+    if path.suffix != ".toml":
+        if text not in shipped_benches():
+            raise ConfigurationError(
+                f"bench = {text!r}: there is no such bench; allowed is {', '.join(shipped_benches())} or a .toml file"
+            )
+        path = _folder() / f"{text}.toml"
+    return validated(Bench, read_toml(path), text)
+
+
+BenchSource = Bench | str | Path
+"""A bench, the name of a shipped one, or a TOML file."""

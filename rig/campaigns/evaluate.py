@@ -1,0 +1,152 @@
+"""From the recorded rows of a point to its result, and from the results of a recording to measurements in memory."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from identification import Backbone, Channel, IdentificationError, PeriodicVibration, nonlinear_mode, periodic_vibration
+from rig.bench import Bench
+from rig.campaigns.backbone import BackbonePlan, Target
+from rig.sequencer.layout import Outcome
+
+__all__ = ["backbone_of", "failed_point", "measured_point"]
+
+WHY = {
+    Outcome.NOT_SETTLED: "not settled within {longest:g} periods",
+    Outcome.DISTURBED: "the settle rule was broken while recording",
+    Outcome.LOST_LOCK: "phase lock lost",
+    Outcome.UNREACHABLE: "out of reach: the output stood at its voltage limit",
+    Outcome.INTERRUPTED: "interrupted",
+}
+
+
+def measured_point(
+    bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray, settling: np.void
+) -> dict[str, Any]:
+    """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment.
+
+    A point whose recorded fundamental is too far from the wanted phase is kept, marked as not accepted.
+    """
+    point = _head(plan, target)
+    channels = _channels(bench)
+    try:
+        vibration = periodic_vibration(
+            rows["theta_rad"].astype(float),
+            rows["inputs"].astype(float).T,
+            channels,
+            sample_rate_hz=bench.sample_rate_hz,
+            harmonics=plan.harmonics,
+            phase_lag_target_deg=plan.controller.phase_lag_deg + 180.0,
+        )
+        mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
+    except IdentificationError as error:
+        return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+    error_deg = vibration.phase_error_deg
+    accepted = abs(error_deg) <= plan.accepted_phase_error_deg
+    damping = float(mode.damping_ratio[0])
+    scatter = rows["phase_error_rad"].astype(float)
+    return {
+        **point,
+        "settled": True,
+        "accepted": accepted,
+        "reason": ""
+        if accepted
+        else f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg",
+        "force_n": vibration.force_n,
+        "frequency_hz": vibration.frequency_hz,
+        "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
+        "damping_ratio": damping if math.isfinite(damping) else None,
+        "amplitude_m": vibration.amplitude_m,
+        "phase_error_deg": error_deg,
+        "phase_scatter_deg": math.degrees(float(scatter.std())),
+        "voltage_v": float(np.abs(rows["command_v"]).mean()),
+        "force_purity": float(mode.force_purity[0]),
+        "response_purity": float(mode.response_purity[0]),
+        "periods": vibration.periods,
+        "settle_periods": float(settling["periods"]),
+        "amplitude_drift": float(settling["drift"]),
+        "harmonics": _pairs(vibration.harmonics),
+        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
+        "residual_rms": vibration.residual_rms.tolist(),
+        "drift": None if vibration.drift is None else _pairs(vibration.drift),
+        "warnings": list(vibration.warnings),
+    }
+
+
+def failed_point(plan: BackbonePlan, target: Target, outcome: np.void) -> dict[str, Any]:
+    """The mark of a point that was not measured, with the reason; it holds no data."""
+    code = Outcome(int(outcome["outcome"]))
+    error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
+    why = WHY.get(code, code.name.lower()).format(longest=plan.settle.longest_periods)
+    if math.isfinite(error) and code is not Outcome.INTERRUPTED:
+        why += f" (averaged phase error {error:.2f} deg, amplitude drift {100.0 * drift:.2f} %)"
+    return {
+        **_head(plan, target),
+        "settled": False,
+        "accepted": False,
+        "reason": why,
+        "settle_periods": float(outcome["periods"]),
+    }
+
+
+def backbone_of(
+    points: Iterable[Mapping[str, Any]],
+    channels: Sequence[Mapping[str, Any]],
+    specimen: str,
+    drive_mode_shape: float | None,
+    phase_lag_target_deg: float,
+) -> Backbone:
+    """The accepted points of a recording as measurements; raises `IdentificationError` where there is none."""
+    accepted = [point for point in points if point["accepted"]]
+    if not accepted:
+        raise IdentificationError("points: none of the recording was accepted")
+    kinds = tuple(Channel(c["name"], c["role"], c["unit"]) for c in channels)
+    vibrations = tuple(
+        PeriodicVibration(
+            kinds,
+            point["frequency_hz"],
+            _complex(point["harmonics"]),
+            point["periods"],
+            np.asarray(point["residual_rms"], float),
+            None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
+            None if point["drift"] is None else _complex(point["drift"]),
+            phase_lag_target_deg=phase_lag_target_deg,
+            warnings=tuple(point["warnings"]),
+        )
+        for point in accepted
+    )
+    return Backbone(
+        vibrations,
+        specimen,
+        drive_mode_shape,
+        tuple(point["direction"] for point in accepted),
+        tuple(point["repeat"] for point in accepted),
+    )
+
+
+def _head(plan: BackbonePlan, target: Target) -> dict[str, Any]:
+    return {
+        "number": target.number,
+        "level": target.level,
+        "level_unit": plan.level_unit,
+        "direction": target.direction,
+        "repeat": target.repeat,
+    }
+
+
+def _channels(bench: Bench) -> tuple[Channel, ...]:
+    return tuple(
+        Channel(c.name, cast(Literal["force", "drive", "response", "monitor"], c.role), c.unit) for c in bench.channels
+    )
+
+
+def _pairs(values: np.ndarray) -> Any:
+    """Complex numbers as [real, imaginary]."""
+    return np.stack([values.real, values.imag], axis=-1).tolist()
+
+
+def _complex(pairs: Any) -> np.ndarray:
+    array = np.asarray(pairs, float)
+    return np.asarray(array[..., 0] + 1j * array[..., 1])

@@ -1,0 +1,298 @@
+"""The command ``rig``. Exit status 0 only on success; errors are one line, with a traceback under ``--debug``."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    help="Phase-locked nonlinear vibration tests on virtual and real rigs, and models from the recordings.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
+Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
+
+
+@app.callback()
+def _common(debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False) -> None:
+    pass
+
+
+@app.command("list")
+def list_(json: Json = False) -> None:
+    """Shipped benches and plans, and the installed drivers."""
+    from rig.bench import load_bench, shipped_benches
+    from rig.campaigns.plans import load_plan, shipped_plans
+    from rig.console import print_json
+    from rig.drivers import driver_names
+
+    benches = [{"name": name, "description": load_bench(name).description} for name in shipped_benches()]
+    plans = [{"name": name, "description": load_plan(name).description} for name in shipped_plans()]
+    if json:
+        print_json({"benches": benches, "plans": plans, "drivers": driver_names()})
+        return
+    for heading, rows in (("benches", benches), ("plans", plans)):
+        print(f"{heading}:")
+        for row in rows:
+            print(f"  {row['name']:32} {' '.join(row['description'].split())}")
+    print(f"drivers:\n  {', '.join(driver_names())}")
+
+
+@app.command()
+def run(
+    plan: Annotated[str, typer.Argument(help="Shipped plan (magnet-beam/backbone) or TOML file.")],
+    output: Output,
+    bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
+    daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
+    realtime: Realtime = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")] = False,
+    json: Json = False,
+) -> None:
+    """Carry out a plan and record it."""
+    import rig
+    from rig.bench import load_bench
+    from rig.campaigns.plans import bench_of, load_plan
+
+    loaded = load_plan(plan)
+    chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
+    if daq is not None:
+        chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
+    _carry(
+        json,
+        lambda progress: rig.run(
+            loaded, bench=chosen, output=output, seed=seed, realtime=realtime, overwrite=overwrite, progress=progress
+        ),
+    )
+
+
+@app.command()
+def resume(
+    output: Annotated[Path, typer.Argument(help="Recording of the interrupted run.")],
+    realtime: Realtime = False,
+    json: Json = False,
+) -> None:
+    """Finish a run that was interrupted; points that were accepted stay."""
+    import rig
+
+    _carry(json, lambda progress: rig.resume(output, realtime=realtime, progress=progress))
+
+
+def _carry(json: bool, start: Any) -> None:
+    from rig.console import RunProgress, print_json
+    from rig.summary import summarise_recording
+
+    progress = RunProgress()
+    try:
+        result = start(progress)
+    finally:
+        progress.close()
+    with result:
+        summary = summarise_recording(result.recording)
+        complete = result.complete
+    if json:
+        print_json(summary)
+    else:
+        _say_how_it_ended(summary)
+    if not complete:
+        raise typer.Exit(1)
+
+
+def _say_how_it_ended(summary: dict[str, Any]) -> None:
+    loop = summary["loop"]
+    accepted = sum(point["accepted"] for point in summary["points"])
+    factor = loop["realtime_factor"]
+    pace = f", {factor:.0f} times real time in the loop" if factor else ""
+    ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
+    print(f"{ended}: {accepted} of {len(summary['points'])} points accepted, {loop['samples']} samples{pace}")
+    for name, count in summary["counters"].items():
+        if count:
+            print(f"warning: {name.replace('_', ' ')}: {count} samples")
+
+
+@app.command()
+def show(
+    file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")], json: Json = False
+) -> None:
+    """What is in a file: points, quality, statistics of the loop."""
+    from rig.console import print_json
+    from rig.summary import summarise
+
+    summary = summarise(file)
+    if json:
+        print_json(summary)
+    else:
+        _print_summary(summary)
+
+
+def _print_summary(summary: dict[str, Any]) -> None:
+    from rig.console import number, print_table
+
+    if "responses" in summary:
+        print(f"{summary['kind']}: {len(summary['responses'])} levels")
+        print_table(
+            ("level", "samples", "from Hz", "to Hz"),
+            [
+                (r["label"], str(r["samples"]), number(r["lowest_hz"], ".2f"), number(r["highest_hz"], ".2f"))
+                for r in summary["responses"]
+            ],
+        )
+        return
+    print(f"{summary['kind']} of {summary['specimen'] or 'an unnamed specimen'}")
+    if "loop" not in summary:
+        _print_mode(summary)
+        return
+    loop = summary["loop"]
+    print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
+    print_table(
+        ("level", "", "force N", "frequency Hz", "damping %", "amplitude mm", "phase error deg", "settled", "quality"),
+        [
+            (
+                f"{p['level']:.4g}",
+                p["level_unit"],
+                number(p["force_n"], ".4f"),
+                number(p["frequency_hz"], ".4f"),
+                number(p["damping_ratio"], ".4f", 100.0),
+                number(p["amplitude_m"], ".4f", 1e3),
+                number(p["phase_error_deg"], ".2f"),
+                "yes" if p["settled"] else "no",
+                "ok" if p["accepted"] else p["reason"],
+            )
+            for p in summary["points"]
+        ],
+    )
+    print(
+        f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz, {loop['periods']} periods, "
+        f"{loop['overruns']} overruns, {number(loop['realtime_factor'], '.0f')} times real time"
+    )
+    for index, part in enumerate(summary["parts"]):
+        print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}")
+
+
+def _print_mode(summary: dict[str, Any]) -> None:
+    from rig.console import number, print_table
+
+    print_table(
+        ("force N", "amplitude mm", "modal frequency Hz", "+-", "damping %", "+-", "all harmonics %", "phase lag deg"),
+        [
+            (
+                number(p["force_n"], ".4f"),
+                number(p["amplitude_m"], ".5f", 1e3),
+                number(p["modal_frequency_hz"], ".4f"),
+                number(p["modal_frequency_std_hz"], ".4f", 1.96),
+                number(p["damping_ratio"], ".4f", 100.0),
+                number(p["damping_ratio_std"], ".4f", 196.0),
+                number(p["damping_ratio_total_power"], ".4f", 100.0),
+                number(p["phase_lag_deg"], ".2f"),
+            )
+            for p in summary["points"]
+        ],
+    )
+    print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
+    for note in summary["notes"]:
+        print(f"note: {note}")
+
+
+@app.command()
+def identify(
+    file: Annotated[Path, typer.Argument(help="Backbone recording or imported frequency responses.")],
+    output: Output,
+    model: Annotated[str, typer.Option(help="Kind of model: nonlinear-mode.")] = "nonlinear-mode",
+    json: Json = False,
+) -> None:
+    """Turn a recording into a model."""
+    from rig.console import print_json
+    from rig.errors import ConfigurationError
+    from rig.models import NONLINEAR_MODE, identify_nonlinear_mode, save_model
+    from rig.summary import summarise
+
+    if model != NONLINEAR_MODE:
+        raise ConfigurationError(f"--model = {model!r}: allowed is {NONLINEAR_MODE}")
+    save_model(identify_nonlinear_mode(file), output)
+    summary = summarise(output)
+    if json:
+        print_json(summary)
+    else:
+        _print_summary(summary)
+
+
+@app.command("plot")
+def plot_(
+    file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
+) -> None:
+    """Draw what is in a file."""
+    from rig.figures import plot
+
+    plot(file, output)
+
+
+@app.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(help="MAT file with stepped-sine measurements.")],
+    mapping: Annotated[Path, typer.Option(help="TOML file that says what is where in it.")],
+    output: Output,
+    format_: Annotated[str, typer.Option("--format", help="Format of the file: mat.")] = "mat",
+    json: Json = False,
+) -> None:
+    """Bring in measurements from elsewhere."""
+    from rig.console import print_json
+    from rig.errors import ConfigurationError
+    from rig.importing import read_frequency_responses
+    from rig.models import save_frequency_responses
+    from rig.summary import summarise
+
+    if format_ != "mat":
+        raise ConfigurationError(f"--format = {format_!r}: allowed is mat")
+    save_frequency_responses(read_frequency_responses(file, mapping), output)
+    summary = summarise(output)
+    if json:
+        print_json(summary)
+    else:
+        _print_summary(summary)
+
+
+@app.command()
+def doctor(json: Json = False) -> None:
+    """What this machine can promise: clock, privileges, disk, drivers."""
+    from rig.console import print_json
+    from rig.realtime import examine
+
+    facts = examine(Path.cwd())
+    if json:
+        print_json(facts)
+        return
+    for name, value in facts.items():
+        text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
+        text = ", ".join(value) if isinstance(value, list) else text
+        print(f"{name.replace('_', ' '):22} {text}")
+
+
+def main() -> None:
+    """Entry point of the command."""
+    debug = "--debug" in sys.argv
+    try:
+        app(prog_name="rig")
+    except Exception as error:
+        if debug:
+            raise
+        print(f"rig: {_one_line(error)}", file=sys.stderr)
+        sys.exit(1)
+
+
+def _one_line(error: Exception) -> str:
+    """The error in one line; anything that is not ours is named with its type."""
+    from identification.errors import IdentificationError
+    from rig.errors import RigError
+
+    text = " ".join(str(error).split())
+    if isinstance(error, RigError | IdentificationError):
+        return text
+    return f"unexpected {type(error).__name__}: {text} (run again with --debug for the details)"

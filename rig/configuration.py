@@ -1,0 +1,74 @@
+"""Benches and plans from TOML files: read, validated, and refused in one clear line."""
+
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from rig.errors import ConfigurationError
+
+__all__ = ["Configured", "explain", "read_toml", "validated"]
+
+
+class Configured(BaseModel):
+    """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table in a TOML file; `ConfigurationError` names the file and the line where it cannot be read."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigurationError(f"{path}: there is no such file") from None
+    except IsADirectoryError:
+        raise ConfigurationError(f"{path}: is a folder, a TOML file is wanted") from None
+    except PermissionError:
+        raise ConfigurationError(f"{path}: may not be read (permission denied)") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{path}: is not TOML: {error}") from None
+
+
+def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
+    """A model from a table; every bad value is named with its path, itself and what is allowed."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        raise ConfigurationError(f"{source}: {explain(error, model)}") from None
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """All faults of a validation error in one line."""
+    return "; ".join(_fault(dict(detail), model) for detail in error.errors(include_url=False))
+
+
+def _fault(detail: dict[str, Any], model: type[BaseModel]) -> str:
+    path = ""
+    for part in detail["loc"]:
+        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else str(part)
+    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if detail["type"] == "extra_forbidden":
+        close = get_close_matches(str(detail["loc"][-1]), _keys(model), n=1)
+        return f"{path}: unknown key" + (f", did you mean {close[0]}?" if close else "")
+    if detail["type"] == "missing":
+        return f"{path}: is missing"
+    if detail["type"] == "value_error":
+        return f"{path}: {message}" if path else message
+    return f"{path} = {detail['input']!r}: allowed is {message}"
+
+
+def _keys(model: type[BaseModel]) -> list[str]:
+    """All keys that a model and the models inside it know."""
+    keys = list(model.model_fields)
+    for field in model.model_fields.values():
+        inner = [field.annotation, *getattr(field.annotation, "__args__", ())]
+        for kind in inner:
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                keys += _keys(kind)
+    return keys

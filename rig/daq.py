@@ -1,0 +1,213 @@
+"""The DAQ contract: everything above it works with any driver that keeps it.
+
+A driver swaps blocks of samples with a device. With ``n`` samples a block and a queue of ``q`` blocks in the device,
+call j of `DAQ.exchange` returns the inputs of the instants ``j n ... j n + n - 1``, in volts, once all are measured; the
+outputs handed over in call j are on the converter at the instants ``(j + q) n ... (j + q) n + n - 1``. ``q = 0`` with
+``n = 1`` is sample-synchronous hardware.
+"""
+
+from abc import ABC, abstractmethod
+from enum import Enum, IntEnum
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from rig.configuration import Configured
+from rig.errors import DaqError, DaqRefused
+
+__all__ = ["DAQ", "Capabilities", "Channel", "Role", "State"]
+
+
+class Role(IntEnum):
+    """What a channel measures in the test."""
+
+    FORCE = 0
+    """Force at the drive point, by the load cell."""
+    DRIVE = 1
+    """Acceleration at the drive point; its phase lag behind the force is what the loop controls."""
+    RESPONSE = 2
+    """Acceleration elsewhere."""
+    MONITOR = 3
+    """Anything else that is worth a column."""
+
+
+class Channel(Configured):
+    """An input channel: what is connected to it and how it is scaled."""
+
+    name: str = Field(min_length=1, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    """Name, used in files and messages."""
+    role: str = Field(pattern="^(force|drive|response|monitor)$")
+    """``force``, ``drive``, ``response`` or ``monitor``; see `Role`."""
+    unit: str
+    """Physical unit: N for a force, m/s^2 for drive and response."""
+    sensitivity_v_per_unit: float
+    """Volts per unit; negative for a sensor that is mounted the other way round."""
+    range_v: float = Field(10.0, gt=0, le=100)
+    """Largest voltage that sensor and converter deliver undistorted, V."""
+    resolution_v: float = Field(20.0 / 65536.0, gt=0, le=1)
+    """Voltage of the converter's least bit, V."""
+    noise_rms: float = Field(0.0, ge=0)
+    """Noise of sensor and converter, RMS in the physical unit, as far as known."""
+    skew_samples: float = Field(0.0, ge=-100, le=100)
+    """Delay of this channel behind the others, samples; taken out of the measured phase lag."""
+    sensor: str = ""
+    """Type and serial number, for the record."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.sensitivity_v_per_unit == 0.0:
+            raise ValueError("sensitivity_v_per_unit = 0: allowed is any number but 0")
+        wanted = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}.get(self.role, self.unit)
+        if self.unit != wanted:
+            raise ValueError(f"unit = {self.unit!r}: a channel with role {self.role!r} is in {wanted!r}")
+        return self
+
+    @property
+    def role_code(self) -> Role:
+        """The role as the kernels know it."""
+        return Role[self.role.upper()]
+
+    @property
+    def range_in_unit(self) -> float:
+        """Largest reading in the physical unit."""
+        return self.range_v / abs(self.sensitivity_v_per_unit)
+
+
+class Capabilities(Configured):
+    """What a driver can do; the conformance suite and the loop ask here instead of for its type."""
+
+    largest_block: int = Field(ge=1)
+    """Largest number of samples a call may swap."""
+    paced: bool
+    """Whether `DAQ.exchange` blocks until the samples are measured (a clock paces it); a virtual rig returns at once."""
+    virtual: bool
+    """Whether nothing physical moves: such a rig may arm itself."""
+    repeatable: bool
+    """Whether two runs with the same outputs return the same inputs."""
+
+
+class State(Enum):
+    """Life cycle of a driver."""
+
+    CLOSED = "closed"
+    OPEN = "open"
+    RUNNING = "running"
+
+
+class DAQ(ABC):
+    """A data acquisition device with one output and several inputs.
+
+    ``open -> start -> exchange ... -> stop -> close``, or as a context manager, which opens and closes. Nothing is opened
+    by the constructor. `close` may be called at any time, any number of times, and leaves the output at 0 V; so does
+    `stop`. A driver implements the methods with a leading underscore and leaves the rest alone.
+
+    Errors: `DaqRefused` for what the device or the present state cannot do, `DaqTimeout`, `DaqDisconnected`,
+    `DaqOverrun` for what happens on the way.
+    """
+
+    def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float, output_range_v: float) -> None:
+        self.channels = channels
+        self.sample_rate_hz = sample_rate_hz
+        self.output_range_v = output_range_v
+        self.block = 0
+        self.state = State.CLOSED
+
+    @property
+    @abstractmethod
+    def capabilities(self) -> Capabilities:
+        """What this driver can do."""
+
+    @property
+    @abstractmethod
+    def latency_samples(self) -> float:
+        """``u[i]`` shows at ``y[i + latency_samples]``: queue, hold, converter and filter delay; known once started."""
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What went wrong so far, counted: lost samples, clipped outputs and inputs, and the like."""
+        return {}
+
+    @abstractmethod
+    def _open(self) -> None:
+        """Find and open the device, compare its channels with ours; output 0 V."""
+
+    @abstractmethod
+    def _start(self) -> None:
+        """Begin sampling with blocks of ``self.block``."""
+
+    @abstractmethod
+    def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
+        """Swap one block: ``voltages`` float64[n] out, ``inputs`` float64[n, n_channels] to be filled."""
+
+    @abstractmethod
+    def _stop(self) -> None:
+        """Output to 0 V, end sampling."""
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Output to 0 V, let go of the device. Must not fail because the device is gone."""
+
+    def open(self) -> None:
+        """Open the device."""
+        if self.state is not State.CLOSED:
+            raise DaqRefused(f"the device is {self.state.value} already; close it before opening it again")
+        self._open()
+        self.state = State.OPEN
+
+    def start(self, block: int = 1) -> None:
+        """Begin sampling with ``block`` samples a call, fixed until `stop`."""
+        if self.state is not State.OPEN:
+            raise DaqRefused(f"the device is {self.state.value}; it can be started when it is open")
+        largest = self.capabilities.largest_block
+        if not 1 <= block <= largest:
+            raise DaqRefused(f"block = {block}: allowed is 1 to {largest} samples")
+        self.block = block
+        self._start()
+        self.state = State.RUNNING
+
+    def exchange(self, voltages: np.ndarray) -> np.ndarray:
+        """Swap one block: float64[n] volts out for float64[n, n_channels] volts in.
+
+        Voltages beyond the output range, or that are not numbers, are refused before anything is sent.
+        """
+        if self.state is not State.RUNNING:
+            raise DaqRefused(f"the device is {self.state.value}; samples are exchanged while it is running")
+        if voltages.shape != (self.block,):
+            raise DaqRefused(
+                f"voltages of shape {voltages.shape}: allowed is ({self.block},), the block given to start"
+            )
+        if not np.abs(voltages).max() <= self.output_range_v:
+            worst = float(voltages[np.argmax(np.where(np.isfinite(voltages), np.abs(voltages), np.inf))])
+            raise DaqRefused(f"an output of {worst:g} V was demanded: allowed is +-{self.output_range_v:g} V")
+        inputs = np.empty((self.block, len(self.channels)))
+        self._exchange(voltages, inputs)
+        return inputs
+
+    def stop(self) -> None:
+        """Output to 0 V and end sampling; no effect unless running."""
+        if self.state is State.RUNNING:
+            self.state = State.OPEN
+            self._stop()
+
+    def close(self) -> None:
+        """Output to 0 V and let go of the device; any time, any number of times."""
+        if self.state is State.CLOSED:
+            return
+        try:
+            self.stop()
+        except DaqError:
+            pass  # the device may be gone, which is a reason to close it
+        finally:
+            self.state = State.CLOSED
+            self._close()
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,45 @@
+"""Drivers by name. A driver is a class found under the entry-point group ``vibrolock.drivers``.
+
+The class is called as ``Driver(bench, seed)`` and keeps the contract of `rig.daq.DAQ`; its module is imported on use only.
+"""
+
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from rig.bench import Bench
+from rig.daq import DAQ
+from rig.errors import ConfigurationError
+
+__all__ = ["GROUP", "driver_names", "make_daq"]
+
+GROUP = "vibrolock.drivers"
+
+
+def _found() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def driver_names() -> list[str]:
+    """Names of all installed drivers."""
+    return sorted(_found())
+
+
+def make_daq(bench: Bench, seed: int = 0) -> DAQ:
+    """The driver that a bench asks for, not yet open.
+
+    Raises `ConfigurationError` for an unknown name, a driver that cannot be imported, or options it refuses.
+    """
+    name = bench.driver.name
+    found = _found()
+    if name not in found:
+        raise ConfigurationError(
+            f"driver.name = {name!r}: there is no such driver; installed are {', '.join(sorted(found)) or 'none'}"
+        )
+    try:
+        driver: Any = found[name].load()
+    except (ImportError, AttributeError) as error:
+        raise ConfigurationError(f"driver.name = {name!r}: its code cannot be imported: {error}") from error
+    daq = driver(bench, seed)
+    if not isinstance(daq, DAQ):
+        raise ConfigurationError(f"driver.name = {name!r}: {found[name].value} is not a rig.daq.DAQ")
+    return daq

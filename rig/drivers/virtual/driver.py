@@ -1,0 +1,117 @@
+"""`VirtualDAQ`: a full sibling of a real driver, with any block and any latency."""
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from rig.bench import Bench
+from rig.configuration import Configured, validated
+from rig.daq import DAQ, Capabilities
+from rig.drivers.virtual.kernels import exchange_block, fused
+from rig.errors import ConfigurationError, DaqRefused
+from rig.tick.layout import TickArrays
+from simulators import Flag, VirtualRig
+
+__all__ = ["VirtualDAQ"]
+
+HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
+
+
+class Queue(Configured):
+    """Latency of the virtual device."""
+
+    queue_blocks: int = Field(0, ge=0, le=64)
+    """q: blocks of outputs that the device keeps back, as a buffered DAQ does."""
+    delay_samples: int = Field(0, ge=0, le=1000)
+    """Further samples between the handing over of an output and the converter."""
+
+
+class VirtualDAQ(DAQ):
+    """A virtual rig behind the DAQ contract.
+
+    Options: those of `simulators.VirtualRig` (``specimen`` and its parts), ``queue_blocks`` and ``delay_samples``. The
+    seed draws the noise; a run with the same seed and outputs returns the same inputs bit for bit, whatever the block.
+
+    It returns at once: pacing is the loop's. Not modelled: lost samples, jitter, a device that fails.
+    """
+
+    def __init__(self, bench: Bench, seed: int = 0) -> None:
+        super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
+        options = dict(bench.driver.options)
+        queue = {key: options.pop(key) for key in list(options) if key in Queue.model_fields}
+        self._queue_options = validated(Queue, queue, "driver.options")
+        converter = {"sample_rate_hz": bench.sample_rate_hz, "dac_range_v": bench.output_range_v}
+        options["converter"] = {**converter, **options.get("converter", {})}
+        self.rig = validated(VirtualRig, options, "driver.options")
+        self._compare_channels()
+        self._seed = seed
+        self._queue = np.zeros(0)
+        self._counts = np.zeros(len(Flag), np.int64)
+        self._first = 0
+
+    def _compare_channels(self) -> None:
+        ours = [channel.name for channel in self.channels]
+        theirs = [sensor.name for sensor in self.rig.sensors]
+        if ours != theirs:
+            raise ConfigurationError(f"channels: {ours} in the bench, the virtual rig has {theirs}, in this order")
+        if self.rig.converter.sample_rate_hz != self.sample_rate_hz:
+            raise ConfigurationError(
+                f"driver.options.converter.sample_rate_hz = {self.rig.converter.sample_rate_hz:g}: "
+                f"allowed is the bench's {self.sample_rate_hz:g}"
+            )
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """A virtual rig takes any block, is not paced, and repeats itself."""
+        return Capabilities(largest_block=1_000_000, paced=False, virtual=True, repeatable=True)
+
+    @property
+    def queue_samples(self) -> int:
+        """Samples between the handing over of an output and the converter."""
+        return self._queue_options.queue_blocks * self.block + self._queue_options.delay_samples
+
+    @property
+    def latency_samples(self) -> float:
+        """Queue and half a sample of hold."""
+        return self.queue_samples + HOLD_SAMPLES
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Samples at which each flag of the rig was up."""
+        return {
+            str(flag.name).lower(): int(count) for flag, count in zip(Flag, self._counts, strict=True)
+        }
+
+    def _open(self) -> None:
+        pass
+
+    def _start(self) -> None:
+        self._arrays, self._state = self.rig.build(self._seed)
+        self._queue = np.zeros(self.queue_samples)
+        self._under_way = np.zeros(self.block + self.queue_samples)
+        self._counts[:] = 0
+        self._first = 0
+
+    def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
+        exchange_block(self._arrays, self._state, self._queue, self._first, voltages, inputs, self._counts)
+        self._first += voltages.size
+
+    def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
+        """Run the tick and the rig in one compiled loop, bit for bit as `exchange` with this block would.
+
+        The lead of the tick must be the block plus the latency. A run is either fused or exchanged, not both.
+        """
+        lead = int(t.loop["lead_whole"][0])
+        if lead != math.floor(self.block + self.latency_samples):
+            raise DaqRefused(f"the tick expects a lead of {lead} samples, this device has {self.block + self.queue_samples}")
+        volts = np.empty(len(self.channels))
+        return fused(t, self._arrays, self._state, self._under_way, volts, readings, rows, self._counts)
+
+    def _stop(self) -> None:
+        self._queue[:] = 0.0
+
+    def _close(self) -> None:
+        pass
+
+

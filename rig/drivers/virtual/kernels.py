@@ -1,0 +1,68 @@
+"""Compiled loops around the virtual rig: one block behind the DAQ contract, and tick and rig fused."""
+
+import numpy as np
+
+from rig.safety.layout import OFF
+from rig.tick.kernels import tick
+from rig.tick.layout import TickArrays
+from simulators.kernels import RigArrays, RigState, sample
+from vibrolock.compiled import kernel
+
+
+@kernel
+def exchange_block(
+    rig: RigArrays,
+    state: RigState,
+    queue: np.ndarray,
+    first: int,
+    voltages: np.ndarray,
+    inputs: np.ndarray,
+    counts: np.ndarray,
+) -> None:
+    """Swap one block with the rig.
+
+    ``queue`` (float64[d], d may be 0) holds the outputs that the device still keeps back; ``first`` is the number of
+    the block's first sample; ``counts`` (int64[bits]) counts the samples at which each flag of the rig was up.
+    """
+    delay = queue.size
+    for index in range(voltages.size):
+        voltage = voltages[index]
+        if delay > 0:
+            slot = (first + index) % delay
+            voltage = queue[slot]
+            queue[slot] = voltages[index]
+        count_flags(sample(rig, state, voltage, inputs[index]), counts)
+
+
+@kernel
+def count_flags(flags: int, counts: np.ndarray) -> None:
+    """Count every flag that is up."""
+    if flags != 0:
+        for bit in range(counts.size):
+            if flags & (1 << bit):
+                counts[bit] += 1
+
+
+@kernel
+def fused(
+    t: TickArrays,
+    rig: RigArrays,
+    state: RigState,
+    queue: np.ndarray,
+    volts: np.ndarray,
+    readings: np.ndarray,
+    rows: np.ndarray,
+    counts: np.ndarray,
+) -> int:
+    """Tick and rig in one loop; returns the number of samples done, fewer than ``rows`` once the output is off.
+
+    ``queue`` (float64[d]) holds the outputs under way: what the tick computes at a sample is on the converter d later.
+    """
+    delay = queue.size
+    for index in range(rows.size):
+        slot = t.loop[0].sample % delay
+        count_flags(sample(rig, state, queue[slot], volts), counts)
+        queue[slot] = tick(t, volts, readings[index], rows[index])
+        if t.guard[0].mode == OFF:
+            return index + 1
+    return int(rows.size)

@@ -1,0 +1,208 @@
+"""Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification import IdentificationError, NonlinearMode, nonlinear_mode
+from rig.errors import RecordingError
+from rig.measurements import backbone
+from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
+from rig.recording.arrays import kind_of
+from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["plot"]
+
+MAIN, SECOND, REJECTED = "#1f4e79", "#c0504d", "#9a9a9a"
+STYLE = {
+    "font.size": 9,
+    "axes.grid": True,
+    "grid.color": "#e2e2e2",
+    "grid.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "savefig.dpi": 150,
+}
+
+
+def plot(source: Path, figure: Path) -> None:
+    """Draw what is in ``source`` into ``figure`` (png, pdf or svg by its ending).
+
+    Raises `RecordingError` where the file cannot be read or the figure not be written.
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+    kind = kind_of(source)
+    with mpl.rc_context(STYLE):
+        page = Figure(figsize=(9.0, 6.4), layout="constrained")
+        if kind == NONLINEAR_MODE:
+            _draw_mode(page, load_model(source))
+        elif kind == FREQUENCY_RESPONSES:
+            _draw_responses(page, source)
+        else:
+            with Recording(source) as recording:
+                _draw_recording(page, recording)
+        try:
+            page.savefig(figure)
+        except OSError as error:
+            raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
+
+
+def _engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
+    """Amplitudes in millimetres or micrometres, whichever reads well."""
+    if amplitude_m.size and np.nanmax(amplitude_m) < 5e-4:
+        return amplitude_m * 1e6, "µm"
+    return amplitude_m * 1e3, "mm"
+
+
+def _properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = MAIN) -> None:
+    """Modal frequency and damping over the amplitude."""
+    order = np.argsort(mode.amplitude_m)
+    amplitude, unit = _engineering(mode.amplitude_m[order])
+    error: dict[str, Any] = {"fmt": "o-", "ms": 4, "color": colour, "capsize": 2, "elinewidth": 0.8}
+    left.errorbar(amplitude, mode.modal_frequency_hz[order], 1.96 * mode.modal_frequency_std_hz[order], **error)
+    left.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
+    if np.isfinite(mode.damping_ratio).any():
+        right.errorbar(
+            amplitude,
+            100 * mode.damping_ratio[order],
+            196 * mode.damping_ratio_std[order],
+            label="active power of the fundamental",
+            **error,
+        )
+        if np.isfinite(mode.damping_ratio_total_power).any():
+            right.plot(
+                amplitude,
+                100 * mode.damping_ratio_total_power[order],
+                "s--",
+                ms=3.5,
+                color=SECOND,
+                label="active power of all harmonics",
+            )
+        right.legend(fontsize=8)
+    right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping ratio, %")
+    right.set_ylim(bottom=0.0)
+
+
+def _title(page: "Figure", text: str) -> None:
+    page.suptitle(text, fontsize=11, x=0.01, ha="left")
+
+
+def _draw_mode(page: "Figure", mode: NonlinearMode) -> None:
+    axes = page.subplots(2, 2)
+    _properties(axes[0, 0], axes[0, 1], mode)
+    amplitude, unit = _engineering(mode.amplitude_m)
+    order = np.argsort(mode.force_n)
+    axes[1, 0].plot(mode.force_n[order], amplitude[order], "o-", ms=4, color=MAIN)
+    axes[1, 0].set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement amplitude, {unit}")
+    _harmonics(axes[1, 1], mode)
+    _title(page, f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {mode.force_n.size} points")
+
+
+def _harmonics(axis: "Axes", mode: NonlinearMode) -> None:
+    order = np.argsort(mode.force_n)
+    drawn = False
+    for harmonic, marker in ((2, "^"), (3, "v")):
+        if mode.force_harmonics.shape[1] > harmonic and np.isfinite(mode.force_harmonics).any():
+            ratio = np.abs(mode.force_harmonics[:, harmonic]) / np.abs(mode.force_harmonics[:, 1])
+            axis.plot(
+                mode.force_n[order],
+                ratio[order],
+                marker + "-",
+                ms=4,
+                color=MAIN if harmonic == 2 else SECOND,
+                label=f"|F{harmonic}|/|F1|",
+            )
+            drawn = True
+    if drawn:
+        axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of the force")
+        axis.set_ylim(bottom=0.0)
+        axis.legend(fontsize=8)
+        return
+    axis.plot(mode.modal_frequency_hz, _engineering(mode.amplitude_m)[0], "o-", ms=4, color=MAIN)
+    axis.set(xlabel="modal frequency, Hz", ylabel=f"displacement amplitude, {_engineering(mode.amplitude_m)[1]}")
+
+
+def _draw_responses(page: "Figure", source: Path) -> None:
+    from matplotlib import colormaps
+
+    responses = load_frequency_responses(source)
+    top, bottom = page.subplots(2, 1, sharex=True)
+    everything = np.concatenate([response.amplitude_m for response in responses])
+    unit = _engineering(everything)[1]
+    scale = {"mm": 1e3, "µm": 1e6}[unit]
+    for number, response in enumerate(responses):
+        colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.9)
+        order = np.argsort(response.frequency_hz)
+        label = response.label or f"{response.level:g}"
+        top.semilogy(response.frequency_hz[order], scale * response.amplitude_m[order], ".-", color=colour, label=label)
+        bottom.plot(response.frequency_hz[order], response.phase_lag_deg[order], ".-", color=colour)
+    top.set(ylabel=f"displacement amplitude, {unit}")
+    bottom.set(xlabel="frequency, Hz", ylabel="phase lag of displacement, deg")
+    bottom.axhline(90.0, color=REJECTED, lw=0.8)
+    top.legend(fontsize=7, ncols=2, loc="upper right")
+    _title(page, f"{responses[0].specimen or 'specimen'}: stepped-sine responses, {len(responses)} levels")
+
+
+def _draw_recording(page: "Figure", recording: Recording) -> None:
+    axes = page.subplots(2, 2)
+    try:
+        mode: NonlinearMode | None = nonlinear_mode(backbone(recording))
+    except IdentificationError:
+        mode = None
+    if mode is not None:
+        _properties(axes[0, 0], axes[0, 1], mode)
+    else:
+        axes[0, 0].text(0.5, 0.5, "no accepted point", ha="center", transform=axes[0, 0].transAxes)
+    _draw_history(axes[1, 0], axes[1, 1], recording)
+    points = {point["number"]: point for point in recording.points}.values()
+    left_out = sum(not point["accepted"] for point in points)
+    specimen = recording.configuration["bench"]["specimen"]["name"]
+    text = f"{specimen}: {recording.kind} test, {len(points)} points"
+    _title(page, text + (f", {left_out} not accepted" if left_out else ""))
+
+
+MOST_TRACE_POINTS = 6000
+
+
+def _draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None:
+    """The loop over time: oscillator frequency with the force level, and the phase error."""
+    rate = float(recording.configuration["bench"]["sample_rate_hz"])
+    level = frequency.twinx()
+    step = max(1, recording.n_rows // MOST_TRACE_POINTS)
+    start = 0
+    for part in recording.parts:
+        kept = slice(None, None, step)
+        seconds = (start + np.arange(part.n_rows)[kept]) / rate
+        frequency.plot(seconds, part.rows("frequency_hz")[kept], color=MAIN, lw=0.7)
+        level.plot(seconds, np.abs(part.rows("command_v")[kept]), color=SECOND, lw=0.9)
+        degrees = np.degrees(part.rows("phase_error_rad")[kept])
+        error.plot(seconds, degrees, color=MAIN, lw=0.5)
+        start += part.n_rows
+    frequency.set(xlabel="time, s", ylabel="oscillator frequency, Hz")
+    frequency.yaxis.label.set_color(MAIN)
+    level.set_ylabel("output amplitude, V", color=SECOND)
+    level.grid(False)
+    level.spines["right"].set_visible(True)
+    limit = _symmetric_limit(recording)
+    error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-limit, limit))
+
+
+def _symmetric_limit(recording: Recording) -> float:
+    """Bound that holds all but the largest hundredth of the phase errors."""
+    parts = [np.abs(np.degrees(part.rows("phase_error_rad")[::50])) for part in recording.parts if part.n_rows]
+    largest = float(np.quantile(np.concatenate(parts), 0.99)) if parts else 1.0
+    return 1.3 * max(1.0, largest) if math.isfinite(largest) else 180.0

@@ -1,0 +1,125 @@
+"""The loop: blocks from the driver through the tick and back, in chunks of telemetry for whoever records them."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from rig.daq import DAQ
+from rig.errors import DaqError
+from rig.safety.layout import EndReason, GuardMode
+from rig.tick.kernels import tick_block
+from rig.tick.layout import TickArrays
+from rig.tick.tick import Tick
+
+__all__ = ["FusedDAQ", "Loop", "LoopStatistics"]
+
+CHUNK_S = 0.5
+PACED_CHUNK_S = 0.02
+
+
+@runtime_checkable
+class FusedDAQ(Protocol):
+    """A driver that can run the tick and what stands behind it in one compiled loop."""
+
+    def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
+        """Fill ``readings`` and ``rows``; returns the number of samples done, fewer once the output is off."""
+
+
+@dataclass
+class LoopStatistics:
+    """What the loop did. ``busy_s`` is the time in tick and driver alone."""
+
+    sample_rate_hz: float
+    samples: int = 0
+    overruns: int = 0
+    busy_s: float = 0.0
+    wall_s: float = 0.0
+
+    @property
+    def realtime_factor(self) -> float:
+        """Seconds of rig time per second in tick and driver."""
+        return self.samples / self.sample_rate_hz / self.busy_s if self.busy_s > 0 else 0.0
+
+    @property
+    def end_to_end_factor(self) -> float:
+        """Seconds of rig time per second of everything, recording included."""
+        return self.samples / self.sample_rate_hz / self.wall_s if self.wall_s > 0 else 0.0
+
+
+class Loop:
+    """Runs a tick over a started driver until the guard has brought the output to 0 V.
+
+    `run` yields structured rows in chunks; between two chunks the caller may `Tick.request_stop`. A driver that fails
+    ends the loop: the rows so far are yielded, ``failure`` holds the error. ``paced`` holds a virtual rig back to the
+    wall clock; a chunk that is done too late counts as an overrun. ``fused`` false makes a virtual rig go through
+    `DAQ.exchange` as a real one does.
+    """
+
+    def __init__(self, daq: DAQ, tick: Tick, *, paced: bool = False, fused: bool = True) -> None:
+        self.daq = daq
+        self.tick = tick
+        self.paced = paced
+        self.failure: DaqError | None = None
+        self.statistics = LoopStatistics(daq.sample_rate_hz)
+        self._fused = daq if fused and isinstance(daq, FusedDAQ) else None
+        self._voltages = np.zeros(daq.block)
+
+    def run(self) -> Iterator[np.ndarray]:
+        """Telemetry in chunks, until the output is off."""
+        chunk = self._chunk_samples()
+        began = time.perf_counter()
+        while not self._over():
+            readings, rows = self.tick.buffers(chunk)
+            start = time.perf_counter()
+            done = self._advance(readings, rows)
+            self.statistics.busy_s += time.perf_counter() - start
+            self.statistics.samples += done
+            if self.paced:
+                self._wait_for_the_clock(began)
+            self.statistics.wall_s = time.perf_counter() - began
+            if done:
+                yield self.tick.joined(readings[:done], rows[:done])
+        self.statistics.wall_s = time.perf_counter() - began
+
+    def _over(self) -> bool:
+        return self.failure is not None or int(self.tick.guard["mode"][0]) == GuardMode.OFF
+
+    def _chunk_samples(self) -> int:
+        seconds = PACED_CHUNK_S if self.paced or self.daq.capabilities.paced else CHUNK_S
+        blocks = max(1, round(seconds * self.daq.sample_rate_hz / self.daq.block))
+        return blocks * self.daq.block
+
+    def _advance(self, readings: np.ndarray, rows: np.ndarray) -> int:
+        if self._fused is not None:
+            return self._fused.run_fused(self.tick.arrays, readings, rows)
+        block = self.daq.block
+        for first in range(0, rows.size, block):
+            try:
+                inputs = self.daq.exchange(self._voltages)
+            except DaqError as error:
+                self._fail(error)
+                return first
+            part = slice(first, first + block)
+            tick_block(self.tick.arrays, inputs, readings[part], rows[part], self._voltages)
+            if self._over():
+                return first + block
+        return int(rows.size)
+
+    def _fail(self, error: DaqError) -> None:
+        self.failure = error
+        guard = self.tick.guard
+        if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
+            guard["reason"] = EndReason.DRIVER_FAILED
+            guard["sample"] = self.tick.sample
+        guard["mode"] = GuardMode.OFF
+        guard["amplitude_v"] = 0.0
+
+    def _wait_for_the_clock(self, began: float) -> None:
+        early = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()
+        if early > 0.0:
+            time.sleep(early)
+        else:
+            self.statistics.overruns += 1

@@ -1,0 +1,100 @@
+"""Arrays with attributes in one HDF5 file: models and imported measurements."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rig.errors import RecordingError
+from rig.recording.journal import journal_path, read_journal
+from rig.recording.layout import identify, kind_in, new_file, one_line, open_file, reading
+from rig.recording.tables import read_object, write_object
+
+__all__ = ["kind_of", "read_arrays", "write_arrays"]
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
+_COMPRESSED_FROM_BYTES = 65536
+
+
+def write_arrays(path: str | Path, kind: str, arrays: Mapping[str, ArrayLike], attributes: Mapping[str, Any]) -> None:
+    """Write arrays of numbers or texts and JSON-able attributes to ``path``, whole or not at all.
+
+    Names are letters, digits and underscores, with ``/`` between groups.
+
+    Raises:
+        RecordingError: a name or an array that cannot be stored, attributes that are not JSON, or no way to write
+            ``path``, which is then as it was.
+    """
+    path = Path(path)
+    try:
+        plain = {name: np.asarray(values) for name, values in arrays.items()}
+    except ValueError as error:
+        raise RecordingError(f"{path}: an array has rows of unequal length ({one_line(error)})") from error
+    for name, values in plain.items():
+        if not _NAME.match(name):
+            raise RecordingError(
+                f"{path}: array name {name!r} must be letters, digits, underscores and / between groups"
+            )
+        if values.dtype.kind not in "biufcU":
+            raise RecordingError(f"{path}: array {name!r} is {values.dtype}; numbers or texts are wanted")
+    with new_file(path, kept="nothing was changed") as (file, check):
+        identify(file, kind)
+        write_object(file, "attributes", attributes)
+        group = file.create_group("arrays")
+        for name, values in plain.items():
+            _write_array(group, name, values)
+            check()
+
+
+def _write_array(group: Any, name: str, values: NDArray[Any]) -> None:
+    import h5py
+
+    if values.dtype.kind == "U":
+        group.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype("utf-8"))
+    else:
+        large = values.ndim > 0 and values.nbytes >= _COMPRESSED_FROM_BYTES
+        group.create_dataset(name, data=values, **({"compression": "lzf", "shuffle": True} if large else {}))
+
+
+def read_arrays(path: str | Path) -> tuple[str, dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read back what ``write_arrays`` wrote.
+
+    Returns:
+        Kind, arrays by name, attributes.
+
+    Raises:
+        RecordingError: missing, not ours, truncated, damaged, of a later schema, or a recording.
+    """
+    path = Path(path)
+    with open_file(path) as file, reading(path):
+        kind = kind_in(file)
+        if "arrays" not in file:
+            raise RecordingError(f"{path}: holds no arrays; it is a recording of kind {kind!r}")
+        arrays: dict[str, NDArray[Any]] = {}
+        _collect(file["arrays"], "", arrays)
+        return kind, arrays, read_object(file, "attributes")
+
+
+def _collect(group: Any, prefix: str, arrays: dict[str, NDArray[Any]]) -> None:
+    for name, item in group.items():
+        if hasattr(item, "items"):
+            _collect(item, f"{prefix}{name}/", arrays)
+        else:
+            text = item.dtype.kind == "O"
+            arrays[prefix + name] = np.asarray(item.asstr()[()], dtype=np.str_) if text else np.asarray(item[()])
+
+
+def kind_of(path: str | Path) -> str:
+    """Read the kind of any file of ours: a recording (also one that is still a journal), a model, a measurement.
+
+    Raises:
+        RecordingError: missing, not ours, truncated, or of a later schema.
+    """
+    path = Path(path)
+    if not path.exists() and journal_path(path).exists():
+        return read_journal(journal_path(path)).header.kind
+    with open_file(path) as file, reading(path):
+        return kind_in(file)

@@ -1,0 +1,241 @@
+"""The writer of the journal: append-only, one write per block, readable up to its last whole block at any moment.
+
+When a method returns, what it was given is in the hands of the operating system: killing the process loses nothing of
+it. It is forced to the disk at most every half second and at every end, so a power cut costs at most that much.
+"""
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import RecordingError
+from rig.recording import jsontext
+from rig.recording.blocks import LARGEST_PAYLOAD, Kind, Tail, pack, read_journal
+from rig.recording.contents import JournalContents
+from rig.recording.header import Column, Header, packed
+from rig.recording.locking import lock, synchronise_folder
+
+__all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]
+
+SYNC_INTERVAL_S = 0.5
+_ROWS_BLOCK_BYTES = 2**20
+_WRITABLE = os.O_RDWR | os.O_APPEND | getattr(os, "O_BINARY", 0)
+_fdatasync: Callable[[int], None] = getattr(os, "fdatasync", os.fsync)
+
+
+def journal_path(output: str | Path) -> Path:
+    """Path of the journal of the recording ``output``: ``OUT.h5`` -> ``OUT.h5.journal``."""
+    return Path(f"{output}.journal")
+
+
+def set_aside(path: Path) -> Path:
+    """Return a free path beside the damaged journal ``path``, under which it is to be kept."""
+    candidates = (path.with_name(f"{path.name}.damaged{n}") for n in ("", *(f"-{k}" for k in range(2, 1000))))
+    return next(candidate for candidate in candidates if not candidate.exists())
+
+
+class JournalWriter:
+    """Appends to one journal; a context manager. Made by ``create`` or ``reopen``, and alone on its file until closed.
+
+    Rows, points and events belong to a part: ``part`` comes first, ``end`` closes it. All methods raise
+    ``RecordingError`` on a full disk or an I/O error; the journal then ends with its last whole block, and further
+    writes are welcome once the cause is gone.
+    """
+
+    def __init__(self, path: Path, descriptor: int, header: Header) -> None:
+        self.path, self.header = path, header
+        self.n_rows = 0
+        """Rows in the journal, all parts together."""
+        self.n_points = 0
+        """Points in the journal, all parts together."""
+        self.n_parts = 0
+        """Parts in the journal."""
+        self.dropped = Tail(0, "", torn=True)
+        """What ``reopen`` cut off."""
+        self._descriptor = descriptor
+        self._end = (0, 0)  # bytes and blocks: one value, so that no signal comes between the two
+        self._in_part = False
+        self._unsound = ""
+        self._synced_s = time.monotonic()
+
+    @classmethod
+    def create(cls, path: str | Path, header: Header) -> Self:
+        """Begin a new journal at ``path`` with ``header``.
+
+        Raises:
+            RecordingError: there is one already (of an interrupted run; never overwritten), or it cannot be written.
+        """
+        path = Path(path)
+        try:
+            descriptor = os.open(path, _WRITABLE | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise RecordingError(f"{path}: cannot be created ({error.strerror})") from error
+        writer = cls(path, descriptor, header)
+        try:
+            lock(descriptor, path)
+            if os.fstat(descriptor).st_size:
+                raise RecordingError(
+                    f"{path}: exists already, from an interrupted run; resume that run, or remove the file"
+                )
+        except BaseException:
+            writer._let_go()
+            raise
+        try:
+            writer._append(Kind.HEADER, header.encoded())
+            writer._synchronise()
+            synchronise_folder(path)
+        except BaseException:
+            writer._let_go()
+            path.unlink(missing_ok=True)
+            raise
+        return writer
+
+    @classmethod
+    def reopen(cls, path: str | Path) -> Self:
+        """Go on with the journal of an interrupted run: cut off what is torn behind its last whole block, then append.
+
+        What was cut off is told in ``dropped``. Where whole blocks follow a damaged one, the journal is first copied to
+        ``PATH.damaged``.
+
+        Raises:
+            RecordingError: missing, foreign, of a later schema, being written by another process, or not writable.
+        """
+        path = Path(path)
+        try:
+            descriptor = os.open(path, _WRITABLE)
+        except OSError as error:
+            raise RecordingError(f"{path}: cannot be resumed ({error.strerror})") from error
+        try:
+            lock(descriptor, path)
+            with JournalContents(path) as contents:
+                writer = cls(path, descriptor, contents.header)
+                writer._continue(contents)
+        except OSError as error:
+            os.close(descriptor)
+            raise RecordingError(f"{path}: cannot be resumed ({error.strerror})") from error
+        except BaseException:
+            os.close(descriptor)
+            raise
+        return writer
+
+    def _continue(self, contents: JournalContents) -> None:
+        self.n_parts, self.dropped = len(contents.parts), contents.tail
+        self.n_rows = sum(part.n_rows for part in contents.parts)
+        self.n_points = sum(len(part.points) for part in contents.parts)
+        self._end = (contents.size, contents.n_blocks)
+        if not contents.tail.torn:
+            shutil.copyfile(self.path, set_aside(self.path))
+        os.ftruncate(self._descriptor, contents.size)
+        self._synchronise()
+
+    def part(self, information: Mapping[str, Any]) -> None:
+        """Begin a part; ``information`` is the caller's (``first_sample``: number of its first row's sample)."""
+        self._append(Kind.PART, jsontext.encode(information, what="part"))
+        self._in_part = True
+        self.n_parts += 1
+
+    def rows(self, rows: NDArray[Any]) -> None:
+        """Append rows, a one-dimensional structured array with the fields of the header's ``row_dtype``.
+
+        Large arrays become several blocks: after an error, ``n_rows`` says how many rows are in the journal.
+        """
+        wanted = self.header.row_dtype
+        if rows.ndim != 1 or (rows.dtype != wanted and packed(rows.dtype) != wanted):
+            raise RecordingError(f"rows: {rows.dtype} in {rows.ndim} dimensions given, {wanted} in one wanted")
+        stored = np.ascontiguousarray(rows, wanted)
+        step = max(_ROWS_BLOCK_BYTES // wanted.itemsize, 1)
+        for first in range(0, len(stored), step):
+            block = stored[first : first + step]
+            self._append_to_part(Kind.ROWS, block.tobytes())
+            self.n_rows += len(block)
+
+    def event(self, event: Mapping[str, Any]) -> None:
+        """Append an event."""
+        self._append_to_part(Kind.EVENT, jsontext.encode(event, what="event"))
+
+    def point(self, point: Mapping[str, Any]) -> None:
+        """Append the result of a completed point."""
+        self._append_to_part(Kind.POINT, jsontext.encode(point, what="point"))
+        self.n_points += 1
+
+    def end(self, end: Mapping[str, Any]) -> None:
+        """End the part and force all to the disk; ``completed: True`` in ``end`` says that the run is finished."""
+        self._append_to_part(Kind.END, jsontext.encode(end, what="end"))
+        self._in_part = False
+        self._synchronise()
+
+    def close(self) -> None:
+        """Force everything to the disk and let go of the file; may be called twice."""
+        if self._descriptor < 0:
+            return
+        try:
+            self._synchronise()
+        finally:
+            self._let_go()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _append_to_part(self, kind: Kind, payload: bytes) -> None:
+        if not self._in_part:
+            raise RecordingError(f"{self.path}: {kind.name.lower()} outside any part; call part() first")
+        self._append(kind, payload)
+        if time.monotonic() - self._synced_s >= SYNC_INTERVAL_S:
+            self._synchronise()
+
+    def _append(self, kind: Kind, payload: bytes) -> None:
+        if self._descriptor < 0:
+            raise RecordingError(f"{self.path}: the journal is closed")
+        if self._unsound:
+            raise RecordingError(f"{self.path}: no further writes after an earlier error ({self._unsound})")
+        if len(payload) > LARGEST_PAYLOAD:
+            raise RecordingError(
+                f"{kind.name.lower()}: {len(payload)} bytes of JSON, at most {LARGEST_PAYLOAD} are allowed"
+            )
+        n_bytes, n_blocks = self._end
+        block = pack(kind, n_blocks, payload)
+        try:
+            remaining = memoryview(block)
+            while remaining:
+                remaining = remaining[os.write(self._descriptor, remaining) :]
+            self._end = (n_bytes + len(block), n_blocks + 1)
+        except OSError as error:
+            self._cut_back()
+            raise RecordingError(f"{self.path}: cannot be written ({error.strerror}); {self._kept()}") from error
+        except BaseException:  # an interrupt between two pieces of a block
+            self._cut_back()
+            raise
+
+    def _cut_back(self) -> None:
+        try:
+            os.ftruncate(self._descriptor, self._end[0])
+        except OSError as error:
+            self._unsound = error.strerror or str(error)
+
+    def _kept(self) -> str:
+        return f"the {self.n_rows} rows and {self.n_points} points before are kept"
+
+    def _synchronise(self) -> None:
+        try:
+            _fdatasync(self._descriptor)
+        except OSError as error:
+            raise RecordingError(
+                f"{self.path}: cannot be forced to the disk ({error.strerror}); {self._kept()}"
+            ) from error
+        self._synced_s = time.monotonic()
+
+    def _let_go(self) -> None:
+        descriptor, self._descriptor = self._descriptor, -1
+        os.close(descriptor)

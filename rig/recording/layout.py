@@ -1,0 +1,125 @@
+"""What all HDF5 files of the bench have in common: how they are recognised, opened, and replaced in one step."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from rig.errors import RecordingError
+from rig.recording.header import FORMAT, SCHEMA, check_schema
+from rig.recording.locking import synchronise_folder
+from rig.recording.sink import Sink
+
+__all__ = ["identify", "kind_in", "new_file", "one_line", "open_file", "reading"]
+
+_HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_FOREIGN = {
+    b"MATLAB 5.0": "a MATLAB 5 file; `rig import` reads those",
+    b"VLJB": "a journal; give the name of its recording, without .journal",
+    b"PK\x03\x04": "a ZIP archive",
+    b"\x89PNG": "a picture",
+    b"CDF": "a NetCDF file",
+    b"    -1": "a UFF file",
+}
+
+
+def _foreign(path: Path) -> str:
+    with path.open("rb") as stream:
+        start = stream.read(64)
+    if not start:
+        return "an empty file"
+    for signature, name in _FOREIGN.items():
+        if start.startswith(signature):
+            return name
+    text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start)
+    return "a text file" if text else "no HDF5 file"
+
+
+def one_line(error: BaseException) -> str:
+    """Return the message of a library's error without its line breaks."""
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn whatever h5py raises on a damaged or vanished file into one ``RecordingError`` that names ``path``."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, MemoryError) as error:
+        raise RecordingError(f"{path}: damaged: cannot be read ({one_line(error)})") from error
+
+
+def open_file(path: Path) -> Any:
+    """Open one of our HDF5 files for reading.
+
+    Returns:
+        The open ``h5py.File``, to be closed by the caller.
+
+    Raises:
+        RecordingError: missing, not permitted, no HDF5 file, truncated, of another program, or of a later schema.
+    """
+    import h5py
+
+    try:
+        with path.open("rb") as stream:
+            ours = stream.read(len(_HDF5_SIGNATURE)) == _HDF5_SIGNATURE
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
+    if not ours:
+        raise RecordingError(f"{path}: not a file of vibrolock, but {_foreign(path)}")
+    try:
+        file = h5py.File(path, "r")
+    except (OSError, RuntimeError, ValueError) as error:
+        why = "truncated" if "truncated" in str(error) else f"damaged ({one_line(error)})"
+        raise RecordingError(f"{path}: cannot be opened: {why}") from error
+    try:
+        with reading(path):
+            if file.attrs.get("format") != FORMAT:
+                raise RecordingError(f"{path}: not a file of vibrolock, but an HDF5 file of another program")
+            check_schema(file.attrs.get("schema"), path)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def identify(file: Any, kind: str) -> None:
+    """Mark an open new file as one of ours, of the present schema and of ``kind``."""
+    file.attrs["format"], file.attrs["schema"], file.attrs["kind"] = FORMAT, SCHEMA, kind
+
+
+def kind_in(file: Any) -> str:
+    """Return the kind of the open file, for example ``"backbone"`` or ``"nonlinear-mode"``."""
+    return str(file.attrs["kind"])
+
+
+@contextmanager
+def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]]]:
+    """Write an HDF5 file that appears under ``path`` whole or not at all, in place of what was there before.
+
+    It is written as ``PATH.part`` in the same folder, forced to the disk and renamed. ``kept`` ends the error's line.
+    Yields the open ``h5py.File`` and a function to call after each large write: it raises once the disk is full.
+
+    Raises:
+        RecordingError: it cannot be written; ``path`` is then as it was.
+    """
+    import h5py
+
+    part = path.with_name(f"{path.name}.part")
+    try:
+        with Sink(part) as sink:
+            with h5py.File(sink, "w") as file:
+                yield file, sink.check
+            sink.check()
+            os.fsync(sink.fileno())
+        part.replace(path)
+        synchronise_folder(path)
+    except (OSError, RuntimeError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
+        raise RecordingError(f"{path}: cannot be written ({why}); {kept}") from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)

@@ -1,0 +1,74 @@
+"""What every part of a recording offers, be it in a journal or in an HDF5 file."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import RecordingError
+from rig.recording.header import Column
+
+__all__ = ["Part", "rows_at_once"]
+
+
+def rows_at_once(row_dtype: np.dtype[Any]) -> int:
+    """Return how many rows are held in memory while reading or converting, and make one chunk of an HDF5 dataset."""
+    return max(min(4096, 2**22 // row_dtype.itemsize), 1)
+
+
+class Part(ABC):
+    """One uninterrupted stretch of a recording, from its beginning to its end, a kill or a change of plan."""
+
+    information: dict[str, Any]
+    """What was said when the part began."""
+    points: list[dict[str, Any]]
+    """Results per point, in the order in which they were completed."""
+    events: list[dict[str, Any]]
+    """Events, in the order in which they happened."""
+    end: dict[str, Any] | None
+    """How the part ended, with its counters; ``None`` where it was cut short."""
+    n_rows: int
+    """Number of rows."""
+    row_dtype: np.dtype[Any]
+    """Structured dtype of its rows."""
+    columns: Sequence[Column]
+    """Unit and meaning of each field of its rows."""
+    dropped_bytes: int
+    """Bytes of its journal behind the last good block that could not be read; 0 but for a torn or damaged journal."""
+    dropped_reason: str
+    """Why they could not be read."""
+
+    @property
+    def first_sample(self) -> int | None:
+        """Number of the sample of the first row, where the part's ``information`` says it."""
+        first = self.information.get("first_sample")
+        return None if first is None else int(first)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the part's end says ``"completed": true``."""
+        return self.end is not None and self.end.get("completed") is True
+
+    def rows(self, field: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+        """Read one field of the rows ``start`` to ``stop``, which count as in a slice; nothing is kept between calls.
+
+        Returns:
+            Array of shape ``(rows,)``, or ``(rows, k)`` for a field of k numbers, in the field's stored type.
+
+        Raises:
+            RecordingError: no such field, or the file cannot be read any more.
+        """
+        names = self.row_dtype.names or ()
+        if field not in names:
+            raise RecordingError(f"no field {field!r} in the rows; there are {', '.join(names)}")
+        first, last, _ = slice(start, stop).indices(self.n_rows)
+        return self._read_field(field, first, max(first, last))
+
+    @abstractmethod
+    def read(self, start: int, stop: int) -> NDArray[Any]:
+        """Read rows ``start`` to ``stop`` (0 <= start <= stop <= n_rows): a structured array, ``(stop - start,)``."""
+
+    @abstractmethod
+    def _read_field(self, field: str, start: int, stop: int) -> NDArray[Any]: ...

@@ -1,0 +1,118 @@
+"""A recording is opened by the name of its HDF5 file, whether it is finished, interrupted or still running."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from rig.errors import RecordingError
+from rig.recording.contents import JournalContents
+from rig.recording.header import Header
+from rig.recording.journal import journal_path
+from rig.recording.layout import open_file
+from rig.recording.parts import Part
+from rig.recording.store import check_continuation
+from rig.recording.stored import read_recording
+
+__all__ = ["Part", "Recording"]
+
+
+class Recording:
+    """The recording ``OUT.h5``: from the HDF5 file, from the journal beside it, or from both; nothing is written.
+
+    A context manager that holds the files open; rows are read when asked for, all else at once.
+
+    Raises:
+        RecordingError: on construction: missing, not permitted, not ours, truncated, damaged, of a later schema, or of
+            another kind (a model); one line that names the file.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        journal = journal_path(self.path)
+        with ExitStack() as stack:
+            self._header, self.parts = self._open(stack, journal if _holds_anything(journal) else None)
+            self._stack = stack.pop_all()
+
+    def _open(self, stack: ExitStack, journal: Path | None) -> tuple[Header, Sequence[Part]]:
+        if journal is None or self.path.exists():
+            file = stack.enter_context(open_file(self.path))
+            header, stored = read_recording(file, self.path)
+            if journal is None:
+                return header, stored
+            contents = stack.enter_context(JournalContents(journal))
+            check_continuation(contents.header, header, self.path)
+            return header, [*stored[: contents.header.first_part], *contents.parts]
+        contents = stack.enter_context(JournalContents(journal))
+        check_continuation(contents.header, None, self.path)
+        return contents.header, contents.parts
+
+    parts: Sequence[Part]
+    """The parts in the order in which they were recorded."""
+
+    @property
+    def configuration(self) -> Mapping[str, Any]:
+        """The whole configuration as it was."""
+        return self._header.configuration
+
+    @property
+    def channels(self) -> Sequence[Mapping[str, Any]]:
+        """Channel table, one mapping per input channel."""
+        return self._header.channels
+
+    @property
+    def kind(self) -> str:
+        """Kind of recording, for example ``"backbone"``."""
+        return self._header.kind
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of the noise of a virtual rig."""
+        return self._header.seed
+
+    @property
+    def software_version(self) -> str:
+        """Version that began the recording."""
+        return self._header.software_version
+
+    @property
+    def started(self) -> str:
+        """Start time as it was given."""
+        return self._header.started
+
+    @property
+    def n_rows(self) -> int:
+        """Rows of all parts together."""
+        return sum(part.n_rows for part in self.parts)
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """Results of all points of all parts, in the order in which they were completed."""
+        return [point for part in self.parts for point in part.points]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the last part ended and said ``"completed": true``."""
+        return bool(self.parts) and self.parts[-1].complete
+
+    def close(self) -> None:
+        """Let go of the files; may be called twice. Rows can no longer be read."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _holds_anything(journal: Path) -> bool:
+    try:
+        return journal.stat().st_size > 0
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        raise RecordingError(f"{journal}: cannot be read ({error.strerror})") from error

@@ -1,0 +1,1 @@
+"""Safety between the law and the actuator: limits, arming, trip, latch, and the one ramp that ends every run."""

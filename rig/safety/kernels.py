@@ -1,0 +1,88 @@
+"""Compiled decisions of the safety room: pure functions of readings, limits and the guard's own state."""
+
+import math
+
+from rig.safety.layout import ARMED, DISARMED, OFF, RAMPING, EndReason
+from vibrolock.compiled import Record, kernel
+
+FORCE = 0  # `rig.daq.Role.FORCE`
+OVERTRAVEL_FACTOR = 1.25  # beyond this multiple of the displacement limit a ramp would take too long: drop to 0 V
+
+FORCE_LIMIT = int(EndReason.FORCE_LIMIT)
+RESPONSE_LIMIT = int(EndReason.RESPONSE_LIMIT)
+DISPLACEMENT_LIMIT = int(EndReason.DISPLACEMENT_LIMIT)
+OVERTRAVEL = int(EndReason.OVERTRAVEL)
+FREQUENCY_LIMIT = int(EndReason.FREQUENCY_LIMIT)
+SENSOR_OVERLOAD = int(EndReason.SENSOR_OVERLOAD)
+SENSOR_STUCK = int(EndReason.SENSOR_STUCK)
+NON_FINITE_INPUT = int(EndReason.NON_FINITE_INPUT)
+NON_FINITE_OUTPUT = int(EndReason.NON_FINITE_OUTPUT)
+
+
+@kernel
+def shut_down(guard: Record, reason: int, channel: int, value: float, sample: int, drop: bool) -> None:
+    """Begin the ramp to 0 V, or drop at once. The first cause is kept; a later one may only turn a ramp into a drop."""
+    if guard.mode == ARMED or guard.mode == DISARMED:
+        guard.reason = reason
+        guard.channel = channel
+        guard.value = value
+        guard.sample = sample
+        guard.ramp_sample = sample
+        guard.ramp_from_v = guard.amplitude_v
+        guard.mode = RAMPING
+    if drop:
+        guard.amplitude_v = 0.0
+        guard.mode = OFF
+
+
+@kernel
+def watch_input(
+    guard: Record, limits: Record, channel: Record, watch: Record, index: int, volts: float, sample: int, driven: bool
+) -> bool:
+    """Check one raw reading (V) before it is used; False where it must not be (not a number)."""
+    if not math.isfinite(volts):
+        shut_down(guard, NON_FINITE_INPUT, index, volts, sample, False)
+        return False
+    watch.overload_samples = watch.overload_samples + 1 if abs(volts) >= channel.overload_v else 0
+    if watch.overload_samples >= limits.overload_samples:
+        shut_down(guard, SENSOR_OVERLOAD, index, volts * channel.unit_per_volt, sample, False)
+    watch.same_samples = watch.same_samples + 1 if driven and volts == watch.last_v else 0
+    watch.last_v = volts
+    if watch.same_samples >= limits.stuck_samples:
+        shut_down(guard, SENSOR_STUCK, index, volts * channel.unit_per_volt, sample, False)
+    if guard.mode == ARMED and abs(volts * channel.unit_per_volt) > channel.limit:
+        reason = FORCE_LIMIT if channel.role == FORCE else RESPONSE_LIMIT
+        shut_down(guard, reason, index, volts * channel.unit_per_volt, sample, False)
+    return True
+
+
+@kernel
+def watch_motion(guard: Record, limits: Record, amplitude_m: float, index: int, omega: float, sample: int) -> None:
+    """Check a displacement amplitude (m) and the frequency (rad/s)."""
+    if amplitude_m > OVERTRAVEL_FACTOR * limits.displacement_m:
+        shut_down(guard, OVERTRAVEL, index, amplitude_m, sample, True)
+    elif amplitude_m > limits.displacement_m:
+        shut_down(guard, DISPLACEMENT_LIMIT, index, amplitude_m, sample, False)
+    if guard.mode == ARMED and (omega < limits.lowest_rad_s or omega > limits.highest_rad_s):
+        shut_down(guard, FREQUENCY_LIMIT, -1, omega / (2.0 * math.pi), sample, False)
+
+
+@kernel
+def permitted_amplitude(guard: Record, limits: Record, demanded_v: float, sample: int) -> float:
+    """Output amplitude (V) that may go out for the ``demanded_v`` of the law: clamped, slew-limited, ramped or zero."""
+    if not math.isfinite(demanded_v):
+        shut_down(guard, NON_FINITE_OUTPUT, -1, demanded_v, sample, True)
+    if guard.mode == ARMED:
+        target = min(max(demanded_v, -limits.voltage_v), limits.voltage_v)
+        step = min(max(target - guard.amplitude_v, -limits.slew_v_per_sample), limits.slew_v_per_sample)
+        guard.amplitude_v += step
+    elif guard.mode == RAMPING:
+        done = (sample - guard.ramp_sample) / limits.ramp_down_samples
+        if done >= 1.0:
+            guard.amplitude_v = 0.0
+            guard.mode = OFF
+        else:
+            guard.amplitude_v = guard.ramp_from_v * 0.5 * (1.0 + math.cos(math.pi * done))
+    else:
+        guard.amplitude_v = 0.0
+    return float(guard.amplitude_v)

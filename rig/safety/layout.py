@@ -1,0 +1,113 @@
+"""Codes and records of the safety room, shared by its kernels and its shell."""
+
+from enum import IntEnum
+
+import numpy as np
+
+__all__ = ["GUARD", "INPUT", "INPUT_WATCH", "LIMITS", "TEXT", "EndReason", "GuardMode"]
+
+
+class GuardMode(IntEnum):
+    """What the guard lets through."""
+
+    DISARMED = 0
+    """0 V until somebody arms."""
+    ARMED = 1
+    """The law's output."""
+    RAMPING = 2
+    """A half-cosine ramp to 0 V at frozen frequency."""
+    OFF = 3
+    """0 V, latched."""
+
+
+class EndReason(IntEnum):
+    """Why the output was brought down. Everything from FORCE_LIMIT on is a trip and latches."""
+
+    NONE = 0
+    COMPLETED = 1
+    STOP_REQUESTED = 2
+    PLAN_STOPPED = 3
+    FORCE_LIMIT = 10
+    RESPONSE_LIMIT = 11
+    DISPLACEMENT_LIMIT = 12
+    OVERTRAVEL = 13
+    FREQUENCY_LIMIT = 14
+    SENSOR_OVERLOAD = 15
+    SENSOR_STUCK = 16
+    NON_FINITE_INPUT = 17
+    NON_FINITE_OUTPUT = 18
+    LOST_LOCK = 19
+    DRIVER_FAILED = 20
+
+    @property
+    def is_trip(self) -> bool:
+        """Whether a person has to look before the rig is armed again."""
+        return self >= EndReason.FORCE_LIMIT
+
+
+TEXT = {
+    EndReason.NONE: "running",
+    EndReason.COMPLETED: "the plan was carried out",
+    EndReason.STOP_REQUESTED: "stopped by request",
+    EndReason.PLAN_STOPPED: "stopped by the plan's rule after a point failed",
+    EndReason.FORCE_LIMIT: "force above its limit",
+    EndReason.RESPONSE_LIMIT: "response above its limit",
+    EndReason.DISPLACEMENT_LIMIT: "displacement amplitude above its limit",
+    EndReason.OVERTRAVEL: "displacement amplitude far above its limit",
+    EndReason.FREQUENCY_LIMIT: "frequency outside its limits",
+    EndReason.SENSOR_OVERLOAD: "sensor at the end of its range",
+    EndReason.SENSOR_STUCK: "sensor dead or stuck (its reading does not change while the rig is driven)",
+    EndReason.NON_FINITE_INPUT: "input is not a number",
+    EndReason.NON_FINITE_OUTPUT: "the law's output is not a number",
+    EndReason.LOST_LOCK: "phase lock lost",
+    EndReason.DRIVER_FAILED: "the driver failed",
+}
+"""One line for each reason."""
+
+DISARMED, ARMED, RAMPING, OFF = (int(mode) for mode in GuardMode)
+
+LIMITS = np.dtype(
+    [
+        ("voltage_v", "f8"),
+        ("displacement_m", "f8"),
+        ("lowest_rad_s", "f8"),
+        ("highest_rad_s", "f8"),
+        ("slew_v_per_sample", "f8"),
+        ("overload_samples", "i8"),
+        ("stuck_samples", "i8"),
+        ("ramp_down_samples", "i8"),
+    ]
+)
+"""Limits of a bench in samples and SI units (one record)."""
+
+INPUT = np.dtype(
+    [
+        ("unit_per_volt", "f8"),
+        ("overload_v", "f8"),
+        ("limit", "f8"),
+        ("role", "i8"),
+        ("skew_samples", "f8"),
+        ("watch_displacement", "i8"),
+    ]
+)
+"""What the tick needs to know of an input channel (one record a channel)."""
+
+INPUT_WATCH = np.dtype(
+    [("mean", "f8"), ("estimate", "c16"), ("last_v", "f8"), ("same_samples", "i8"), ("overload_samples", "i8")]
+)
+"""Running state of an input channel (one record a channel)."""
+
+GUARD = np.dtype(
+    [
+        ("mode", "i8"),
+        ("reason", "i8"),
+        ("channel", "i8"),
+        ("sample", "i8"),
+        ("value", "f8"),
+        ("ramp_sample", "i8"),
+        ("ramp_from_v", "f8"),
+        ("amplitude_v", "f8"),
+        ("stop_requested", "i8"),
+    ]
+)
+"""State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once: the first cause stays."""

@@ -1,0 +1,76 @@
+"""The limits of a bench as the records that the kernels read, and a trip as a sentence."""
+
+import math
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, TEXT, EndReason, GuardMode
+
+__all__ = ["describe_end", "guard_record", "input_records", "limits_record", "watch_records"]
+
+
+def limits_record(bench: Bench) -> np.ndarray:
+    """Limits in samples and SI units."""
+    limits, rate = bench.limits, bench.sample_rate_hz
+    out = np.zeros(1, LIMITS)
+    out["voltage_v"] = limits.voltage_v
+    out["displacement_m"] = limits.displacement_m
+    out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in limits.frequency_hz)
+    out["slew_v_per_sample"] = limits.slew_v_per_s / rate
+    out["overload_samples"] = max(1, round(limits.overload_s * rate))
+    out["stuck_samples"] = max(2, round(limits.stuck_s * rate))
+    out["ramp_down_samples"] = max(1, round(limits.ramp_down_s * rate))
+    return out
+
+
+def input_records(bench: Bench) -> np.ndarray:
+    """One record a channel: scaling, range, limit, skew."""
+    out = np.zeros(len(bench.channels), INPUT)
+    for record, channel in zip(out, bench.channels, strict=True):
+        accelerates = channel.role in ("drive", "response")
+        record["unit_per_volt"] = 1.0 / channel.sensitivity_v_per_unit
+        record["overload_v"] = bench.limits.overload_fraction * channel.range_v
+        record["limit"] = (
+            bench.limits.force_n
+            if channel.role == "force"
+            else bench.limits.acceleration_m_s2
+            if accelerates
+            else math.inf
+        )
+        record["role"] = channel.role_code
+        record["skew_samples"] = channel.skew_samples
+        record["watch_displacement"] = accelerates
+    return out
+
+
+def watch_records(n_channels: int) -> np.ndarray:
+    """Fresh running state of the inputs."""
+    out = np.zeros(n_channels, INPUT_WATCH)
+    out["last_v"] = np.nan
+    return out
+
+
+def guard_record(armed: bool) -> np.ndarray:
+    """A fresh guard, armed or not."""
+    out = np.zeros(1, GUARD)
+    out["mode"] = GuardMode.ARMED if armed else GuardMode.DISARMED
+    out["channel"] = -1
+    return out
+
+
+def describe_end(guard: np.ndarray, bench: Bench) -> str:
+    """One sentence on why the output was brought down: reason, channel, value, sample."""
+    reason = EndReason(int(guard["reason"][0]))
+    text = TEXT[reason]
+    if not reason.is_trip:
+        return text
+    channel = int(guard["channel"][0])
+    sample = int(guard["sample"][0])
+    where = ""
+    if channel >= 0:
+        unit = "m" if reason in (EndReason.DISPLACEMENT_LIMIT, EndReason.OVERTRAVEL) else bench.channels[channel].unit
+        where = f" on channel {bench.channels[channel].name} ({float(guard['value'][0]):.4g} {unit})"
+    elif reason is EndReason.FREQUENCY_LIMIT:
+        where = f" ({float(guard['value'][0]):.4g} Hz)"
+    return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s)"

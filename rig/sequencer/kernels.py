@@ -1,0 +1,191 @@
+"""Compiled sequencer: judges every period, steps through the segments, and gives the level of the moment."""
+
+import math
+
+import numpy as np
+
+from controller.kernels import reacquire
+from controller.layout import LOST
+from rig.safety.kernels import shut_down
+from rig.safety.layout import ARMED, EndReason
+from rig.sequencer.layout import LONGEST_AVERAGE, RAMP, RECORD, SETTLE, OnFailure, Outcome
+from vibrolock.compiled import Record, kernel
+
+COMPLETED = int(EndReason.COMPLETED)
+STOP_REQUESTED = int(EndReason.STOP_REQUESTED)
+PLAN_STOPPED = int(EndReason.PLAN_STOPPED)
+TRIP_LOST_LOCK = int(EndReason.LOST_LOCK)
+
+RUNNING = int(Outcome.RUNNING)
+DONE = int(Outcome.DONE)
+NOT_SETTLED = int(Outcome.NOT_SETTLED)
+DISTURBED = int(Outcome.DISTURBED)
+LOST_LOCK = int(Outcome.LOST_LOCK)
+UNREACHABLE = int(Outcome.UNREACHABLE)
+SKIPPED = int(Outcome.SKIPPED)
+INTERRUPTED = int(Outcome.INTERRUPTED)
+STOP = int(OnFailure.STOP)
+
+SATURATED_PERIODS = 20
+LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
+
+
+@kernel
+def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
+    """Mean of the ``periods`` entries of a ring that end with entry number ``last`` (counted from 0 since the start)."""
+    total = 0.0
+    for back in range(periods):
+        total += ring[(last - back) % (2 * LONGEST_AVERAGE)]
+    return total / periods
+
+
+@kernel
+def judge_period(
+    settling: Record, rule: Record, error: float, response: float, force: float, wanted_force: float, saturated: bool
+) -> None:
+    """Take in one period's means and apply the settle rule.
+
+    Settled is: the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the averaged response
+    amplitude within ``amplitude`` (relative) of what it was that many periods before, for ``settled_periods`` in a row.
+    With a force level, the averaged force must be within ``amplitude`` of it too.
+    """
+    n = rule.average_periods
+    slot = settling.count % (2 * LONGEST_AVERAGE)
+    settling.errors[slot] = error
+    settling.responses[slot] = response
+    settling.forces[slot] = force
+    last = settling.count
+    settling.count += 1
+    if settling.count < 2 * n:
+        return
+    settling.mean_error_rad = mean_of(settling.errors, last, n)
+    new, old = mean_of(settling.responses, last, n), mean_of(settling.responses, last - n, n)
+    drift = (new - old) / new if new > 0.0 else math.inf
+    if wanted_force > 0.0:
+        miss = mean_of(settling.forces, last, n) / wanted_force - 1.0
+        drift = miss if abs(miss) > abs(drift) else drift
+    settling.drift = drift
+    off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
+    settling.good_periods = settling.good_periods + 1 if off <= 1.0 else 0
+    settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
+    unreached = saturated and abs(drift) > 2.0 * rule.amplitude
+    settling.saturated_periods = settling.saturated_periods + 1 if unreached else 0
+
+
+@kernel
+def forget_periods(settling: Record) -> None:
+    """Begin a new settling: periods before the level was reached do not count."""
+    settling.count = 0
+    settling.good_periods = 0
+    settling.bad_periods = 0
+    settling.saturated_periods = 0
+    settling.mean_error_rad = math.nan
+    settling.drift = math.nan
+
+
+@kernel
+def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed: float, periods: float) -> int:
+    """Outcome code of a held segment that has failed, or RUNNING."""
+    if lock.state == LOST:
+        return LOST_LOCK
+    if settling.saturated_periods >= SATURATED_PERIODS:
+        return UNREACHABLE
+    if kind == RECORD and settling.bad_periods >= rule.average_periods:
+        return DISTURBED
+    if kind == SETTLE and elapsed >= periods:
+        return NOT_SETTLED
+    return RUNNING
+
+
+@kernel
+def close_segment(
+    progress: Record, outcomes: np.ndarray, settling: Record, outcome: int, cycle: float, sample: int
+) -> None:
+    """Write down how the present segment ended and move to the next."""
+    entry = outcomes[progress.segment]
+    entry.outcome = outcome
+    entry.end_sample = sample
+    entry.periods = cycle - progress.start_cycle
+    entry.mean_error_rad = settling.mean_error_rad
+    entry.drift = settling.drift
+    progress.segment += 1
+    progress.entered = 0
+
+
+@kernel
+def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, sample: int) -> None:
+    """Pass over what is left of a failed point."""
+    point = segments[progress.segment - 1].point
+    while progress.segment < progress.segments and segments[progress.segment].point == point:
+        entry = outcomes[progress.segment]
+        entry.outcome = SKIPPED
+        entry.first_sample = sample
+        entry.end_sample = sample
+        progress.segment += 1
+
+
+@kernel
+def advance(
+    progress: Record,
+    segments: np.ndarray,
+    outcomes: np.ndarray,
+    settling: Record,
+    rule: Record,
+    lock: Record,
+    guard: Record,
+    cycle: float,
+    sample: int,
+) -> None:
+    """One sample of the sequencer: sets ``progress.level``, moves on when a segment is over, ends the run after the last.
+
+    ``cycle`` is the number of oscillator periods seen by the inputs so far, with its fraction.
+    """
+    if progress.finished:
+        return
+    if guard.stop_requested == 1 and guard.mode == ARMED:
+        shut_down(guard, STOP_REQUESTED, -1, 0.0, sample, False)
+    if guard.mode != ARMED:
+        if progress.entered:
+            close_segment(progress, outcomes, settling, INTERRUPTED, cycle, sample)
+        progress.finished = 1
+        return
+    if progress.segment >= progress.segments:
+        progress.finished = 1
+        shut_down(guard, COMPLETED, -1, 0.0, sample, False)
+        return
+    segment = segments[progress.segment]
+    if not progress.entered:
+        progress.entered = 1
+        progress.start_cycle = cycle
+        progress.start_level = progress.level
+        outcomes[progress.segment].outcome = RUNNING
+        outcomes[progress.segment].first_sample = sample
+        if segment.kind == RAMP and lock.state == LOST:
+            reacquire(lock)
+        if segment.kind == SETTLE:
+            forget_periods(settling)
+    elapsed = cycle - progress.start_cycle
+    if segment.kind == RAMP:
+        done = min(elapsed / segment.periods, 1.0)
+        progress.level = progress.start_level + (segment.level - progress.start_level) * 0.5 * (
+            1.0 - math.cos(math.pi * done)
+        )
+        if done >= 1.0:
+            close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        return
+    progress.level = segment.level
+    if segment.kind == SETTLE and settling.good_periods >= rule.settled_periods:
+        close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        return
+    if segment.kind == SETTLE or segment.kind == RECORD:
+        failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
+        if failure != RUNNING:
+            close_segment(progress, outcomes, settling, failure, cycle, sample)
+            if segment.on_failure == STOP:
+                progress.finished = 1
+                shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
+            else:
+                skip_point(progress, segments, outcomes, sample)
+            return
+    if segment.kind != SETTLE and elapsed >= segment.periods:
+        close_segment(progress, outcomes, settling, DONE, cycle, sample)

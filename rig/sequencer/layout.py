@@ -1,0 +1,98 @@
+"""Codes and records of the sequencer.
+
+A plan compiles to a table of segments. Durations count periods of the oscillator as seen by the inputs.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+__all__ = ["OUTCOME", "PROGRESS", "SEGMENT", "SETTLE_RULE", "SETTLING", "OnFailure", "Outcome", "SegmentKind"]
+
+
+class SegmentKind(IntEnum):
+    """What a segment does with the level."""
+
+    RAMP = 0
+    """Half-cosine from the present level to ``level`` in ``periods``."""
+    SETTLE = 1
+    """Hold until settled, at the most ``periods``."""
+    RECORD = 2
+    """Hold for ``periods``, watched all the time; these rows are evaluated."""
+    HOLD = 3
+    """Hold for ``periods``, watched by nobody."""
+
+
+class Outcome(IntEnum):
+    """How a segment ended."""
+
+    PENDING = 0
+    RUNNING = 1
+    DONE = 2
+    NOT_SETTLED = 3
+    """The time to settle ran out."""
+    DISTURBED = 4
+    """The settle rule was broken while recording."""
+    LOST_LOCK = 5
+    UNREACHABLE = 6
+    """The output stood at its voltage limit and the level was not reached."""
+    SKIPPED = 7
+    INTERRUPTED = 8
+
+
+class OnFailure(IntEnum):
+    """What a failed point does to the rest of the plan."""
+
+    SKIP = 0
+    STOP = 1
+
+
+RAMP, SETTLE, RECORD, HOLD = (int(kind) for kind in SegmentKind)
+
+SEGMENT = np.dtype([("kind", "i8"), ("point", "i8"), ("level", "f8"), ("periods", "f8"), ("on_failure", "i8")])
+"""One segment of a plan; ``level`` in V or N after the plan's amplitude law."""
+
+OUTCOME = np.dtype(
+    [
+        ("outcome", "i8"),
+        ("first_sample", "i8"),
+        ("end_sample", "i8"),
+        ("periods", "f8"),
+        ("mean_error_rad", "f8"),
+        ("drift", "f8"),
+    ]
+)
+"""How each segment went: samples [first, end), periods used, last averaged phase error, last relative amplitude drift."""
+
+SETTLE_RULE = np.dtype([("phase_rad", "f8"), ("amplitude", "f8"), ("average_periods", "i8"), ("settled_periods", "i8")])
+"""The settle rule (one record); see `rig.sequencer.kernels.judge_period`."""
+
+LONGEST_AVERAGE = 64
+
+SETTLING = np.dtype(
+    [
+        ("errors", "f8", (2 * LONGEST_AVERAGE,)),
+        ("responses", "f8", (2 * LONGEST_AVERAGE,)),
+        ("forces", "f8", (2 * LONGEST_AVERAGE,)),
+        ("count", "i8"),
+        ("good_periods", "i8"),
+        ("bad_periods", "i8"),
+        ("saturated_periods", "i8"),
+        ("mean_error_rad", "f8"),
+        ("drift", "f8"),
+    ]
+)
+"""Period means of the last periods, as a ring, and what the settle rule made of them (one record)."""
+
+PROGRESS = np.dtype(
+    [
+        ("segment", "i8"),
+        ("segments", "i8"),
+        ("start_cycle", "f8"),
+        ("start_level", "f8"),
+        ("level", "f8"),
+        ("finished", "i8"),
+        ("entered", "i8"),
+    ]
+)
+"""Where in the plan the run stands (one record)."""

@@ -1,0 +1,61 @@
+"""From a list of steps to the table of segments that the compiled sequencer executes, and the settle rule."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from rig.configuration import Configured
+from rig.sequencer.layout import LONGEST_AVERAGE, OUTCOME, SEGMENT, SETTLE_RULE, OnFailure, SegmentKind
+
+__all__ = ["Segment", "SettleRule", "segment_table"]
+
+
+class SettleRule(Configured):
+    """When a vibration counts as settled at its set-point."""
+
+    phase_deg: float = Field(1.0, gt=0, le=45)
+    """Largest phase error, averaged over `average_periods`, deg."""
+    amplitude: float = Field(0.01, gt=0, le=0.5)
+    """Largest relative change of the averaged response amplitude over `average_periods`, and, with levels in newtons,
+    largest relative error of the averaged force."""
+    average_periods: int = Field(10, ge=1, le=LONGEST_AVERAGE)
+    """Periods that are averaged."""
+    settled_periods: int = Field(20, ge=1, le=10000)
+    """Periods in a row that must keep the rule."""
+    longest_periods: float = Field(600.0, gt=0, le=1e6)
+    """Periods after which a point that has not settled is given up."""
+
+    def build(self) -> np.ndarray:
+        """The record that the kernels read."""
+        out = np.zeros(1, SETTLE_RULE)
+        out["phase_rad"] = math.radians(self.phase_deg)
+        out["amplitude"] = self.amplitude
+        out["average_periods"] = self.average_periods
+        out["settled_periods"] = self.settled_periods
+        return out
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One step of a plan: its kind, the point it belongs to (-1: none), the level (V or N) and its length in periods."""
+
+    kind: SegmentKind
+    point: int
+    level: float
+    periods: float
+    on_failure: OnFailure = OnFailure.SKIP
+
+
+def segment_table(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
+    """The table of segments, and the table of outcomes that goes with it, all pending."""
+    table = np.zeros(len(segments), SEGMENT)
+    for row, segment in zip(table, segments, strict=True):
+        row["kind"], row["point"], row["level"] = segment.kind, segment.point, segment.level
+        row["periods"], row["on_failure"] = segment.periods, segment.on_failure
+    outcomes = np.zeros(len(segments), OUTCOME)
+    outcomes["mean_error_rad"] = np.nan
+    outcomes["drift"] = np.nan
+    return table, outcomes

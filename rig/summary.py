@@ -1,0 +1,112 @@
+"""What is in a file, as one JSON-able dictionary: the answer of ``rig show``."""
+
+from pathlib import Path
+from typing import Any
+
+from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
+from rig.recording.arrays import kind_of
+from rig.recording.reader import Recording
+
+__all__ = ["summarise", "summarise_recording"]
+
+POINT_KEYS = (
+    "number",
+    "level",
+    "level_unit",
+    "direction",
+    "repeat",
+    "force_n",
+    "frequency_hz",
+    "damping_ratio",
+    "amplitude_m",
+    "phase_error_deg",
+    "phase_scatter_deg",
+    "force_purity",
+    "response_purity",
+    "settled",
+    "accepted",
+    "reason",
+    "periods",
+    "settle_periods",
+    "warnings",
+)
+
+
+def summarise(path: Path) -> dict[str, Any]:
+    """What a recording, an imported measurement or a model holds; `RecordingError` where it is none of them."""
+    kind = kind_of(path)
+    if kind in (NONLINEAR_MODE, FREQUENCY_RESPONSES):
+        return _summarise_arrays(path, kind)
+    with Recording(path) as recording:
+        return summarise_recording(recording)
+
+
+def summarise_recording(recording: Recording) -> dict[str, Any]:
+    """Points with their quality, statistics of the loop, how each part ended."""
+    bench = recording.configuration["bench"]
+    latest = {point["number"]: point for point in recording.points}
+    parts = [
+        {
+            "rows": part.n_rows,
+            "ended": None if part.end is None else part.end["text"],
+            "tripped": part.end is not None and part.end["tripped"],
+        }
+        for part in recording.parts
+    ]
+    ends = [part.end for part in recording.parts if part.end is not None]
+    return {
+        "kind": recording.kind,
+        "specimen": bench["specimen"]["name"],
+        "bench": bench["name"],
+        "started": recording.started,
+        "software_version": recording.software_version,
+        "seed": recording.seed,
+        "complete": recording.complete,
+        "points": [{key: latest[number].get(key) for key in POINT_KEYS} for number in sorted(latest)],
+        "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
+        "counters": {
+            name: sum(end["counters"].get(name, 0) for end in ends)
+            for name in sorted({n for e in ends for n in e["counters"]})
+        },
+        "parts": parts,
+    }
+
+
+def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, Any]:
+    loops = [end["loop"] for end in ends]
+    busy, wall = sum(loop["busy_s"] for loop in loops), sum(loop["wall_s"] for loop in loops)
+    samples = sum(loop["samples"] for loop in loops)
+    return {
+        "samples": rows,
+        "sample_rate_hz": rate_hz,
+        "overruns": sum(loop["overruns"] for loop in loops),
+        "periods": sum(loop["periods"] for loop in loops),
+        "wall_s": wall,
+        "realtime_factor": samples / rate_hz / busy if busy > 0 else None,
+        "end_to_end_factor": samples / rate_hz / wall if wall > 0 else None,
+    }
+
+
+def _summarise_arrays(path: Path, kind: str) -> dict[str, Any]:
+    if kind == NONLINEAR_MODE:
+        model = load_model(path)
+        return {
+            "kind": kind,
+            "specimen": model.specimen,
+            "source": model.source,
+            "frequency_shift": model.frequency_shift,
+            "points": model.table(),
+            "notes": list(model.notes),
+        }
+    return {
+        "kind": kind,
+        "responses": [
+            {
+                "label": response.label,
+                "samples": int(response.frequency_hz.size),
+                "lowest_hz": float(response.frequency_hz.min()),
+                "highest_hz": float(response.frequency_hz.max()),
+            }
+            for response in load_frequency_responses(path)
+        ],
+    }

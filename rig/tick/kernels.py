@@ -1,0 +1,195 @@
+"""The compiled tick, once, for every driver: per sample, per block, or fused with a virtual rig.
+
+Order within one sample: measure, take out the mean, demodulate against the phase that was on the output when the
+reading was made, lock state, sequencer, frequency law, amplitude law, safety, act, telemetry row.
+"""
+
+import math
+
+import numpy as np
+
+from controller.kernels import (
+    TWO_PI,
+    advance_phase,
+    demodulate,
+    next_lock_state,
+    phase_lag,
+    proportional_integral,
+    sign_product,
+    track,
+    wrap,
+)
+from controller.layout import FORCE, SIGN
+from rig.safety.kernels import NON_FINITE_OUTPUT, permitted_amplitude, shut_down, watch_input, watch_motion
+from rig.safety.layout import ARMED
+from rig.sequencer.kernels import advance, judge_period
+from rig.sequencer.layout import RAMP
+from rig.tick.layout import FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
+from vibrolock.compiled import Record, kernel
+
+
+@kernel
+def phase_on_output(history: np.ndarray, loop: Record, dt: float) -> float:
+    """Oscillator phase that was on the output when this sample's inputs were measured, in [0, 2 pi)."""
+    size = history.size
+    now = history[(loop.sample - loop.lead_whole) % size]
+    before = history[(loop.sample - loop.lead_whole - 1) % size]
+    theta = now.theta - loop.lead_fraction * dt * before.omega
+    return float(theta + TWO_PI if theta < 0.0 else theta)
+
+
+@kernel
+def estimate_inputs(
+    t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_theta: Record, sin_theta: Record
+) -> int:
+    """Check, convert and demodulate every input channel; returns the telemetry flags of the inputs."""
+    law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
+    driven = guard.mode == ARMED and loop.held == 1
+    flags = 0
+    force = 0.0
+    drive = 0.0
+    for index in range(t.inputs.size):
+        channel, watch = t.inputs[index], t.watches[index]
+        usable = watch_input(guard, limits, channel, watch, index, volts[index], loop.sample, driven)
+        value = volts[index] * channel.unit_per_volt
+        readings[index] = value
+        if not usable:
+            continue
+        if watch.overload_samples > 0:
+            flags |= SENSOR_AT_RANGE
+        if loop.sample == 0:
+            watch.mean = value
+        watch.mean = track(watch.mean, value, law.mean_gain)
+        value -= watch.mean
+        watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, law.demodulator_gain)
+        if index == loop.force_channel:
+            force = value
+        if index == loop.drive_channel:
+            drive = value
+        if channel.watch_displacement == 1:
+            amplitude_m = abs(watch.estimate) / (loop.omega * loop.omega)
+            watch_motion(guard, limits, amplitude_m, index, loop.omega, loop.sample)
+    loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), law.demodulator_gain)
+    return flags
+
+
+@kernel
+def phase_error(t: TickArrays, force: complex, drive: complex) -> float:
+    """Wanted minus measured phase lag in rad, by the detector of the plan, with the channels' skew taken out."""
+    law, loop = t.law[0], t.loop[0]
+    skew = t.inputs[loop.force_channel].skew_samples - t.inputs[loop.drive_channel].skew_samples
+    lag_of_skew = loop.omega * skew * law.dt_s
+    if law.detector == SIGN:
+        return float(0.5 * math.pi * loop.sign_mean - lag_of_skew)
+    return wrap(law.target_lag_rad - phase_lag(force, drive) - lag_of_skew)
+
+
+@kernel
+def close_period(t: TickArrays, present: bool) -> None:
+    """An oscillator period has ended at the inputs: lock state and settle rule take its means."""
+    law, loop = t.law[0], t.loop[0]
+    n = loop.sum_samples
+    if n > 0:
+        error = loop.sum_error / n
+        next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
+        wanted = t.progress[0].level if law.amplitude_law == FORCE else 0.0
+        judge_period(
+            t.settling[0], t.rule[0], error, loop.sum_response / n, loop.sum_force / n, wanted, loop.saturated == 1
+        )
+    loop.sum_error = 0.0
+    loop.sum_response = 0.0
+    loop.sum_force = 0.0
+    loop.sum_samples = 0
+
+
+@kernel
+def demanded_amplitude(t: TickArrays, force_amplitude: float) -> float:
+    """Amplitude law: the output amplitude (V) for the level of the moment."""
+    law, loop, level = t.law[0], t.loop[0], t.progress[0].level
+    if law.amplitude_law == FORCE:
+        demanded, loop.amplitude_integral = proportional_integral(
+            level - force_amplitude, loop.amplitude_integral, law.k3, law.k4, law.dt_s, 0.0, 0.0, law.largest_v
+        )
+    else:
+        demanded = level
+    loop.saturated = 1 if demanded >= law.largest_v else 0
+    return float(demanded)
+
+
+@kernel
+def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) -> float:
+    """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``."""
+    law, loop, guard, progress = t.law[0], t.loop[0], t.guard[0], t.progress[0]
+    now = loop.sample
+    seen = t.history[(now - loop.lead_whole) % t.history.size]
+    theta_in = phase_on_output(t.history, loop, law.dt_s)
+    row.theta_rad = theta_in
+    row.frequency_hz = seen.omega / TWO_PI
+    row.output_v = seen.output_v
+    row.command_v = seen.amplitude_v
+
+    flags = estimate_inputs(t, volts, readings, math.cos(theta_in), math.sin(theta_in))
+    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
+    size_f, size_a = abs(force), abs(drive)
+    present = size_f >= t.thresholds[0].smallest_force_n and size_a >= t.thresholds[0].smallest_response
+    loop.error = phase_error(t, force, drive) if present else 0.0
+
+    if theta_in < loop.theta_in:
+        loop.cycles += 1
+        close_period(t, present)
+    loop.theta_in = theta_in
+    loop.sum_error += loop.error
+    loop.sum_response += size_a
+    loop.sum_force += size_f
+    loop.sum_samples += 1
+
+    cycle = loop.cycles + theta_in / TWO_PI
+    advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.lock[0], guard, cycle, now)
+    running = guard.mode == ARMED and progress.finished == 0
+    loop.held = 1 if running and progress.entered == 1 and t.segments[progress.segment].kind != RAMP else 0
+    flags |= HELD if loop.held == 1 else 0
+
+    demanded = 0.0
+    if running:
+        if present:
+            loop.omega, loop.phase_integral = proportional_integral(
+                loop.error,
+                loop.phase_integral,
+                law.kp,
+                law.ki,
+                law.dt_s,
+                law.centre_rad_s,
+                law.lowest_rad_s,
+                law.highest_rad_s,
+            )
+            if loop.omega == law.lowest_rad_s or loop.omega == law.highest_rad_s:
+                flags |= FREQUENCY_CLAMPED
+        demanded = demanded_amplitude(t, size_f)
+        flags |= SATURATED if loop.saturated == 1 else 0
+    amplitude = permitted_amplitude(guard, t.limits[0], demanded, now)
+    output = amplitude * math.cos(loop.theta)
+    if not math.isfinite(output):
+        shut_down(guard, NON_FINITE_OUTPUT, -1, output, now, True)
+        output = 0.0
+
+    sent = t.history[now % t.history.size]
+    sent.theta = loop.theta
+    sent.omega = loop.omega
+    sent.amplitude_v = amplitude
+    sent.output_v = output
+    loop.theta = advance_phase(loop.theta, loop.omega, law.dt_s)
+    loop.sample = now + 1
+
+    row.phase_error_rad = loop.error
+    row.flags = flags
+    row.segment = progress.segment if running else -1
+    row.lock = t.lock[0].state
+    row.guard = guard.mode
+    return float(output)
+
+
+@kernel
+def tick_block(t: TickArrays, volts: np.ndarray, readings: np.ndarray, rows: np.ndarray, outputs: np.ndarray) -> None:
+    """A block of samples: ``volts`` (float64[n, n_channels]) in, ``outputs`` (float64[n]) for the next block out."""
+    for index in range(outputs.size):
+        outputs[index] = tick(t, volts[index], readings[index], rows[index])

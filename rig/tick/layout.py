@@ -1,0 +1,105 @@
+"""Records of the tick, and the bundle of arrays that its kernel takes.
+
+One bundle holds everything a run's control state consists of; a copy of it is a checkpoint.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+__all__ = ["HISTORY", "LOOP", "ROW", "ROW_COLUMNS", "TickArrays", "recorded_row"]
+
+LOOP = np.dtype(
+    [
+        ("sample", "i8"),
+        ("lead_whole", "i8"),
+        ("lead_fraction", "f8"),
+        ("force_channel", "i8"),
+        ("drive_channel", "i8"),
+        ("theta", "f8"),
+        ("omega", "f8"),
+        ("theta_in", "f8"),
+        ("cycles", "i8"),
+        ("held", "i8"),
+        ("phase_integral", "f8"),
+        ("amplitude_integral", "f8"),
+        ("sign_mean", "f8"),
+        ("error", "f8"),
+        ("sum_error", "f8"),
+        ("sum_force", "f8"),
+        ("sum_response", "f8"),
+        ("sum_samples", "i8"),
+        ("saturated", "i8"),
+    ]
+)
+"""State of oscillator and laws (one record)."""
+
+HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("output_v", "f8")])
+"""What the tick has sent out and the inputs have not yet seen; a ring."""
+
+ROW = np.dtype(
+    [
+        ("output_v", "f4"),
+        ("theta_rad", "f4"),
+        ("frequency_hz", "f4"),
+        ("command_v", "c8"),
+        ("phase_error_rad", "f4"),
+        ("flags", "u4"),
+        ("segment", "i2"),
+        ("lock", "u1"),
+        ("guard", "u1"),
+    ]
+)
+"""Scalar part of a telemetry row. Output, phase, frequency and command are those on the converter at that instant."""
+
+SATURATED = 1
+FREQUENCY_CLAMPED = 2
+SENSOR_AT_RANGE = 4
+HELD = 8
+
+ROW_COLUMNS: tuple[dict[str, str], ...] = (
+    {"name": "inputs", "unit": "SI unit of each channel", "description": "inputs in SI units, one column a channel"},
+    {"name": "output_v", "unit": "V", "description": "voltage on the converter at this instant"},
+    {"name": "theta_rad", "unit": "rad", "description": "oscillator phase on the converter at this instant, 0 to 2 pi"},
+    {"name": "frequency_hz", "unit": "Hz", "description": "oscillator frequency at this instant"},
+    {"name": "command_v", "unit": "V", "description": "complex amplitude U of the output, u = Re(U exp(i theta))"},
+    {
+        "name": "phase_error_rad",
+        "unit": "rad",
+        "description": "wanted minus measured phase lag, as the detector sees it",
+    },
+    {
+        "name": "flags",
+        "unit": "1",
+        "description": "bits: 1 output at its voltage limit, 2 frequency at its window, 4 sensor near its range, "
+        "8 level held",
+    },
+    {"name": "segment", "unit": "1", "description": "number of the plan's segment; -1 while coming down"},
+    {"name": "lock", "unit": "1", "description": "0 searching, 1 acquiring, 2 locked, 3 lost"},
+    {"name": "guard", "unit": "1", "description": "0 disarmed, 1 armed, 2 ramping down, 3 off"},
+)
+"""Unit and meaning of every recorded column, for the file."""
+
+
+def recorded_row(n_channels: int) -> np.dtype[Any]:
+    """Dtype of a recorded row: the inputs (float32, SI units), then the scalars of `ROW`."""
+    return np.dtype([("inputs", "f4", (n_channels,)), *((name, ROW[name]) for name in ROW.names or ())])
+
+
+class TickArrays(NamedTuple):
+    """Everything the tick reads and writes. The first six are constants of the run, the rest is its state."""
+
+    law: np.ndarray
+    thresholds: np.ndarray
+    rule: np.ndarray
+    limits: np.ndarray
+    inputs: np.ndarray
+    segments: np.ndarray
+    loop: np.ndarray
+    lock: np.ndarray
+    guard: np.ndarray
+    watches: np.ndarray
+    settling: np.ndarray
+    progress: np.ndarray
+    outcomes: np.ndarray
+    history: np.ndarray

@@ -1,0 +1,123 @@
+"""The tick as an object: its arrays built from bench, law and plan, and one call a block."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.layout import LOCK, AmplitudeLaw
+from controller.pll import PhaseLockedLoop
+from rig.bench import Bench
+from rig.errors import ConfigurationError
+from rig.safety.limits import guard_record, input_records, limits_record, watch_records
+from rig.sequencer.layout import PROGRESS, SETTLING
+from rig.sequencer.segments import Segment, SettleRule, segment_table
+from rig.tick.layout import HISTORY, LOOP, ROW, TickArrays, recorded_row
+
+__all__ = ["Tick"]
+
+SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude
+
+
+class Tick:
+    """The control state of a run.
+
+    ``lead_samples`` is the way from an output computed by the tick to the input that shows it: the block plus the
+    device's latency, with its fraction. ``armed`` false keeps the output at 0 V. ``first_sample`` numbers the first row.
+
+    Raises `ConfigurationError` where the law does not fit the bench.
+    """
+
+    def __init__(
+        self,
+        bench: Bench,
+        law: PhaseLockedLoop,
+        amplitude_law: AmplitudeLaw,
+        settle: SettleRule,
+        segments: Sequence[Segment],
+        lead_samples: float,
+        *,
+        armed: bool = True,
+    ) -> None:
+        try:
+            law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v)
+        except ValueError as error:
+            raise ConfigurationError(f"controller.{error}") from None
+        if lead_samples < 1.0:
+            raise ConfigurationError(
+                f"lead_samples = {lead_samples:g}: an output shows at the next sample at the earliest"
+            )
+        table, outcomes = segment_table(segments)
+        force, drive = bench.index_of("force"), bench.index_of("drive")
+        smallest = [SMALLEST_BITS * c.resolution_v / abs(c.sensitivity_v_per_unit) for c in bench.channels]
+        loop = np.zeros(1, LOOP)
+        loop["lead_whole"] = math.floor(lead_samples)
+        loop["lead_fraction"] = lead_samples - math.floor(lead_samples)
+        loop["force_channel"], loop["drive_channel"] = force, drive
+        loop["omega"] = law_record["centre_rad_s"]
+        progress = np.zeros(1, PROGRESS)
+        progress["segments"] = len(segments)
+        self.bench = bench
+        self.arrays = TickArrays(
+            law=law_record,
+            thresholds=law.lock.build(smallest[force], smallest[drive]),
+            rule=settle.build(),
+            limits=limits_record(bench),
+            inputs=input_records(bench),
+            segments=table,
+            loop=loop,
+            lock=np.zeros(1, LOCK),
+            guard=guard_record(armed),
+            watches=watch_records(len(bench.channels)),
+            settling=np.zeros(1, SETTLING),
+            progress=progress,
+            outcomes=outcomes,
+            history=_history(loop, 1.0 / bench.sample_rate_hz),
+        )
+
+    @property
+    def guard(self) -> np.ndarray:
+        """The guard's record: mode, reason, channel, sample."""
+        return self.arrays.guard
+
+    @property
+    def outcomes(self) -> np.ndarray:
+        """How each segment went so far."""
+        return self.arrays.outcomes
+
+    @property
+    def sample(self) -> int:
+        """Number of samples done."""
+        return int(self.arrays.loop["sample"][0])
+
+    @property
+    def row_dtype(self) -> np.dtype[np.void]:
+        """Dtype of the rows that `buffers` and `joined` deal in."""
+        return recorded_row(len(self.bench.channels))
+
+    def request_stop(self) -> None:
+        """Ask for a ramp to 0 V at frozen frequency; the plan ends with it."""
+        self.arrays.guard["stop_requested"] = 1
+
+    def buffers(self, n: int) -> tuple[np.ndarray, np.ndarray]:
+        """Empty telemetry of n samples: readings float32[n, n_channels] and rows."""
+        return np.zeros((n, len(self.bench.channels)), np.float32), np.zeros(n, ROW)
+
+    def joined(self, readings: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Readings and rows as one structured array, the form that is recorded."""
+        out = np.empty(rows.size, self.row_dtype)
+        out["inputs"] = readings
+        for name in ROW.names or ():
+            out[name] = rows[name]
+        return out
+
+
+def _history(loop: np.ndarray, dt: float) -> np.ndarray:
+    """The ring of what was sent out, as if the oscillator had been running silently before."""
+    size = int(loop["lead_whole"][0]) + 2
+    out = np.zeros(size, HISTORY)
+    omega = float(loop["omega"][0])
+    ago = np.arange(size, 0, -1)
+    out["theta"] = np.mod(-ago * omega * dt, 2.0 * math.pi)
+    out["omega"] = omega
+    return out

@@ -1,0 +1,106 @@
+"""Flags, codes and bundles of arrays that the kernels of the virtual rig read and write.
+
+Plain numpy only, so that the shell and the kernels can share it. A bundle of state holds everything that a run depends
+on: a copy of it is a checkpoint.
+"""
+
+from enum import IntEnum, IntFlag
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CHANNEL", "CONVERTER", "PLANT", "SITE", "Flag", "RigArrays", "RigState", "SiteKind"]
+
+
+class Flag(IntFlag):
+    """What went wrong in a sample; ``sample`` returns these, or-ed."""
+
+    MAGNET_RANGE = 1
+    """A magnet was displaced by more than 0.7 of its gap: beyond is contact, which the model does not know."""
+    SENSOR_CLIPPED = 2
+    """A sensor left its own range, or the range of the analogue-to-digital converter."""
+    DAC_CLIPPED = 4
+    """The voltage asked for is beyond the digital-to-analogue converter, or not a number (then 0 V is held)."""
+    DIVERGED = 8
+    """The state is no longer finite. From then on it is held and every channel reads NaN."""
+
+
+MAGNET_RANGE, SENSOR_CLIPPED, DAC_CLIPPED, DIVERGED = (int(flag) for flag in Flag)
+
+
+class SiteKind(IntEnum):
+    """Force laws of local sites without memory. Jenkins sites have a table of their own."""
+
+    MAGNET_ONE_SIDED = 0
+    MAGNET_SYMMETRIC = 1
+
+
+MAGNET_ONE_SIDED, MAGNET_SYMMETRIC = (int(kind) for kind in SiteKind)
+
+PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_jenkins", "i8"), ("substeps", "i8")])
+"""Sizes (one record)."""
+
+SITE = np.dtype([("kind", "i8"), ("strength", "f8"), ("gap", "f8"), ("limit", "f8"), ("stiffness", "f8"), ("offset", "f8")])
+"""A local site: strength K0 (N m^4), gap d0 (m), limit of validity (m), linear stiffness that the linear part already
+holds (N/m), force at rest that is taken off (N)."""
+
+CHANNEL = np.dtype(
+    [
+        ("hold", "f8"),
+        ("old", "f8"),
+        ("new", "f8"),
+        ("noise_rms", "f8"),
+        ("sensitivity", "f8"),
+        ("range_v", "f8"),
+    ]
+)
+"""A sensor: low-pass coefficients of its high-pass, noise (RMS, SI), V per SI unit, own range (V)."""
+
+CONVERTER = np.dtype([("adc_step_v", "f8"), ("adc_range_v", "f8"), ("dac_step_v", "f8"), ("dac_range_v", "f8")])
+"""Steps and ranges (one record). A step of zero means no quantisation."""
+
+
+class RigArrays(NamedTuple):
+    """The rig as its kernels see it; never written to during a run.
+
+    ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_jenkins]``;
+    its rows are ``[x, site coordinates]``. ``correct`` [n_site, n_row]: what a change of each site force over the
+    sub-step adds. ``sense`` [n_input, n_channel padded]: outputs (SI) from the same input vector. Inputs, rows and
+    channels are padded with zeros to multiples of four, so that the compiled loops run over whole vectors.
+    ``jenkins_stiffness`` and ``jenkins_limit`` [n_element, n_jenkins padded]; ``stuck`` [n_jenkins padded] their sums.
+    ``noise_keys`` [n_pair]: one key per pair of channels.
+    """
+
+    plant: NDArray[Any]
+    step: NDArray[np.float64]
+    correct: NDArray[np.float64]
+    sites: NDArray[Any]
+    stuck: NDArray[np.float64]
+    jenkins_stiffness: NDArray[np.float64]
+    jenkins_limit: NDArray[np.float64]
+    sense: NDArray[np.float64]
+    channels: NDArray[Any]
+    converter: NDArray[Any]
+    noise_keys: NDArray[np.uint64]
+
+
+class RigState(NamedTuple):
+    """Everything a run depends on, and the scratch space of its kernels.
+
+    ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_jenkins]`` at the present instant. ``deflection``
+    [n_jenkins padded] and ``friction`` [n_element, n_jenkins padded]: committed state of the Jenkins elements.
+    ``filters`` [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next
+    sample, from which its noise is drawn. The others carry nothing from one sample to the next.
+    """
+
+    inputs: NDArray[np.float64]
+    deflection: NDArray[np.float64]
+    friction: NDArray[np.float64]
+    filters: NDArray[np.float64]
+    counter: NDArray[np.int64]
+    rows: NDArray[np.float64]
+    forces: NDArray[np.float64]
+    friction_trial: NDArray[np.float64]
+    friction_sum: NDArray[np.float64]
+    outputs: NDArray[np.float64]

@@ -1,0 +1,21 @@
+"""Base of every part that a virtual rig is configured from."""
+
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["Part", "Positive", "Several"]
+
+Item = TypeVar("Item")
+
+Positive = Annotated[float, Field(gt=0.0)]
+Several = Annotated[tuple[Item, ...], Field(strict=False)]
+"""A tuple that may be given as a list, as TOML does."""
+
+
+class Part(BaseModel):
+    """Frozen; unknown keys, wrong types and non-finite numbers are refused. The docstring under a field describes it."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )

@@ -1,0 +1,1 @@
+"""Structure, sites, stinger and exciter as one discrete-time system."""

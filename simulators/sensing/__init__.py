@@ -1,0 +1,1 @@
+"""What stands between the physics and the samples: sensors, converters, noise."""

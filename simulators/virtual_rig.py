@@ -1,0 +1,153 @@
+"""A virtual rig: structure, magnets, joints, exciter, stinger, sensors and converters, from a table to compiled arrays."""
+
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from simulators.exciter import Exciter, Stinger
+from simulators.layout import RigArrays, RigState
+from simulators.modes import LinearModes, coupled_modes, structure_modes
+from simulators.part import Part, Several
+from simulators.plant.assembly import LinearPlant, assemble
+from simulators.plant.compilation import at_rest, rig_arrays
+from simulators.sensing.parts import Converter, Sensor
+from simulators.shipped import merged, specimen_table
+from simulators.sites import JenkinsSite, Magnet
+from simulators.structure import ModalStructure, Structure
+
+__all__ = ["VirtualRig"]
+
+
+class VirtualRig(Part):
+    """Everything a virtual rig is; `build` turns it into the arrays that `simulators.kernels.sample` runs on.
+
+    ``VirtualRig(specimen="magnet-beam")`` is a shipped one. Further tables change it key by key:
+    ``VirtualRig.model_validate({"specimen": "magnet-beam", "converter": {"substeps": 4}})``; a list is replaced whole.
+    Without ``specimen`` all parts are given.
+    """
+
+    specimen: str | None = None
+    """Shipped specimen that the other tables change: magnet-beam or magnet-beam-symmetric."""
+    provenance: dict[str, str] = Field(default_factory=dict)
+    """Which of the numbers are published, calibrated, chosen, unverified; carried along, not used."""
+    structure: Structure
+    """The vibrating structure."""
+    magnets: Several[Magnet] = ()
+    """Magnets facing the structure."""
+    friction: Several[JenkinsSite] = ()
+    """Friction joints."""
+    exciter: Exciter
+    """The shaker and its amplifier."""
+    stinger: Stinger
+    """The rod between exciter and structure."""
+    sensors: Annotated[Several[Sensor], Field(min_length=1)]
+    """One channel per sensor, in this order."""
+    converter: Converter = Converter()
+    """Sampling and converters."""
+    noise_scale: Annotated[float, Field(ge=0.0)] = 1.0
+    """Multiplies the noise of every sensor; 0 for none, 10 for a bad day."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of the noise."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_specimen(cls, table: Any) -> Any:
+        if isinstance(table, dict) and isinstance(table.get("specimen"), str):
+            return merged(specimen_table(table["specimen"]), table)
+        return table
+
+    @model_validator(mode="after")
+    def _belongs_together(self) -> "VirtualRig":
+        self._check_points()
+        names = self.channel_names
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ValueError(f"sensors: two are named {twice[0]!r}, allowed is one of each name")
+        if not np.any(self.structure.shape(self.stinger.at)):
+            raise ValueError(f"stinger.at = {self.stinger.at!r}: allowed is a point that moves")
+        self._check_joints()
+        return self
+
+    def _check_points(self) -> None:
+        points = self.structure.points
+        used = {f"magnets[{i}].at": magnet.at for i, magnet in enumerate(self.magnets)}
+        used |= {f"friction[{i}].at": joint.at for i, joint in enumerate(self.friction)}
+        used |= {"stinger.at": self.stinger.at}
+        used |= {f"sensors[{i}].at": sensor.at for i, sensor in enumerate(self.sensors) if sensor.at is not None}
+        for path, at in used.items():
+            if at not in points:
+                raise ValueError(f"{path} = {at!r}: allowed is one of {', '.join(points)}")
+        for i, joint in enumerate(self.friction):
+            if isinstance(self.structure, ModalStructure) and joint.quantity != "deflection":
+                message = "allowed is 'deflection' where the modes are given"
+                raise ValueError(f"friction[{i}].quantity = {joint.quantity!r}: {message}")
+
+    def _check_joints(self) -> None:
+        """Refuse joints that are stiffer than the structure they are part of: slipping, it would not hold together."""
+        for i, joint in enumerate(self.friction):
+            if joint.relative_to_mode_1 and self.structure.shape(joint.at, joint.quantity)[0] == 0.0:
+                raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
+        slipping = self.plant.modal_stiffness.copy()
+        for joint, row in zip(self.friction, self.plant.site_rows[len(self.magnets) :], strict=True):
+            coordinate = row[: self.plant.n_mode]
+            slipping -= joint.stuck_stiffness * np.outer(coordinate, coordinate)
+        lowest = np.linalg.eigvalsh(slipping)[0]
+        if lowest < -1e-9 * np.max(np.abs(self.plant.modal_stiffness)):
+            total = sum(joint.stuck_stiffness for joint in self.friction)
+            raise ValueError(f"friction: stiffness {total:.6g} in all, allowed is less than the structure has there")
+
+    def build(self, seed: int | None = None) -> tuple[RigArrays, RigState]:
+        """Arrays for the kernels, and a state at rest; ``seed`` of the noise in place of the rig's own."""
+        rig = rig_arrays(
+            self.plant,
+            self.magnets,
+            self.friction,
+            [self.output_row(sensor) for sensor in self.sensors],
+            self.sensors,
+            self.converter,
+            noise_scale=self.noise_scale,
+            seed=self.seed if seed is None else seed,
+        )
+        return rig, at_rest(rig)
+
+    def output_row(self, sensor: Sensor) -> NDArray[np.float64]:
+        """What a sensor senses (SI), as a row over the input vector ``[x, u, f]``."""
+        if sensor.at is None:
+            return self.plant.force_row()
+        return self.plant.acceleration_row(self.shape(sensor.at))
+
+    def shape(self, at: str) -> NDArray[np.float64]:
+        """Mode shapes (kg^-1/2) of the structure at a named point, turned so that the drive point moves forward."""
+        return self.plant.signs * self.structure.shape(at)
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names of the channels, in the order of ``out_v``."""
+        return tuple(sensor.name for sensor in self.sensors)
+
+    @property
+    def sensitivities_v_per_unit(self) -> NDArray[np.float64]:
+        """Volts per newton or per m/s^2 of each channel [n_channel]."""
+        return np.array([sensor.sensitivity_v_per_unit for sensor in self.sensors])
+
+    @cached_property
+    def plant(self) -> LinearPlant:
+        """Linear part of the coupled plant."""
+        return assemble(self.structure, self.magnets, self.friction, self.exciter, self.stinger)
+
+    @cached_property
+    def linear_modes(self) -> LinearModes:
+        """Modes of the structure alone with the linear stiffness of its magnets, all joints stuck."""
+        return structure_modes(self.plant)
+
+    @cached_property
+    def coupled_modes(self) -> LinearModes:
+        """Modes of the coupled rig from voltage: with exciter and stinger, not what a phase-resonant test finds."""
+        return coupled_modes(self.plant)
+
+    @property
+    def drive_shape_mode_1(self) -> float:
+        """Mass-normalised deflection (kg^-1/2) of the drive point in mode 1 of `linear_modes`."""
+        return float(self.linear_modes.drive_shape[0])

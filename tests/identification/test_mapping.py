@@ -1,0 +1,137 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from identification import FrequencyResponseMapping, IdentificationError, map_frequency_responses
+
+FREQUENCY_HZ = np.array([79.5, 80.0, 80.5])
+OMEGA = 2 * np.pi * FREQUENCY_HZ
+COMPLIANCE = 1.0 / ((2 * np.pi * 80.0) ** 2 - OMEGA**2 + 0.008j * 2 * np.pi * 80.0 * OMEGA)
+FORCE_N = np.array([2.0, 0.5, 2.0])
+ACCELERATION = -(OMEGA**2) * COMPLIANCE * FORCE_N
+
+
+def mapping(**changes: Any) -> FrequencyResponseMapping:
+    group = {
+        "levels": "data.levels",
+        "frequency": "f",
+        "force": "F",
+        "response": "A",
+        "phase": "ph",
+        "controlled": "response",
+        "level_values": [7.0],
+    }
+    table: dict[str, Any] = {
+        "specimen": "beam",
+        "units": {"frequency": "Hz", "force": "N", "response": "m/s2", "values": "peak"},
+        "phase": {"unit": "rad", "of": "acceleration", "sense": "response-minus-force"},
+    }
+    for key, value in changes.items():
+        (table if key in ("units", "phase") else group)[key] = value
+    for name in [name for name, value in group.items() if value is None]:
+        del group[name]
+    return FrequencyResponseMapping.model_validate({**table, "sets": [group]})
+
+
+def data(**entry: Any) -> dict[str, Any]:
+    plain = {"f": FREQUENCY_HZ, "F": FORCE_N, "A": np.abs(ACCELERATION), "ph": np.angle(ACCELERATION)}
+    return {"__header__": b"", "data": {"levels": [plain | entry]}}
+
+
+@pytest.mark.parametrize("of", ["displacement", "velocity", "acceleration"])
+@pytest.mark.parametrize("sense", ["response-minus-force", "force-minus-response"])
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_every_phase_convention_gives_the_same_response(of: str, sense: str, unit: str) -> None:
+    motion = ACCELERATION / (1j * OMEGA) ** {"displacement": 2, "velocity": 1, "acceleration": 0}[of]
+    angle = np.angle(motion) * (1 if sense == "response-minus-force" else -1)
+    stored = np.degrees(angle) if unit == "deg" else angle
+    phase = {"unit": unit, "of": of, "sense": sense}
+    (response,) = map_frequency_responses(data(ph=stored), mapping(phase=phase))
+    np.testing.assert_allclose(response.response, ACCELERATION, rtol=1e-12)
+    np.testing.assert_allclose(response.displacement_m, COMPLIANCE * FORCE_N, rtol=1e-12)
+    assert response.phase_lag_deg[1] == pytest.approx(90.0, abs=1e-9)
+
+
+def test_units_and_rms_become_si_peak() -> None:
+    units = {"frequency": "rad/s", "force": "mN", "response": "g", "values": "rms"}
+    stored = data(f=OMEGA, F=FORCE_N * 1e3 / np.sqrt(2), A=np.abs(ACCELERATION) / 9.80665 / np.sqrt(2))
+    (response,) = map_frequency_responses(stored, mapping(units=units, level_values=[2.0]))
+    np.testing.assert_allclose(response.frequency_hz, FREQUENCY_HZ)
+    np.testing.assert_allclose(response.force, FORCE_N)
+    np.testing.assert_allclose(response.response, ACCELERATION)
+    assert response.level == pytest.approx(2.0 * np.sqrt(2) * 9.80665)
+
+
+def test_complex_responses_need_no_phase() -> None:
+    stored = data(A=ACCELERATION * 1j, F=FORCE_N * 1j)
+    table = mapping().model_dump()
+    del table["sets"][0]["phase"]
+    (response,) = map_frequency_responses(stored, FrequencyResponseMapping.model_validate(table))
+    np.testing.assert_allclose(response.response / response.force, ACCELERATION / FORCE_N)
+
+
+def test_columns_of_matrices_are_levels_and_share_a_vector_of_frequencies() -> None:
+    stored = {
+        "f": FREQUENCY_HZ,
+        "F": np.column_stack([FORCE_N, 2 * FORCE_N]),
+        "A": np.column_stack([np.abs(ACCELERATION), 2 * np.abs(ACCELERATION)]),
+        "ph": np.angle(ACCELERATION)[None, :],
+    }
+    one, two = map_frequency_responses(stored, mapping(levels=None, level_values=None, label="level {number}"))
+    np.testing.assert_allclose(two.response, 2 * ACCELERATION)
+    assert (one.label, two.label) == ("level 1", "level 2")
+    assert two.level == pytest.approx(np.median(2 * np.abs(ACCELERATION)))
+
+
+def test_a_single_structure_is_a_list_of_one() -> None:
+    stored = data()
+    stored["data"]["levels"] = stored["data"]["levels"][0]
+    assert len(map_frequency_responses(stored, mapping())) == 1
+
+
+@pytest.mark.parametrize(
+    ("entry", "changes", "message"),
+    [
+        ({}, {"levels": "data.level"}, r"sets\[0\].levels: path 'data.level': no 'level' at 'data', which has levels"),
+        ({}, {"levels": "Data"}, r"no 'Data' at the top, which has data$"),
+        ({}, {"levels": "data.levels[3].x"}, r"no \[3\] at 'data.levels', which has 1 entries"),
+        ({}, {"levels": "data..levels"}, "'data..levels' is no path"),
+        (
+            {},
+            {"force": "Force"},
+            r"sets\[0\].force, level 1: path 'Force': no 'Force' at the top, which has f, F, A, ph",
+        ),
+        ({"F": "2 N"}, {}, r"sets\[0\].force, level 1 'F': is text, needs numbers"),
+        ({"F": [[1.0, 2.0], [3.0]]}, {}, r"'F': is a list of unequal lengths, needs numbers"),
+        ({"F": np.ones((3, 2))}, {}, r"has shape \(3, 2\), needs a vector"),
+        ({"F": np.ones(4)}, {}, r"sets\[0\], level 1: unequal lengths .*'force': 4"),
+        ({"F": -FORCE_N}, {}, r"sets\[0\].force, level 1: an amplitude is below zero"),
+        ({"A": np.array([1.0, np.nan, 1.0])}, {}, r"sets\[0\], level 1: response: value at \[1\]"),
+        ({"A": ACCELERATION}, {}, r"sets\[0\].phase: is given, but 'A' holds complex numbers"),
+        ({}, {"level_values": [5.0, 6.0]}, r"sets\[0\].level_values: 2 given, the data has 1 levels"),
+        ({}, {"label": "{name}"}, r"sets\[0\], level 1: 'name'"),
+    ],
+)
+def test_what_does_not_fit_is_named_in_one_line(entry: dict[str, Any], changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(IdentificationError, match=message) as caught:
+        map_frequency_responses(data(**entry), mapping(**changes))
+    assert "\n" not in str(caught.value)
+
+
+def test_real_amplitudes_without_phase_are_refused() -> None:
+    table = mapping().model_dump()
+    del table["sets"][0]["phase"]
+    with pytest.raises(IdentificationError, match=r"sets\[0\].phase: is left out, but 'A' holds real numbers"):
+        map_frequency_responses(data(), FrequencyResponseMapping.model_validate(table))
+    with pytest.raises(IdentificationError, match=r"the mapping has no \[phase\] table"):
+        map_frequency_responses(
+            data(), FrequencyResponseMapping.model_validate(mapping().model_dump() | {"phase": None})
+        )
+
+
+@pytest.mark.parametrize("change", [{"label_": "x"}, {"level_values": [-1.0]}, {"controlled": "speed"}])
+def test_unknown_keys_and_values_are_refused(change: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        mapping(**change)

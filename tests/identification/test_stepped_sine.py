@@ -1,0 +1,140 @@
+import numpy as np
+import pytest
+
+from identification import (
+    FrequencyResponse,
+    IdentificationError,
+    NonlinearMode,
+    pack_frequency_responses,
+    stepped_sine_mode,
+    unpack_frequency_responses,
+)
+from identification.channels import Motion
+from identification.frequency_responses import Controlled
+
+FREQUENCY_HZ = np.arange(79.0, 81.5, 0.05)
+MASS_KG = 1.9
+
+
+def level(
+    f0_hz: float = 80.3,
+    zeta: float = 0.004,
+    *,
+    beta_deg: float = 0.0,
+    kind: Motion = "acceleration",
+    controlled: Controlled = "response",
+    noise: float = 0.0,
+    seed: int = 0,
+    f_hz: np.ndarray = FREQUENCY_HZ,
+) -> FrequencyResponse:
+    """One linear mode with the amplitude of its response held at 20 (SI)."""
+    omega, omega0 = 2 * np.pi * f_hz, 2 * np.pi * f0_hz
+    response = np.full(f_hz.size, 20.0 + 0j)
+    displacement = response / (1j * omega) ** {"displacement": 0, "velocity": 1, "acceleration": 2}[kind]
+    stiffness = MASS_KG * (omega0**2 - omega**2 + 2j * zeta * omega0 * omega) * np.exp(1j * np.radians(beta_deg))
+    force = stiffness * displacement
+    rng = np.random.default_rng(seed)
+    force = force * (1 + noise * (rng.normal(size=f_hz.size) + 1j * rng.normal(size=f_hz.size)))
+    return FrequencyResponse(f_hz, force, response, kind, controlled, 20.0, "20", "beam")
+
+
+@pytest.mark.parametrize("kind", ["displacement", "velocity", "acceleration"])
+@pytest.mark.parametrize("beta_deg", [0.0, 9.0, -20.0])
+def test_one_linear_mode_is_returned_exactly(kind: Motion, beta_deg: float) -> None:
+    mode = stepped_sine_mode([level(beta_deg=beta_deg, kind=kind)])
+    assert mode.modal_frequency_hz[0] == pytest.approx(80.3, rel=1e-9)
+    assert mode.damping_ratio[0] == pytest.approx(0.004, rel=1e-7)
+    assert mode.phase_lag_deg[0] == pytest.approx(90 + beta_deg, abs=1e-5)
+    assert mode.apparent_mass_kg[0] == pytest.approx(MASS_KG, rel=1e-6)
+    assert mode.fit_residual[0] < 1e-9
+
+
+def test_force_and_amplitude_are_those_at_the_modal_frequency() -> None:
+    mode = stepped_sine_mode([level(kind="displacement")])
+    assert mode.amplitude_m[0] == pytest.approx(20.0)
+    assert mode.force_n[0] == pytest.approx(MASS_KG * 2 * 0.004 * (2 * np.pi * 80.3) ** 2 * 20.0, rel=1e-6)
+    assert np.isnan(mode.modal_amplitude[0])
+    assert mode.source == "stepped sine"
+
+
+def test_a_turned_modal_constant_held_real_shifts_the_frequency() -> None:
+    mode = stepped_sine_mode([level(beta_deg=9.0)], complex_constant=False)
+    assert 0.02 < 80.3 - mode.modal_frequency_hz[0] < 0.15
+    assert mode.fit_residual[0] > 0.02
+
+
+def test_stated_uncertainty_covers_the_truth_under_proportional_noise() -> None:
+    modes = [stepped_sine_mode([level(beta_deg=5.0, noise=0.02, seed=seed)]) for seed in range(200)]
+    frequency = [(m.modal_frequency_hz[0] - 80.3) / m.modal_frequency_std_hz[0] for m in modes]
+    damping = [(m.damping_ratio[0] - 0.004) / m.damping_ratio_std[0] for m in modes]
+    covered = np.mean(np.abs([frequency, damping]) < 1.96, axis=1)
+    assert np.all((covered > 0.90) & (covered < 0.99)), covered
+    assert abs(np.mean(damping)) < 0.4
+
+
+def test_points_where_the_controller_lost_its_level_are_left_out() -> None:
+    good = level()
+    response, force = good.response.copy(), good.force.copy()
+    response[:20] *= 0.9
+    force[:20] *= 0.5
+    broken = FrequencyResponse(FREQUENCY_HZ, force, response, "acceleration", "response", 20.0)
+    assert stepped_sine_mode([broken]).damping_ratio[0] == pytest.approx(0.004, rel=1e-6)
+
+
+def test_levels_that_are_not_response_controlled_are_left_out_and_said_so() -> None:
+    mode = stepped_sine_mode([level(controlled="force"), level()])
+    assert mode.modal_frequency_hz.size == 1
+    assert "1 of 2 levels left out: not response-controlled" in mode.notes
+    with pytest.raises(IdentificationError, match=r"none is response-controlled \(force given\)"):
+        stepped_sine_mode([level(controlled="force")])
+
+
+def test_what_cannot_be_fitted_is_named() -> None:
+    with pytest.raises(IdentificationError, match=r"level '20': 2 of 2 points lie within 60 deg.*needs at least 5"):
+        stepped_sine_mode([level(f_hz=np.array([80.25, 80.35]))])
+    with pytest.raises(IdentificationError, match="phase_window_deg: is 120, allowed is above 0 to 90"):
+        stepped_sine_mode([level()], phase_window_deg=120.0)
+    good = level()
+    backwards = FrequencyResponse(
+        FREQUENCY_HZ, np.conj(good.force), np.conj(good.response), "displacement", "response", 20.0, "mirrored"
+    )
+    with pytest.raises(IdentificationError, match="level 'mirrored': no damped resonance fits; check sign"):
+        stepped_sine_mode([backwards])
+
+
+def test_a_stepped_sine_mode_survives_being_stored() -> None:
+    mode = stepped_sine_mode([level(), level(80.1, 0.005)])
+    again = NonlinearMode.from_arrays(*mode.to_arrays())
+    np.testing.assert_array_equal(again.damping_ratio, mode.damping_ratio)
+    assert again.notes == mode.notes
+
+
+def test_frequency_responses_survive_being_packed() -> None:
+    levels = [level(), level(f_hz=FREQUENCY_HZ[:7], controlled="force", kind="velocity")]
+    again = unpack_frequency_responses(*pack_frequency_responses(levels))
+    for one, other in zip(levels, again, strict=True):
+        np.testing.assert_array_equal(one.force, other.force)
+        np.testing.assert_array_equal(one.frequency_hz, other.frequency_hz)
+        assert (one.kind, one.controlled, one.level, one.label) == (
+            other.kind,
+            other.controlled,
+            other.level,
+            other.label,
+        )
+    arrays, _ = pack_frequency_responses(levels)
+    with pytest.raises(IdentificationError, match="'levels' is missing"):
+        unpack_frequency_responses(arrays, {})
+
+
+@pytest.mark.parametrize(
+    ("force", "kind", "message"),
+    [
+        ([1.0, np.nan], "acceleration", r"force: value at \[1\]"),
+        ([1.0], "acceleration", "force: 1 values for 2 frequencies"),
+        ([1.0, 0.0], "acceleration", r"force: value at \[1\] is 0j, must not be zero"),
+        ([1.0, 1.0], "jerk", "kind: is 'jerk', allowed are displacement, velocity, acceleration"),
+    ],
+)
+def test_unusable_responses_are_refused_by_name(force: list[float], kind: Motion, message: str) -> None:
+    with pytest.raises(IdentificationError, match=message):
+        FrequencyResponse(np.array([79.0, 80.0]), np.array(force), np.ones(2, complex), kind, "response", 20.0)

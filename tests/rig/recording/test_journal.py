@@ -1,0 +1,409 @@
+import json
+import os
+import struct
+import subprocess
+import sys
+import tracemalloc
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rig.errors import RecordingError
+from rig.recording import journal as journal_module
+from rig.recording.blocks import LARGEST_PAYLOAD, Kind
+from rig.recording.contents import JournalContents
+from rig.recording.header import Column
+from rig.recording.journal import JournalWriter, journal_path, read_journal
+from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
+
+
+def blocks_by_hand(data):
+    """An independent reading of the documented layout: (kind, sequence, payload) of every block."""
+    found, position = [], 0
+    while position < len(data):
+        magic, version, kind, length, sequence, crc = struct.unpack_from("<4sHHIQI", data, position)
+        payload = data[position + 24 : position + 24 + length]
+        assert (magic, version) == (b"VLJB", 1)
+        assert crc == zlib.crc32(data[position : position + 20] + payload)
+        found.append((kind, sequence, payload))
+        position += 24 + length
+    return found
+
+
+def test_the_journal_of_a_recording_lies_beside_it(tmp_path):
+    assert journal_path(tmp_path / "OUT.h5") == tmp_path / "OUT.h5.journal"
+
+
+def test_a_journal_has_the_documented_layout(tmp_path):
+    path = journal(tmp_path / "a.journal", 250)
+    found = blocks_by_hand(path.read_bytes())
+    assert [kind for kind, _, _ in found] == [1, 2, 4, 3, 3, 3, 5, 6]
+    assert [sequence for _, sequence, _ in found] == list(range(8))
+    assert json.loads(found[0][2])["configuration"] == header().configuration
+    assert json.loads(found[6][2])["harmonics"] == [1.0, 0.5]
+    assert b"".join(payload for kind, _, payload in found if kind == 3) == rows(0, 250).tobytes()
+
+
+def test_rows_come_back_bit_for_bit_with_nan_payloads_and_negative_zero(tmp_path):
+    noise = np.random.default_rng(5).bytes(3000 * ROW.itemsize)
+    written = np.frombuffer(noise, ROW).copy()
+    written["locked"] = written["sample"] % 2 == 0
+    written["frequency_hz"][:2] = [-0.0, np.frombuffer(b"\x01\x02\x03\x04\x05\x06\xf8\x7f", "<f8")[0]]
+    with JournalWriter.create(tmp_path / "a.journal", header()) as writer:
+        writer.part({})
+        writer.rows(written)
+    with JournalContents(tmp_path / "a.journal") as contents:
+        assert all_rows(contents.parts[0]).tobytes() == written.tobytes()
+
+
+def test_padded_and_big_endian_rows_are_stored_packed_and_little_endian(tmp_path):
+    padded = np.dtype([(name, ROW[name].newbyteorder(">")) for name in ROW.names], align=True)
+    given_rows = np.zeros(10, padded)
+    for name in ROW.names:
+        given_rows[name] = rows(0, 10)[name]
+    with JournalWriter.create(tmp_path / "a.journal", header(row_dtype=padded)) as writer:
+        assert writer.header.row_dtype == ROW
+        writer.part({})
+        writer.rows(given_rows)
+    with JournalContents(tmp_path / "a.journal") as contents:
+        assert all_rows(contents.parts[0]).tobytes() == rows(0, 10).tobytes()
+
+
+@pytest.mark.parametrize(("start", "stop"), [(0, None), (95, 305), (-7, None), (100, 200), (300, 100), (5, 10**9)])
+def test_any_stretch_of_rows_is_read_as_a_slice(tmp_path, start, stop):
+    with JournalContents(journal(tmp_path / "a.journal", 1000)) as contents:
+        assert np.array_equal(contents.parts[0].rows("inputs", start, stop), rows(0, 1000)["inputs"][start:stop])
+
+
+def test_a_large_array_becomes_blocks_that_a_reader_accepts(tmp_path):
+    many = rows(0, 100_000)
+    with JournalWriter.create(tmp_path / "a.journal", header()) as writer:
+        writer.part({})
+        writer.rows(many)
+        assert writer.n_rows == 100_000
+    sizes = [len(block.payload) for block in read_journal(tmp_path / "a.journal") if block.kind is Kind.ROWS]
+    assert len(sizes) > 1
+    assert max(sizes) <= LARGEST_PAYLOAD
+    assert sum(sizes) == many.nbytes
+
+
+def test_what_was_written_is_readable_while_the_writer_is_still_open(tmp_path):
+    with JournalWriter.create(tmp_path / "a.journal", header()) as writer:
+        fill(writer, 0, 300, completed=None)
+        with JournalContents(tmp_path / "a.journal") as contents:
+            assert contents.parts[0].n_rows == 300
+            assert contents.parts[0].end is None
+
+
+def test_a_torn_tail_is_cut_off_and_the_sequence_goes_on(tmp_path):
+    path = journal(tmp_path / "a.journal", 1000)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-5])
+    with JournalWriter.reopen(path) as writer:
+        assert writer.dropped.n_bytes == len(whole) - 5 - sum(24 + len(b[2]) for b in blocks_by_hand(whole)[:-1])
+        assert "the file ends within a block" in writer.dropped.reason
+        assert (writer.n_rows, writer.n_points, writer.n_parts) == (1000, 1, 1)
+        fill(writer, 1000, 200)
+    found = blocks_by_hand(path.read_bytes())
+    assert [sequence for _, sequence, _ in found] == list(range(len(found)))
+    assert not list(tmp_path.glob("*.damaged*"))
+    with JournalContents(path) as contents:
+        assert [part.n_rows for part in contents.parts] == [1000, 200]
+        assert [part.end is None for part in contents.parts] == [True, False]
+
+
+def test_damage_amid_the_file_is_told_from_a_torn_tail_and_nothing_is_thrown_away(tmp_path):
+    path = journal(tmp_path / "a.journal", 1000)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with JournalWriter.reopen(path) as writer:
+        assert not writer.dropped.torn
+        assert "checksum" in writer.dropped.reason
+    assert (tmp_path / "a.journal.damaged").read_bytes() == data
+
+
+def test_a_tail_of_zeros_as_a_power_cut_leaves_it_is_torn(tmp_path):
+    path = journal(tmp_path / "a.journal", 300)
+    path.write_bytes(path.read_bytes() + bytes(5000))
+    blocks = read_journal(path)
+    assert sum(1 for _ in blocks) == 7
+    assert (blocks.tail.n_bytes, blocks.tail.torn) == (5000, True)
+
+
+def test_an_interrupted_journal_is_never_overwritten(tmp_path):
+    path = journal(tmp_path / "a.journal", 100)
+    before = path.read_bytes()
+    with pytest.raises(RecordingError, match="exists already"):
+        JournalWriter.create(path, header())
+    assert path.read_bytes() == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no advisory locks")
+def test_a_journal_has_one_writer_at_a_time(tmp_path):
+    with (
+        JournalWriter.create(tmp_path / "a.journal", header()),
+        pytest.raises(RecordingError, match="being written by another process"),
+    ):
+        JournalWriter.reopen(tmp_path / "a.journal")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"", "it is empty"), (b"hello, world", "no block begins there"), (b"VLJB\x01", "the file ends within a block's head")],
+)
+def test_what_is_no_journal_is_refused_and_left_alone(tmp_path, content, message):
+    path = tmp_path / "a.journal"
+    path.write_bytes(content)
+    for use in (read_journal, JournalWriter.reopen):
+        with pytest.raises(RecordingError, match=message):
+            use(path)
+    assert path.read_bytes() == content
+
+
+def test_a_journal_of_a_later_schema_asks_for_an_update(tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.recording.header.SCHEMA", 2)
+    path = journal(tmp_path / "a.journal", 10)
+    monkeypatch.undo()
+    with pytest.raises(RecordingError, match="written by schema 2, this version reads up to 1; update"):
+        read_journal(path)
+
+
+def test_a_later_block_version_asks_for_an_update(tmp_path):
+    path = journal(tmp_path / "a.journal", 10)
+    data = bytearray(path.read_bytes())
+    data[4] = 2
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="journal version 2, this version reads 1; update"):
+        read_journal(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"columns": COLUMNS[:-1]}, "columns describe"),
+        ({"seed": -1}, "seed is -1; an integer from 0"),
+        ({"kind": ""}, "kind is ''; a printable text"),
+        ({"row_dtype": np.dtype("f8")}, "has no fields"),
+        ({"row_dtype": np.dtype([("x", "O")]), "columns": [Column("x", "", "")]}, "field 'x' is object"),
+        ({"row_dtype": np.dtype([("a b", "f4")]), "columns": [Column("a b", "", "")]}, "field name 'a b'"),
+        ({"row_dtype": np.dtype([("x", "f8", (9000,))]), "columns": [Column("x", "", "")]}, "72000 bytes a row"),
+    ],
+)
+def test_a_header_that_cannot_be_stored_is_refused_by_name(changes, message):
+    with pytest.raises(RecordingError, match=message):
+        header(**changes)
+
+
+def test_a_header_that_is_not_json_leaves_no_file(tmp_path):
+    with pytest.raises(RecordingError, match="header: cannot be written as JSON"):
+        JournalWriter.create(tmp_path / "a.journal", header(configuration={"driver": object()}))
+    assert not list(tmp_path.iterdir())
+
+
+def test_misuse_of_the_writer_is_refused_and_leaves_the_journal_as_it_was(tmp_path):
+    path = tmp_path / "a.journal"
+    with JournalWriter.create(path, header()) as writer:
+        with pytest.raises(RecordingError, match="outside any part"):
+            writer.rows(rows(0, 1))
+        writer.part({})
+        size = path.stat().st_size
+        with pytest.raises(RecordingError, match="wanted"):
+            writer.rows(np.zeros(3, [("sample", "<u4")]))
+        with pytest.raises(RecordingError, match="wanted"):
+            writer.rows(rows(0, 4).reshape(2, 2))
+        with pytest.raises(RecordingError, match="event: cannot be written as JSON"):
+            writer.event({"what": {1, 2}})
+        assert path.stat().st_size == size
+    with pytest.raises(RecordingError, match="closed"):
+        writer.event({})
+    writer.close()
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats(allow_nan=False) | st.text(st.characters()),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(event=st.dictionaries(st.text(max_size=5), JSON, max_size=4))
+def test_every_json_object_comes_back_as_it_was(tmp_path, event):
+    path = tmp_path / "a.journal"
+    path.unlink(missing_ok=True)
+    with JournalWriter.create(path, header()) as writer:
+        writer.part(event)
+        writer.event(event)
+    with JournalContents(path) as contents:
+        assert contents.parts[0].information == event
+        assert contents.parts[0].events == [event]
+
+
+def test_numpy_values_and_lone_surrogates_are_written_as_json(tmp_path):
+    with JournalWriter.create(tmp_path / "a.journal", header()) as writer:
+        writer.part({"file": "\udcff"})
+        writer.point({"x": np.float32(0.5), "n": np.int64(3), "ok": np.bool_(True), "v": np.arange(2)})
+    with JournalContents(tmp_path / "a.journal") as contents:
+        assert contents.parts[0].information == {"file": "\udcff"}
+        assert contents.parts[0].points == [{"x": 0.5, "n": 3, "ok": True, "v": [0, 1]}]
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    path = tmp_path_factory.mktemp("original") / "a.journal"
+    with JournalWriter.create(path, header()) as writer:
+        fill(writer, 0, 40, block=7, completed=False)
+        fill(writer, 40, 30, block=11)
+    return path.read_bytes()
+
+
+MUTATIONS = st.lists(
+    st.one_of(
+        st.tuples(st.just("flip"), st.integers(0, 10**6), st.integers(1, 255)),
+        st.tuples(st.just("cut"), st.integers(0, 10**6), st.integers(0, 500)),
+        st.tuples(st.just("insert"), st.integers(0, 10**6), st.binary(min_size=1, max_size=60)),
+        st.tuples(st.just("repeat"), st.integers(0, 10**6), st.integers(1, 500)),
+        st.tuples(st.just("truncate"), st.integers(0, 10**6), st.just(0)),
+    ),
+    min_size=1,
+    max_size=3,
+)
+
+
+def mutated(data, mutations):
+    data = bytearray(data)
+    for what, where, how in mutations:
+        at = where % (len(data) + 1)
+        if what == "flip" and at < len(data):
+            data[at] ^= how
+        elif what == "cut":
+            del data[at : at + how]
+        elif what == "insert":
+            data[at:at] = how
+        elif what == "repeat":
+            data[at:at] = data[at : at + how]
+        elif what == "truncate":
+            del data[at:]
+    return bytes(data)
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(mutations=MUTATIONS)
+def test_of_a_damaged_journal_the_intact_beginning_is_recovered_and_nothing_else(tmp_path, original, mutations):
+    data = mutated(original, mutations)
+    intact = len(os.path.commonprefix([original, data]))
+    expected, position = [], 0
+    for kind, sequence, payload in blocks_by_hand(original):
+        position += 24 + len(payload)
+        if position <= intact:
+            expected.append((kind, sequence, payload))
+    path = tmp_path / "a.journal"
+    path.write_bytes(data)
+    if not expected:
+        with pytest.raises(RecordingError):
+            read_journal(path)
+        return
+    blocks = read_journal(path)
+    found = [(int(block.kind), block.sequence, block.payload) for block in blocks]
+    assert found[: len(expected) - 1] == expected[1:]
+    whole = blocks_by_hand(original)[1:]
+    assert found == whole[: len(found)]
+    assert 24 + len(blocks._first.payload) + sum(24 + len(p) for _, _, p in found) + blocks.tail.n_bytes == len(data)
+    assert bool(blocks.tail.reason) == bool(blocks.tail.n_bytes)
+    with JournalWriter.reopen(path) as writer:
+        assert writer.n_rows == sum(len(p) for kind, _, p in found if kind == 3) // ROW.itemsize
+        fill(writer, 70, 5)
+    assert [(k, s, p) for k, s, p in blocks_by_hand(path.read_bytes())][1 : len(found) + 1] == found
+    for aside in tmp_path.glob("*.damaged*"):
+        assert aside.read_bytes() == data
+        aside.unlink()
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(kind=st.integers(0, 9), payload=st.binary(max_size=80), at=st.integers(0, 15))
+def test_blocks_with_a_right_checksum_and_wrong_content_end_the_reading_without_a_crash(
+    tmp_path, original, kind, payload, at
+):
+    blocks = blocks_by_hand(original)
+    at %= len(blocks)
+    blocks.insert(at, (kind, at, payload))
+    data = b""
+    for sequence, (number, _, content) in enumerate(blocks):
+        head = struct.pack("<4sHHIQ", b"VLJB", 1, number, len(content), sequence)
+        data += head + struct.pack("<I", zlib.crc32(head + content)) + content
+    path = tmp_path / "a.journal"
+    path.write_bytes(data)
+    if at == 0:
+        with pytest.raises(RecordingError):
+            JournalContents(path)
+        return
+    with JournalContents(path) as contents:
+        assert at <= contents.n_blocks <= len(blocks)
+        assert contents.size + contents.tail.n_bytes == len(data)
+
+
+def test_deeply_nested_json_is_a_bad_block_and_no_crash(tmp_path, original):
+    deep = b'{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}"
+    sequence = len(blocks_by_hand(original))
+    head = struct.pack("<4sHHIQ", b"VLJB", 1, Kind.PART, len(deep), sequence)
+    path = tmp_path / "a.journal"
+    path.write_bytes(original + head + struct.pack("<I", zlib.crc32(head + deep)) + deep)
+    blocks = read_journal(path)
+    assert len(list(blocks)) == sequence - 1
+    assert "cannot be read" in blocks.tail.reason
+
+
+def test_a_journal_of_any_length_is_read_in_little_memory(tmp_path):
+    path, piece = tmp_path / "a.journal", rows(0, 20_000)
+    with JournalWriter.create(path, header()) as writer:
+        writer.part({})
+        for _ in range(50):
+            writer.rows(piece)
+        writer.end({})
+    assert path.stat().st_size > 30e6
+    tracemalloc.start()
+    try:
+        with JournalContents(path) as contents:
+            assert contents.parts[0].n_rows == 1_000_000
+            contents.parts[0].rows("locked")
+            peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 6e6
+
+
+def test_an_absurd_length_is_not_believed(tmp_path):
+    path = journal(tmp_path / "a.journal", 10)
+    whole = path.read_bytes()
+    head = struct.pack("<4sHHIQI", b"VLJB", 1, 3, 2 * LARGEST_PAYLOAD, 6, 0)
+    with path.open("ab") as stream:
+        stream.write(head)
+        stream.truncate(len(whole) + 3 * LARGEST_PAYLOAD)
+    blocks = read_journal(path)
+    assert [block.sequence for block in blocks] == [1, 2, 3, 4, 5]
+    assert "a length of 33554432 bytes" in blocks.tail.reason
+
+
+def test_the_disk_is_synchronised_at_most_every_half_second_and_at_every_end(tmp_path, monkeypatch):
+    now, synced = [100.0], []
+    monkeypatch.setattr(journal_module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(journal_module, "_fdatasync", lambda descriptor: synced.append(now[0]))
+    with JournalWriter.create(tmp_path / "a.journal", header()) as writer:
+        synced.clear()
+        writer.part({})
+        for _ in range(200):
+            now[0] += 0.01
+            writer.rows(rows(0, 50))
+        assert len(synced) == 4
+        assert min(np.diff(synced)) >= 0.5 - 1e-9
+        writer.end({})
+        assert synced[-1] == now[0]
+
+
+def test_the_journal_does_not_import_h5py():
+    code = "import sys, rig.recording.journal; sys.exit('h5py' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
