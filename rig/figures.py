@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["plot"]
 
 MAIN, SECOND, REJECTED = "#1f4e79", "#c0504d", "#9a9a9a"
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.grid": True,
     "grid.color": "#e2e2e2",
@@ -94,7 +94,14 @@ def _properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = 
             )
         right.legend(fontsize=8)
     right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping ratio, %")
-    right.set_ylim(bottom=0.0)
+    _keep_small_changes_small(right)
+
+
+def _keep_small_changes_small(axis: "Axes") -> None:
+    """Let the axis span a fifth of its middle at the least, so that scatter does not look like a trend."""
+    low, high = axis.get_ylim()
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.1 * abs(low + high))
+    axis.set_ylim(max(0.0, middle - half), middle + half)
 
 
 def _title(page: "Figure", text: str) -> None:

@@ -70,6 +70,7 @@ class Loop:
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks, until the output is off."""
         chunk = self._chunk_samples()
+        self._load_kernels()
         began = time.perf_counter()
         while not self._over():
             readings, rows = self.tick.buffers(chunk)
@@ -83,6 +84,14 @@ class Loop:
             if done:
                 yield self.tick.joined(readings[:done], rows[:done])
         self.statistics.wall_s = time.perf_counter() - began
+
+    def _load_kernels(self) -> None:
+        """Compile, or load from the cache, what the loop calls, before the clock runs."""
+        readings, rows = self.tick.buffers(0)
+        if self._fused is not None:
+            self._fused.run_fused(self.tick.arrays, readings, rows)
+        else:
+            tick_block(self.tick.arrays, np.empty((0, len(self.daq.channels))), readings, rows, np.empty(0))
 
     def _over(self) -> bool:
         return self.failure is not None or int(self.tick.guard["mode"][0]) == GuardMode.OFF

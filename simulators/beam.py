@@ -91,10 +91,20 @@ def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[NDArray[np.
     """Stiffness and consistent mass matrix of ``n`` equal elements, both [2 (n + 1), 2 (n + 1)]."""
     h = size
     element_stiffness = (ei / h**3) * np.array(
-        [[12, 6 * h, -12, 6 * h], [6 * h, 4 * h**2, -6 * h, 2 * h**2], [-12, -6 * h, 12, -6 * h], [6 * h, 2 * h**2, -6 * h, 4 * h**2]]
+        [
+            [12, 6 * h, -12, 6 * h],
+            [6 * h, 4 * h**2, -6 * h, 2 * h**2],
+            [-12, -6 * h, 12, -6 * h],
+            [6 * h, 2 * h**2, -6 * h, 4 * h**2],
+        ]
     )
     element_mass = (rho_a * h / 420) * np.array(
-        [[156, 22 * h, 54, -13 * h], [22 * h, 4 * h**2, 13 * h, -3 * h**2], [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h**2, -22 * h, 4 * h**2]]
+        [
+            [156, 22 * h, 54, -13 * h],
+            [22 * h, 4 * h**2, 13 * h, -3 * h**2],
+            [54, 13 * h, 156, -22 * h],
+            [-13 * h, -3 * h**2, -22 * h, 4 * h**2],
+        ]
     )
     stiffness, mass = np.zeros((2, 2 * n + 2, 2 * n + 2))
     for element in range(n):

@@ -37,9 +37,7 @@ def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.fl
 
 
 @kernel
-def run_open_loop(
-    rig: RigArrays, state: RigState, voltages: NDArray[np.float64], out_v: NDArray[np.float64]
-) -> int:
+def run_open_loop(rig: RigArrays, state: RigState, voltages: NDArray[np.float64], out_v: NDArray[np.float64]) -> int:
     """One sample per voltage: ``voltages`` [n] (V) in, ``out_v`` [n, n_channel] (V) out; returns all flags, or-ed."""
     flags = 0
     for k in range(voltages.size):

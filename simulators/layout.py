@@ -41,7 +41,9 @@ MAGNET_ONE_SIDED, MAGNET_SYMMETRIC = (int(kind) for kind in SiteKind)
 PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_jenkins", "i8"), ("substeps", "i8")])
 """Sizes (one record)."""
 
-SITE = np.dtype([("kind", "i8"), ("strength", "f8"), ("gap", "f8"), ("limit", "f8"), ("stiffness", "f8"), ("offset", "f8")])
+SITE = np.dtype(
+    [("kind", "i8"), ("strength", "f8"), ("gap", "f8"), ("limit", "f8"), ("stiffness", "f8"), ("offset", "f8")]
+)
 """A local site: strength K0 (N m^4), gap d0 (m), limit of validity (m), linear stiffness that the linear part already
 holds (N/m), force at rest that is taken off (N)."""
 
@@ -66,19 +68,18 @@ class RigArrays(NamedTuple):
 
     ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_jenkins]``;
     its rows are ``[x, site coordinates]``. ``correct`` [n_site, n_row]: what a change of each site force over the
-    sub-step adds. ``sense`` [n_input, n_channel padded]: outputs (SI) from the same input vector. Inputs, rows and
-    channels are padded with zeros to multiples of four, so that the compiled loops run over whole vectors.
-    ``jenkins_stiffness`` and ``jenkins_limit`` [n_element, n_jenkins padded]; ``stuck`` [n_jenkins padded] their sums.
-    ``noise_keys`` [n_pair]: one key per pair of channels.
+    sub-step adds. ``elements`` [2, n_jenkins, n_element]: stiffness and slip force of every Jenkins element; ``stuck``
+    [n_jenkins]: sum of the stiffnesses of a site. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
+    vector. ``noise_keys`` [n_pair]: one key per pair of channels. Inputs, rows, elements and the columns of ``sense``
+    are padded with zeros to multiples of four, so that the compiled loops run over whole vectors.
     """
 
     plant: NDArray[Any]
     step: NDArray[np.float64]
     correct: NDArray[np.float64]
     sites: NDArray[Any]
+    elements: NDArray[np.float64]
     stuck: NDArray[np.float64]
-    jenkins_stiffness: NDArray[np.float64]
-    jenkins_limit: NDArray[np.float64]
     sense: NDArray[np.float64]
     channels: NDArray[Any]
     converter: NDArray[Any]
@@ -89,9 +90,9 @@ class RigState(NamedTuple):
     """Everything a run depends on, and the scratch space of its kernels.
 
     ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_jenkins]`` at the present instant. ``deflection``
-    [n_jenkins padded] and ``friction`` [n_element, n_jenkins padded]: committed state of the Jenkins elements.
-    ``filters`` [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next
-    sample, from which its noise is drawn. The others carry nothing from one sample to the next.
+    [n_jenkins] and ``friction`` [n_jenkins, n_element]: committed state of the Jenkins elements. ``filters``
+    [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
+    which its noise is drawn. The others carry nothing from one sample to the next.
     """
 
     inputs: NDArray[np.float64]
@@ -102,5 +103,4 @@ class RigState(NamedTuple):
     rows: NDArray[np.float64]
     forces: NDArray[np.float64]
     friction_trial: NDArray[np.float64]
-    friction_sum: NDArray[np.float64]
     outputs: NDArray[np.float64]

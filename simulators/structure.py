@@ -59,7 +59,9 @@ class BeamStructure(Part):
             if lumped.at not in self.points_m:
                 raise ValueError(f"lumped_masses[{index}].at = {lumped.at!r}: allowed is one of {_list(self.points)}")
         if len(self.damping_ratio) > 2 * self.n_element:
-            raise ValueError(f"damping_ratio: has {len(self.damping_ratio)} modes, allowed is 1 to {2 * self.n_element}")
+            raise ValueError(
+                f"damping_ratio: has {len(self.damping_ratio)} modes, allowed is 1 to {2 * self.n_element}"
+            )
         return self
 
     @property

@@ -67,7 +67,7 @@ def _remove_unused(parent: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-numba.config.CACHE_DIR = str(kernel_cache_folder())
+setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

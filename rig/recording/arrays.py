@@ -40,6 +40,8 @@ def write_arrays(path: str | Path, kind: str, arrays: Mapping[str, ArrayLike], a
             )
         if values.dtype.kind not in "biufcU":
             raise RecordingError(f"{path}: array {name!r} is {values.dtype}; numbers or texts are wanted")
+        if group := next((other for other in plain if other.startswith(f"{name}/")), None):
+            raise RecordingError(f"{path}: array name {name!r} is also the group of {group!r}")
     with new_file(path, kept="nothing was changed") as (file, check):
         identify(file, kind)
         write_object(file, "attributes", attributes)

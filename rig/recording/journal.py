@@ -4,10 +4,9 @@ When a method returns, what it was given is in the hands of the operating system
 it. It is forced to the disk at most every half second and at every end, so a power cut costs at most that much.
 """
 
-import os
 import shutil
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -17,17 +16,15 @@ from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording import jsontext
-from rig.recording.blocks import LARGEST_PAYLOAD, Kind, Tail, pack, read_journal
+from rig.recording.appending import BlockFile
+from rig.recording.blocks import LARGEST_PAYLOAD, Kind, Tail, read_journal
 from rig.recording.contents import JournalContents
 from rig.recording.header import Column, Header, packed
-from rig.recording.locking import lock, synchronise_folder
+from rig.recording.locking import synchronise_folder
 
 __all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]
 
-SYNC_INTERVAL_S = 0.5
 _ROWS_BLOCK_BYTES = 2**20
-_WRITABLE = os.O_RDWR | os.O_APPEND | getattr(os, "O_BINARY", 0)
-_fdatasync: Callable[[int], None] = getattr(os, "fdatasync", os.fsync)
 
 
 def journal_path(output: str | Path) -> Path:
@@ -49,7 +46,7 @@ class JournalWriter:
     writes are welcome once the cause is gone.
     """
 
-    def __init__(self, path: Path, descriptor: int, header: Header) -> None:
+    def __init__(self, path: Path, blocks: BlockFile, header: Header) -> None:
         self.path, self.header = path, header
         self.n_rows = 0
         """Rows in the journal, all parts together."""
@@ -59,11 +56,8 @@ class JournalWriter:
         """Parts in the journal."""
         self.dropped = Tail(0, "", torn=True)
         """What ``reopen`` cut off."""
-        self._descriptor = descriptor
-        self._end = (0, 0)  # bytes and blocks: one value, so that no signal comes between the two
+        self._blocks = blocks
         self._in_part = False
-        self._unsound = ""
-        self._synced_s = time.monotonic()
 
     @classmethod
     def create(cls, path: str | Path, header: Header) -> Self:
@@ -74,25 +68,21 @@ class JournalWriter:
         """
         path = Path(path)
         try:
-            descriptor = os.open(path, _WRITABLE | os.O_CREAT, 0o666)
+            blocks = BlockFile.open(path, new=True)
         except OSError as error:
             raise RecordingError(f"{path}: cannot be created ({error.strerror})") from error
-        writer = cls(path, descriptor, header)
-        try:
-            lock(descriptor, path)
-            if os.fstat(descriptor).st_size:
-                raise RecordingError(
-                    f"{path}: exists already, from an interrupted run; resume that run, or remove the file"
-                )
-        except BaseException:
-            writer._let_go()
-            raise
+        if blocks.size:
+            blocks.close()
+            raise RecordingError(
+                f"{path}: exists already, from an interrupted run; resume that run, or remove the file"
+            )
+        writer = cls(path, blocks, header)
         try:
             writer._append(Kind.HEADER, header.encoded())
             writer._synchronise()
             synchronise_folder(path)
         except BaseException:
-            writer._let_go()
+            blocks.close()
             path.unlink(missing_ok=True)
             raise
         return writer
@@ -108,31 +98,25 @@ class JournalWriter:
             RecordingError: missing, foreign, of a later schema, being written by another process, or not writable.
         """
         path = Path(path)
-        try:
-            descriptor = os.open(path, _WRITABLE)
-        except OSError as error:
-            raise RecordingError(f"{path}: cannot be resumed ({error.strerror})") from error
-        try:
-            lock(descriptor, path)
-            with JournalContents(path) as contents:
-                writer = cls(path, descriptor, contents.header)
-                writer._continue(contents)
-        except OSError as error:
-            os.close(descriptor)
-            raise RecordingError(f"{path}: cannot be resumed ({error.strerror})") from error
-        except BaseException:
-            os.close(descriptor)
-            raise
+        with ExitStack() as stack:
+            try:
+                blocks = BlockFile.open(path)
+                stack.callback(blocks.close)
+                with JournalContents(path) as contents:
+                    writer = cls(path, blocks, contents.header)
+                    writer._continue(contents)
+            except OSError as error:
+                raise RecordingError(f"{path}: cannot be resumed ({error.strerror})") from error
+            stack.pop_all()
         return writer
 
     def _continue(self, contents: JournalContents) -> None:
         self.n_parts, self.dropped = len(contents.parts), contents.tail
         self.n_rows = sum(part.n_rows for part in contents.parts)
         self.n_points = sum(len(part.points) for part in contents.parts)
-        self._end = (contents.size, contents.n_blocks)
         if not contents.tail.torn:
             shutil.copyfile(self.path, set_aside(self.path))
-        os.ftruncate(self._descriptor, contents.size)
+        self._blocks.cut(contents.size, contents.n_blocks)
         self._synchronise()
 
     def part(self, information: Mapping[str, Any]) -> None:
@@ -155,15 +139,18 @@ class JournalWriter:
             block = stored[first : first + step]
             self._append_to_part(Kind.ROWS, block.tobytes())
             self.n_rows += len(block)
+        self._synchronise(if_due=True)
 
     def event(self, event: Mapping[str, Any]) -> None:
         """Append an event."""
         self._append_to_part(Kind.EVENT, jsontext.encode(event, what="event"))
+        self._synchronise(if_due=True)
 
     def point(self, point: Mapping[str, Any]) -> None:
         """Append the result of a completed point."""
         self._append_to_part(Kind.POINT, jsontext.encode(point, what="point"))
         self.n_points += 1
+        self._synchronise(if_due=True)
 
     def end(self, end: Mapping[str, Any]) -> None:
         """End the part and force all to the disk; ``completed: True`` in ``end`` says that the run is finished."""
@@ -173,12 +160,11 @@ class JournalWriter:
 
     def close(self) -> None:
         """Force everything to the disk and let go of the file; may be called twice."""
-        if self._descriptor < 0:
-            return
         try:
-            self._synchronise()
+            if not self._blocks.closed:
+                self._synchronise()
         finally:
-            self._let_go()
+            self._blocks.close()
 
     def __enter__(self) -> Self:
         return self
@@ -192,50 +178,23 @@ class JournalWriter:
         if not self._in_part:
             raise RecordingError(f"{self.path}: {kind.name.lower()} outside any part; call part() first")
         self._append(kind, payload)
-        if time.monotonic() - self._synced_s >= SYNC_INTERVAL_S:
-            self._synchronise()
 
     def _append(self, kind: Kind, payload: bytes) -> None:
-        if self._descriptor < 0:
-            raise RecordingError(f"{self.path}: the journal is closed")
-        if self._unsound:
-            raise RecordingError(f"{self.path}: no further writes after an earlier error ({self._unsound})")
         if len(payload) > LARGEST_PAYLOAD:
             raise RecordingError(
                 f"{kind.name.lower()}: {len(payload)} bytes of JSON, at most {LARGEST_PAYLOAD} are allowed"
             )
-        n_bytes, n_blocks = self._end
-        block = pack(kind, n_blocks, payload)
+        with self._telling("written"):
+            self._blocks.append(kind, payload)
+
+    def _synchronise(self, *, if_due: bool = False) -> None:
+        with self._telling("forced to the disk"):
+            self._blocks.synchronise(if_due=if_due)
+
+    @contextmanager
+    def _telling(self, done: str) -> Iterator[None]:
         try:
-            remaining = memoryview(block)
-            while remaining:
-                remaining = remaining[os.write(self._descriptor, remaining) :]
-            self._end = (n_bytes + len(block), n_blocks + 1)
+            yield
         except OSError as error:
-            self._cut_back()
-            raise RecordingError(f"{self.path}: cannot be written ({error.strerror}); {self._kept()}") from error
-        except BaseException:  # an interrupt between two pieces of a block
-            self._cut_back()
-            raise
-
-    def _cut_back(self) -> None:
-        try:
-            os.ftruncate(self._descriptor, self._end[0])
-        except OSError as error:
-            self._unsound = error.strerror or str(error)
-
-    def _kept(self) -> str:
-        return f"the {self.n_rows} rows and {self.n_points} points before are kept"
-
-    def _synchronise(self) -> None:
-        try:
-            _fdatasync(self._descriptor)
-        except OSError as error:
-            raise RecordingError(
-                f"{self.path}: cannot be forced to the disk ({error.strerror}); {self._kept()}"
-            ) from error
-        self._synced_s = time.monotonic()
-
-    def _let_go(self) -> None:
-        descriptor, self._descriptor = self._descriptor, -1
-        os.close(descriptor)
+            kept = f"the {self.n_rows} rows and {self.n_points} points before are kept"
+            raise RecordingError(f"{self.path}: cannot be {done} ({error.strerror}); {kept}") from error

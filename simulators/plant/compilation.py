@@ -38,25 +38,21 @@ def rig_arrays(
 ) -> RigArrays:
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
     predictor, corrector = step_columns(plant, 1.0 / (converter.sample_rate_hz * converter.substeps))
-    n_padded = round_up(len(joints))
-    n_element = max((len(joint.stiffness) for joint in joints), default=0)
-    stiffness, limit = np.zeros((2, n_element, n_padded))
+    n_element = round_up(max((len(joint.stiffness) for joint in joints), default=0))
+    elements = np.zeros((2, len(joints), n_element))
     for s, joint in enumerate(joints):
         n = len(joint.stiffness)
-        stiffness[:n, s] = joint.stiffness
-        limit[:n, s] = np.multiply(joint.stiffness, joint.slip)
-    # The rows of the padding joints are read with the others.
-    extra = n_padded - len(joints)
+        elements[0, s, :n] = joint.stiffness
+        elements[1, s, :n] = np.multiply(joint.stiffness, joint.slip)
     n_pair = (len(sensors) + 1) // 2
     sizes = (plant.dynamics.shape[0], len(magnets), len(joints), converter.substeps)
     return RigArrays(
         plant=np.array([sizes], PLANT),
-        step=pad(predictor, extra=extra),
-        correct=pad(corrector, rows=False, extra=extra),
+        step=pad(predictor),
+        correct=pad(corrector, rows=False),
         sites=np.array([_site(magnet) for magnet in magnets], SITE),
-        stuck=stiffness.sum(axis=0),
-        jenkins_stiffness=stiffness,
-        jenkins_limit=limit,
+        elements=elements,
+        stuck=elements[0].sum(axis=1),
         sense=pad(np.array(outputs).T),
         channels=np.array([_channel(sensor, converter, noise_scale) for sensor in sensors], CHANNEL),
         converter=np.array(
@@ -72,13 +68,12 @@ def at_rest(rig: RigArrays) -> RigState:
     return RigState(
         inputs=np.zeros(n_input),
         deflection=np.zeros(rig.stuck.size),
-        friction=np.zeros_like(rig.jenkins_stiffness),
+        friction=np.zeros(rig.elements.shape[1:]),
         filters=np.zeros((2, rig.channels.size)),
         counter=np.zeros(1, np.int64),
         rows=np.zeros(n_row),
         forces=np.zeros(rig.correct.shape[0]),
-        friction_trial=np.zeros_like(rig.jenkins_stiffness),
-        friction_sum=np.zeros(rig.stuck.size),
+        friction_trial=np.zeros(rig.elements.shape[1:]),
         outputs=np.zeros(rig.sense.shape[1]),
     )
 
@@ -90,7 +85,9 @@ def _site(magnet: Magnet) -> tuple[int, float, float, float, float, float]:
     return (kind, magnet.strength_n_m4, magnet.gap_m, magnet.limit_m, magnet.stiffness_n_m, at_rest_n)
 
 
-def _channel(sensor: Sensor, converter: Converter, noise_scale: float) -> tuple[float, float, float, float, float, float]:
+def _channel(
+    sensor: Sensor, converter: Converter, noise_scale: float
+) -> tuple[float, float, float, float, float, float]:
     """Low-pass ``y' = w_c (value - y)``, exact for a value that changes linearly from one sample to the next."""
     x = 2.0 * np.pi * sensor.high_pass_hz / converter.sample_rate_hz
     hold = float(np.exp(-x))

@@ -49,10 +49,10 @@ def step_columns(plant: LinearPlant, step_s: float) -> tuple[Matrix, Matrix]:
     return (fold @ predictor).T, (fold @ corrector).T
 
 
-def pad(matrix: Matrix, *, rows: bool = True, extra: int = 0) -> Matrix:
-    """Zeros added until both sizes (or the last alone) are multiples of four, after ``extra`` more in the last."""
+def pad(matrix: Matrix, *, rows: bool = True) -> Matrix:
+    """Zeros added until both sizes (or the last alone) are multiples of four."""
     n_row, n_column = matrix.shape
-    padded = np.zeros((round_up(n_row) if rows else n_row, round_up(n_column + extra)))
+    padded = np.zeros((round_up(n_row) if rows else n_row, round_up(n_column)))
     padded[:n_row, :n_column] = matrix
     return padded
 

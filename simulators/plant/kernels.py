@@ -9,6 +9,8 @@ The predictor takes f_1 = f_0, the corrector f_1 from the predicted site coordin
 from the corrected ones and kept. Friction forces of the predictor are provisional: Jenkins elements are committed once.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,68 +56,87 @@ def local_force(site: Record, z: float) -> float:
 
 
 @kernel
-def friction_forces(
-    rig: RigArrays, state: RigState, first: int, after: NDArray[np.float64], forces: NDArray[np.float64]
-) -> None:
-    """Forces of the Jenkins sites minus their stuck linear part: ``k_stuck delta - sum_j f_j``.
-
-    Each element slips at its limit: ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)``, from the committed state into
-    ``after``. ``first``: row of the first site. All sites side by side, so that the compiled loop runs over whole vectors.
-    """
-    stiffness, limit, before, total = rig.jenkins_stiffness, rig.jenkins_limit, state.friction, state.friction_sum
-    n_element, n_padded = stiffness.shape
-    for s in range(n_padded):
-        total[s] = 0.0
-    for e in range(n_element):
-        for s in range(n_padded):
-            force = before[e, s] + stiffness[e, s] * (state.rows[first + s] - state.deflection[s])
-            force = min(max(force, -limit[e, s]), limit[e, s])
-            after[e, s] = force
-            total[s] += force
-    n_local = rig.sites.size
-    for s in range(rig.plant[0].n_jenkins):
-        forces[n_local + s] = rig.stuck[s] * state.rows[first + s] - total[s]
-
-
-@kernel
-def site_forces(
-    rig: RigArrays, state: RigState, friction_after: NDArray[np.float64], forces: NDArray[np.float64]
+def local_forces(
+    sites: NDArray[Any], coordinates: NDArray[np.float64], first: int, forces: NDArray[np.float64]
 ) -> bool:
-    """All site forces from the site coordinates in ``state.rows``; True where a magnet is beyond its limit."""
+    """Forces of the sites without memory, whose coordinates begin at ``first``; True where a magnet is beyond its limit."""
     beyond = False
-    n = rig.plant[0].n_state
-    for s in range(rig.sites.size):
-        z = state.rows[n + s]
-        forces[s] = local_force(rig.sites[s], z)
-        beyond |= abs(z) > rig.sites[s].limit
-    if rig.plant[0].n_jenkins > 0:
-        friction_forces(rig, state, n + rig.sites.size, friction_after, forces)
+    for s in range(sites.size):
+        z = coordinates[first + s]
+        forces[s] = local_force(sites[s], z)
+        beyond |= abs(z) > sites[s].limit
     return beyond
 
 
 @kernel
+def clip(value: float, limit: float) -> float:
+    """``value`` within plus and minus ``limit``."""
+    value = limit if value > limit else value
+    return -limit if value < -limit else value
+
+
+@kernel
+def jenkins_forces(
+    elements: NDArray[np.float64],
+    stuck: NDArray[np.float64],
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+    deflection: NDArray[np.float64],
+    coordinates: NDArray[np.float64],
+    first: int,
+    forces: NDArray[np.float64],
+    n_local: int,
+) -> None:
+    """Forces of the Jenkins sites, whose coordinates begin at ``first``, minus their stuck part: ``k delta - sum_j f_j``.
+
+    Each element slips at its limit: ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)``, from the committed forces
+    ``before`` and ``deflection`` into ``after``. Four elements at a time: their sums do not wait for each other.
+    """
+    _, n_site, n_element = elements.shape
+    for s in range(n_site):
+        z = coordinates[first + s]
+        dz = z - deflection[s]
+        sum_0, sum_1, sum_2, sum_3 = 0.0, 0.0, 0.0, 0.0
+        for e in range(0, n_element, 4):
+            f_0 = clip(before[s, e] + elements[0, s, e] * dz, elements[1, s, e])
+            f_1 = clip(before[s, e + 1] + elements[0, s, e + 1] * dz, elements[1, s, e + 1])
+            f_2 = clip(before[s, e + 2] + elements[0, s, e + 2] * dz, elements[1, s, e + 2])
+            f_3 = clip(before[s, e + 3] + elements[0, s, e + 3] * dz, elements[1, s, e + 3])
+            after[s, e], after[s, e + 1], after[s, e + 2], after[s, e + 3] = f_0, f_1, f_2, f_3
+            sum_0 += f_0
+            sum_1 += f_1
+            sum_2 += f_2
+            sum_3 += f_3
+        forces[n_local + s] = stuck[s] * z - ((sum_0 + sum_1) + (sum_2 + sum_3))
+
+
+@kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
-    """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE or 0."""
-    plant = rig.plant[0]
-    n = plant.n_state
-    n_local = plant.n_local
-    n_site = n_local + plant.n_jenkins
-    inputs, rows = state.inputs, state.rows
-    flags = 0
+    """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE or 0.
+
+    Bundles of arrays are taken apart here: passed on to a callee, each of their arrays would cost a reference count.
+    """
+    step, correct, sites, elements, stuck = rig.step, rig.correct, rig.sites, rig.elements, rig.stuck
+    inputs, rows, forces = state.inputs, state.rows, state.forces
+    friction, trial, deflection = state.friction, state.friction_trial, state.deflection
+    n, n_local, n_jenkins = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_jenkins
+    joints = n + n_local
+    beyond = False
     inputs[n] = voltage
-    for _ in range(plant.substeps):
-        combine(rig.step, inputs, rows)
-        site_forces(rig, state, state.friction_trial, state.forces)
-        for s in range(n_site):
-            change = state.forces[s] - inputs[n + 1 + s]
+    for _ in range(rig.plant[0].substeps):
+        combine(step, inputs, rows)
+        local_forces(sites, rows, n, forces)
+        jenkins_forces(elements, stuck, friction, trial, deflection, rows, joints, forces, n_local)
+        for s in range(n_local + n_jenkins):
+            change = forces[s] - inputs[n + 1 + s]
             for i in range(rows.size):
-                rows[i] += change * rig.correct[s, i]
-        if site_forces(rig, state, state.friction, state.forces):
-            flags = MAGNET_RANGE
-        for s in range(n_site):
-            inputs[n + 1 + s] = state.forces[s]
-        for s in range(plant.n_jenkins):
-            state.deflection[s] = rows[n + n_local + s]
+                rows[i] += change * correct[s, i]
+        beyond |= local_forces(sites, rows, n, forces)
+        jenkins_forces(elements, stuck, friction, friction, deflection, rows, joints, forces, n_local)
+        for s in range(n_local + n_jenkins):
+            inputs[n + 1 + s] = forces[s]
+        for s in range(n_jenkins):
+            deflection[s] = rows[joints + s]
         for i in range(n):
             inputs[i] = rows[i]
-    return flags
+    return MAGNET_RANGE if beyond else 0

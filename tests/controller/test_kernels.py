@@ -65,7 +65,9 @@ def test_demodulation_settles_on_the_complex_amplitude(size, angle):
         value = (amplitude * complex(math.cos(theta), math.sin(theta))).real
         estimate = demodulate(estimate, value, math.cos(theta), math.sin(theta), gain)
         history.append(estimate)
-    ripple = corner / math.hypot(2 * omega, corner)  # |a/(a + 2 i Omega)|: what the low-pass leaves at twice the frequency
+    ripple = corner / math.hypot(
+        2 * omega, corner
+    )  # |a/(a + 2 i Omega)|: what the low-pass leaves at twice the frequency
     last = np.array(history[-2000:])
     assert abs(last.mean() - amplitude) < 3e-3 * size
     assert np.abs(last - last.mean()).max() == pytest.approx(ripple * size, rel=0.1)

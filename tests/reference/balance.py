@@ -93,6 +93,10 @@ class Balance:
         """Inverse of `to_complex`."""
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
+    def unknowns(self, magnet_m: Complex, delta: Complex, omega_rad_s: float, voltage_v: float) -> Vector:
+        """Pack harmonics, frequency and voltage into y."""
+        return np.concatenate([self.to_real(magnet_m), self.to_real(delta), [omega_rad_s, voltage_v]])
+
     def responses(self, y: Vector) -> tuple[Complex, Complex]:
         """[z, delta, F, x_d] that the forces of y cause, (H + 1, 4), and Jacobian (H + 1, 4, len(y))."""
         p, h = self.size, self.harmonics

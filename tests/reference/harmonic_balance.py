@@ -12,7 +12,7 @@ import numpy as np
 from tests.reference.balance import Balance, Conditions
 from tests.reference.coupled_rig import Complex, CoupledRig, Vector
 
-HARMONICS = 11
+HARMONICS = 15
 SAMPLES = 256
 RESONANCE_DEG = -90.0
 
@@ -73,7 +73,7 @@ class Periodic:
 def solve(balance: Balance, conditions: Conditions, start: Vector, tolerance: float = 1e-10) -> tuple[Vector, Vector]:
     """Newton from `start`; the unknowns and the Jacobian there. ArithmeticError when a dozen steps do not do."""
     y, scale = start.copy(), np.ones_like(start)
-    # displacement and slip coordinates are of the order of millimetres
+    # displacements and slips are of the order of millimetres
     scale[: 2 * balance.size] = 1e-3
     for _ in range(12):
         value, jacobian = balance.residual(y, conditions)
@@ -85,7 +85,7 @@ def solve(balance: Balance, conditions: Conditions, start: Vector, tolerance: fl
 
 def linear_start(balance: Balance, conditions: Conditions) -> Vector:
     """Solution of the rig with linearised magnets and stuck clamp, closing conditions met roughly."""
-    rig, p = balance.rig, balance.size
+    rig = balance.rig
     k_lin = -float(rig.magnet_slope(np.zeros(1))[0])
     omega = conditions.omega_rad_s or rig.linear_mode[0]
     transfer = balance.transfer(omega)[0][1]
@@ -93,11 +93,9 @@ def linear_start(balance: Balance, conditions: Conditions) -> Vector:
     voltage = conditions.voltage_v
     if voltage is None:
         voltage = float((conditions.force_n or 0.0) / abs(force))
-    y = np.zeros(2 * p + 2)
-    for at, amplitude in ((0, z * voltage), (p, delta * voltage)):
-        y[at + 1], y[at + 1 + balance.harmonics] = amplitude.real, amplitude.imag
-    y[-2:] = omega, voltage
-    return y
+    first = np.zeros(balance.harmonics + 1, complex)
+    first[1] = voltage
+    return balance.unknowns(z * first, delta * first, omega, voltage)
 
 
 def periodic(balance: Balance, y: Vector) -> Periodic:

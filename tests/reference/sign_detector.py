@@ -7,16 +7,7 @@ from scipy.optimize import brentq
 
 from tests.reference.balance import Balance, Conditions
 from tests.reference.coupled_rig import CoupledRig, Vector
-from tests.reference.harmonic_balance import (
-    HARMONICS,
-    RESONANCE_DEG,
-    SAMPLES,
-    Periodic,
-    linear_start,
-    periodic,
-    sequence,
-    solve,
-)
+from tests.reference.harmonic_balance import HARMONICS, RESONANCE_DEG, SAMPLES, Periodic, periodic, sequence, solve
 
 
 def mean_sign_product(one: Vector, other: Vector) -> float:
@@ -39,3 +30,31 @@ def detector_output(state: Periodic, samples: int = 2048) -> float:
     force = np.where(order > 0, state.force_n, 0.0)
     minus_acceleration = (order * state.omega_rad_s) ** 2 * state.drive_m
     return mean_sign_product(state.waveform(force, theta), state.waveform(minus_acceleration, theta))
+
+
+def sign_lock(rig: CoupledRig, voltages_v: Sequence[float]) -> list[Periodic]:
+    """States where the averaged detector rests, at the given voltage amplitudes, lowest first.
+
+    The rest point next to phase resonance is taken, walking down the detector's characteristic, which falls with lag.
+    """
+    balance = Balance(rig, HARMONICS, SAMPLES)
+    points = [Conditions(voltage_v=voltage, lag_deg=RESONANCE_DEG) for voltage in voltages_v]
+    return [_rest_point(balance, state) for state in sequence(balance, points)]
+
+
+def _rest_point(balance: Balance, resonance: Periodic, step_deg: float = 3.0) -> Periodic:
+    """Walk in lag from a phase-resonant state at fixed voltage until the detector changes sign, then find the zero."""
+    here = balance.unknowns(resonance.magnet_m, resonance.delta, resonance.omega_rad_s, resonance.voltage_v)
+
+    def at(lag_deg: float) -> tuple[Vector, Periodic]:
+        y, _ = solve(balance, Conditions(voltage_v=resonance.voltage_v, lag_deg=lag_deg), here)
+        return y, periodic(balance, y)
+
+    lag, output = RESONANCE_DEG, detector_output(resonance)
+    step = float(np.copysign(step_deg, output))
+    for _ in range(int(80.0 / step_deg)):
+        after, state = at(lag + step)
+        if detector_output(state) * output <= 0.0:
+            return at(brentq(lambda trial: detector_output(at(trial)[1]), lag, lag + step, xtol=1e-6))[1]
+        here, lag = after, lag + step
+    raise ArithmeticError(f"no rest point within 80 degrees at {resonance.voltage_v} V")

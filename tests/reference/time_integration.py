@@ -44,19 +44,21 @@ class TimeDomain:
         return float(self.voltage_v * rise * np.cos(self.omega * t))
 
     def derivative(self, t: float, x: Vector, jenkins: float = 0.0) -> Vector:
-        """x' with the given sum of Jenkins forces; without friction delta must not feel its stuck part either."""
+        """x' under the given sum of Jenkins forces."""
         z, rig = float(self.z_row @ x), self.rig
         away = (rig.magnet_d0_m + z) if rig.symmetric else rig.magnet_d0_m
         magnet = rig.magnet_k0 * (away**-4 - (rig.magnet_d0_m - z) ** -4)
         friction = self.stuck * float(self.delta_row @ x) - jenkins
-        return self.linear @ x + self.into @ np.array([magnet, friction, self.voltage(t)])
+        return np.asarray(self.linear @ x + self.into @ np.array([magnet, friction, self.voltage(t)]))
 
     def derivative_with_rates(self, t: float, y: Vector) -> Vector:
         """State and Jenkins forces: f_j' = k_j delta', held at the limit while the motion pushes on."""
         x, f = y[: self.size], y[self.size :]
         speed = float(self.delta_row[: self.mechanical] @ x[self.mechanical : 2 * self.mechanical])
         pushing = f * np.sign(speed) >= self.limit
-        return np.concatenate([self.derivative(t, x, float(f.sum())), np.where(pushing, 0.0, self.rig.jenkins_k * speed)])
+        return np.concatenate(
+            [self.derivative(t, x, float(f.sum())), np.where(pushing, 0.0, self.rig.jenkins_k * speed)]
+        )
 
     def force_n(self, x: Vector) -> Vector:
         """Stinger force from states (..., size)."""

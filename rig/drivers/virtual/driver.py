@@ -11,7 +11,8 @@ from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.kernels import exchange_block, fused
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
-from simulators import Flag, VirtualRig
+from simulators.layout import Flag
+from simulators.virtual_rig import VirtualRig
 
 __all__ = ["VirtualDAQ"]
 
@@ -79,9 +80,7 @@ class VirtualDAQ(DAQ):
     @property
     def counters(self) -> dict[str, int]:
         """Samples at which each flag of the rig was up."""
-        return {
-            str(flag.name).lower(): int(count) for flag, count in zip(Flag, self._counts, strict=True)
-        }
+        return {str(flag.name).lower(): int(count) for flag, count in zip(Flag, self._counts, strict=True)}
 
     def _open(self) -> None:
         pass
@@ -104,7 +103,9 @@ class VirtualDAQ(DAQ):
         """
         lead = int(t.loop["lead_whole"][0])
         if lead != math.floor(self.block + self.latency_samples):
-            raise DaqRefused(f"the tick expects a lead of {lead} samples, this device has {self.block + self.queue_samples}")
+            raise DaqRefused(
+                f"the tick expects a lead of {lead} samples, this device has {self.block + self.queue_samples}"
+            )
         volts = np.empty(len(self.channels))
         return fused(t, self._arrays, self._state, self._under_way, volts, readings, rows, self._counts)
 
@@ -113,5 +114,3 @@ class VirtualDAQ(DAQ):
 
     def _close(self) -> None:
         pass
-
-

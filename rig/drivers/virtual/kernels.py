@@ -5,7 +5,8 @@ import numpy as np
 from rig.safety.layout import OFF
 from rig.tick.kernels import tick
 from rig.tick.layout import TickArrays
-from simulators.kernels import RigArrays, RigState, sample
+from simulators.kernels import sample
+from simulators.layout import RigArrays, RigState
 from vibrolock.compiled import kernel
 
 

@@ -7,7 +7,9 @@ import numpy as np
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter
 
-ROW = np.dtype([("sample", "<u4"), ("theta_rad", "<f4"), ("frequency_hz", "<f8"), ("locked", "?"), ("inputs", "<f4", (4,))])
+ROW = np.dtype(
+    [("sample", "<u4"), ("theta_rad", "<f4"), ("frequency_hz", "<f8"), ("locked", "?"), ("inputs", "<f4", (4,))]
+)
 COLUMNS = (
     Column("sample", "1", "number of the sample"),
     Column("theta_rad", "rad", "phase of the oscillator"),

@@ -217,7 +217,7 @@ def test_a_disk_that_cannot_be_synchronised_is_told(tmp_path, monkeypatch):
 
     writer = JournalWriter.create(tmp_path / "a.journal", header())
     fill(writer, 0, 10, completed=None)
-    monkeypatch.setattr("rig.recording.journal._fdatasync", failing)
+    monkeypatch.setattr("rig.recording.appending._fdatasync", failing)
     with pytest.raises(RecordingError, match="cannot be forced to the disk"):
         writer.close()
     monkeypatch.undo()

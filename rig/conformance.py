@@ -1,0 +1,232 @@
+"""The DAQ contract as tests: what every driver has to pass before a rig is trusted to it.
+
+Derive a test class from `DriverContract` and say how a driver is made; pytest collects the rest::
+
+    class TestMyDriver(DriverContract):
+        def make(self):
+            return MyDriver(bench)
+
+Tests that a driver cannot take part in by its `rig.daq.Capabilities` say so instead of passing in silence.
+Outputs stay within ``amplitude_v``; nothing is driven at more than that.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+
+import numpy as np
+
+from rig.daq import DAQ, State
+from rig.errors import DaqRefused
+
+__all__ = ["DriverContract", "NotApplicable"]
+
+
+class NotApplicable(Exception):  # noqa: N818 (not an error)
+    """A test asks for a capability that the driver says it has not; a reason to skip, said aloud."""
+
+
+class DriverContract(ABC):
+    """Tests of one driver. Override `make`; and ``amplitude_v``, ``tolerance_v`` for a physical bench."""
+
+    amplitude_v = 0.05
+    """Largest output of any test, V."""
+    tolerance_v = 0.02
+    """How still the inputs are with 0 V on the output, V RMS."""
+    blocks = (1, 4, 10)
+    """Block sizes that are tried, as far as the driver takes them."""
+
+    @abstractmethod
+    def make(self) -> DAQ:
+        """A driver that is not open."""
+
+    def skip(self, reason: str) -> None:
+        """What to do with a test that does not apply; pytest's skip where pytest runs the suite."""
+        try:
+            import pytest
+        except ImportError:
+            raise NotApplicable(reason) from None
+        pytest.skip(reason)
+
+    @contextmanager
+    def running(self, block: int = 1) -> Iterator[DAQ]:
+        """A driver that is running."""
+        with self.make() as daq:
+            if block > daq.capabilities.largest_block:
+                self.skip(f"block {block}: the driver takes up to {daq.capabilities.largest_block}")
+            daq.start(block)
+            yield daq
+
+    def sine(self, samples: int, rate_hz: float) -> np.ndarray:
+        """A quiet sine of 20 Hz."""
+        return np.asarray(self.amplitude_v * np.sin(2.0 * np.pi * 20.0 * np.arange(samples) / rate_hz))
+
+    def refused(self, action: Callable[[], object]) -> str:
+        """The message of the `DaqRefused` that an action must raise."""
+        try:
+            action()
+        except DaqRefused as error:
+            return str(error)
+        raise AssertionError("was not refused")
+
+    def test_nothing_is_opened_by_the_constructor(self) -> None:
+        """A driver that was made and thrown away leaves no trace."""
+        assert self.make().state is State.CLOSED
+
+    def test_the_life_cycle_is_open_start_stop_close(self) -> None:
+        """Every step leads to its state."""
+        daq = self.make()
+        steps = [
+            (daq.open, State.OPEN),
+            (daq.start, State.RUNNING),
+            (daq.stop, State.OPEN),
+            (daq.close, State.CLOSED),
+        ]
+        try:
+            for step, state in steps:
+                step()
+                assert daq.state is state
+        finally:
+            daq.close()
+
+    def test_close_may_be_called_at_any_time_and_again(self) -> None:
+        """Before opening, while running, twice."""
+        daq = self.make()
+        daq.close()
+        daq.open()
+        daq.start(1)
+        daq.close()
+        daq.close()
+        assert daq.state is State.CLOSED
+
+    def test_a_driver_may_be_opened_again(self) -> None:
+        """After close, the same object works once more."""
+        daq = self.make()
+        for _ in range(2):
+            with daq:
+                daq.start(1)
+                assert np.isfinite(daq.exchange(np.zeros(1))).all()
+
+    def test_an_error_inside_the_context_closes(self) -> None:
+        """Whatever happens, the device is let go of."""
+        daq = self.make()
+        try:
+            with daq:
+                daq.start(1)
+                raise KeyError("anything")
+        except KeyError:
+            pass
+        assert daq.state is State.CLOSED
+
+    def test_steps_out_of_order_are_refused(self) -> None:
+        """Exchange before start, start before open, open twice, start twice."""
+        daq = self.make()
+        assert "closed" in self.refused(lambda: daq.exchange(np.zeros(1)))
+        assert "closed" in self.refused(lambda: daq.start(1))
+        with daq:
+            self.refused(daq.open)
+            assert "open" in self.refused(lambda: daq.exchange(np.zeros(1)))
+            daq.start(1)
+            self.refused(lambda: daq.start(1))
+
+    def test_blocks_beyond_the_device_are_refused_with_what_is_allowed(self) -> None:
+        """0, and one more than the largest."""
+        with self.make() as daq:
+            largest = daq.capabilities.largest_block
+            for block in (0, -1, largest + 1):
+                assert str(largest) in self.refused(partial(daq.start, block))
+
+    def test_every_call_returns_one_row_a_sample_and_one_column_a_channel(self) -> None:
+        """In volts, finite, float64."""
+        for block in self.blocks:
+            with self.running(block) as daq:
+                inputs = daq.exchange(np.zeros(block))
+                assert inputs.shape == (block, len(daq.channels))
+                assert inputs.dtype == np.float64
+                assert np.isfinite(inputs).all()
+
+    def test_a_block_of_another_size_is_refused(self) -> None:
+        """N is fixed at start."""
+        with self.running(4) as daq:
+            self.refused(lambda: daq.exchange(np.zeros(3)))
+            self.refused(lambda: daq.exchange(np.zeros((4, 1))))
+
+    def test_voltages_beyond_the_range_or_not_a_number_are_refused(self) -> None:
+        """The message names the voltage and the range; the device goes on."""
+        with self.running(2) as daq:
+            too_much = 1.5 * daq.output_range_v
+            assert f"{daq.output_range_v:g}" in self.refused(lambda: daq.exchange(np.array([0.0, too_much])))
+            self.refused(lambda: daq.exchange(np.array([np.nan, 0.0])))
+            self.refused(lambda: daq.exchange(np.array([0.0, -np.inf])))
+            daq.exchange(np.zeros(2))
+
+    def test_the_voltages_handed_over_are_not_kept(self) -> None:
+        """The caller may write its next block into the same array."""
+        with self.running(4) as daq:
+            voltages = np.zeros(4)
+            first = daq.exchange(voltages)
+            kept = first.copy()
+            voltages[:] = self.amplitude_v
+            daq.exchange(voltages)
+            np.testing.assert_array_equal(first, kept)
+
+    def test_the_latency_is_known_and_not_negative(self) -> None:
+        """u[i] cannot show before y[i]."""
+        for block in self.blocks:
+            with self.running(block) as daq:
+                assert daq.latency_samples >= 0.0
+
+    def test_an_output_does_not_show_before_its_latency(self) -> None:
+        """A repeatable device answers a step at the sample of its latency, and not before."""
+        for block in self.blocks:
+            with self.make() as daq:
+                if not daq.capabilities.repeatable:
+                    self.skip("the device does not repeat itself, so that two runs cannot be compared")
+                steps = int(daq.sample_rate_hz * 0.02) // block + 1
+                quiet, driven = (self._answer(daq, block, steps, level) for level in (0.0, self.amplitude_v))
+                daq.start(block)
+                first = int(np.flatnonzero((quiet != driven).any(axis=1))[0])
+                assert first >= int(daq.latency_samples)
+
+    def _answer(self, daq: DAQ, block: int, calls: int, level: float) -> np.ndarray:
+        daq.start(block)
+        voltages = np.full(block, level)
+        inputs = np.vstack([daq.exchange(voltages) for _ in range(calls)])
+        daq.stop()
+        return inputs
+
+    def test_every_block_size_gives_the_same_samples(self) -> None:
+        """Open loop, a repeatable device without a queue answers the same voltages alike."""
+        answers = []
+        for block in self.blocks:
+            with self.make() as daq:
+                if not daq.capabilities.repeatable:
+                    self.skip("the device does not repeat itself")
+                daq.start(block)
+                if daq.latency_samples >= 1.0:
+                    self.skip("the device has a queue, whose length in samples depends on the block")
+                voltages = self.sine(400, daq.sample_rate_hz)
+                answers.append(np.vstack([daq.exchange(v.copy()) for v in voltages.reshape(-1, block)]))
+        for answer in answers[1:]:
+            np.testing.assert_array_equal(answer, answers[0])
+
+    def test_stop_leaves_the_output_at_zero(self) -> None:
+        """Driven, stopped and started again with 0 V, the inputs come to rest."""
+        with self.running(10) as daq:
+            for voltages in self.sine(2000, daq.sample_rate_hz).reshape(-1, 10):
+                daq.exchange(voltages.copy())
+            daq.stop()
+            daq.start(10)
+            inputs = np.vstack([daq.exchange(np.zeros(10)) for _ in range(500)])
+            assert np.std(inputs[-1000:], axis=0).max() < self.tolerance_v
+
+    def test_counters_are_whole_numbers_that_only_grow(self) -> None:
+        """Whatever a driver counts."""
+        with self.running(10) as daq:
+            before = dict(daq.counters)
+            for _ in range(20):
+                daq.exchange(np.zeros(10))
+            for name, count in daq.counters.items():
+                assert isinstance(count, int)
+                assert count >= before.get(name, 0)

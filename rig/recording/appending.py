@@ -1,0 +1,100 @@
+"""Blocks appended to a file, each whole or not at all."""
+
+import errno
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Self
+
+from rig.recording.blocks import Kind, pack
+from rig.recording.locking import lock
+
+__all__ = ["SYNC_INTERVAL_S", "BlockFile"]
+
+SYNC_INTERVAL_S = 0.5
+"""The disk is synchronised at most this often while blocks are appended."""
+
+_WRITABLE = os.O_RDWR | os.O_APPEND | getattr(os, "O_BINARY", 0)
+_fdatasync: Callable[[int], None] = getattr(os, "fdatasync", os.fsync)  # macOS and Windows have none
+
+
+class BlockFile:
+    """The file of a journal, open for appending and locked against other writers.
+
+    Every method raises ``OSError``; after a failed or interrupted write the file ends where the block began. Where even
+    that fails, nothing more is written: a block behind half a block could not be read.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._end = (0, 0)  # bytes and blocks as one value: a signal's exception never comes between the two
+        self._unsound: OSError | None = None
+        self._synced_s = time.monotonic()
+
+    @classmethod
+    def open(cls, path: Path, *, new: bool = False) -> Self:
+        """Open the file at ``path``, made if it is ``new`` and missing.
+
+        Raises:
+            OSError: it cannot be opened.
+            RecordingError: another process writes it.
+        """
+        descriptor = os.open(path, _WRITABLE | (os.O_CREAT if new else 0), 0o666)
+        try:
+            lock(descriptor, path)
+        except BaseException:
+            os.close(descriptor)
+            raise
+        return cls(descriptor)
+
+    @property
+    def size(self) -> int:
+        """Length of the file, bytes."""
+        return os.fstat(self._descriptor).st_size
+
+    def cut(self, n_bytes: int, n_blocks: int) -> None:
+        """Keep the first ``n_bytes``, which are ``n_blocks`` whole blocks, and go on behind them."""
+        os.ftruncate(self._descriptor, n_bytes)
+        self._end = (n_bytes, n_blocks)
+
+    def append(self, kind: Kind, payload: bytes) -> None:
+        """Append one block; it is in the hands of the operating system on return."""
+        if self._descriptor < 0:
+            raise OSError(errno.EBADF, "the journal is closed")
+        if self._unsound:
+            raise OSError(self._unsound.errno, f"no further writes after an earlier error: {self._unsound.strerror}")
+        n_bytes, n_blocks = self._end
+        block = pack(kind, n_blocks, payload)
+        try:
+            rest = memoryview(block)
+            while rest:
+                rest = rest[os.write(self._descriptor, rest) :]
+            self._end = (n_bytes + len(block), n_blocks + 1)
+        except BaseException:
+            self._take_back()
+            raise
+
+    def _take_back(self) -> None:
+        try:
+            os.ftruncate(self._descriptor, self._end[0])
+        except OSError as error:
+            self._unsound = error
+
+    def synchronise(self, *, if_due: bool = False) -> None:
+        """Force what was written to the disk; ``if_due``: only if that was not done within ``SYNC_INTERVAL_S``."""
+        now_s = time.monotonic()
+        if not if_due or now_s - self._synced_s >= SYNC_INTERVAL_S:
+            _fdatasync(self._descriptor)
+            self._synced_s = now_s
+
+    @property
+    def closed(self) -> bool:
+        """Whether the file was closed."""
+        return self._descriptor < 0
+
+    def close(self) -> None:
+        """Close the file and let other writers in; may be called twice."""
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)

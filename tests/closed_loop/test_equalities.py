@@ -1,0 +1,94 @@
+"""One tick for every driver: the same samples open loop for any block, the same run closed loop, bit for bit."""
+
+import numpy as np
+import pytest
+
+from rig.drivers import make_daq
+from rig.loop import Loop
+from rig.tick.kernels import tick_block
+from tests.rig.rigs import bench_with, tick_for
+
+SAMPLES = 12_000
+
+
+def _open_loop(block, **options):
+    """Readings of the virtual rig under a given voltage, swapped in blocks."""
+    voltages = 0.4 * np.sin(2 * np.pi * 24.5 * np.arange(SAMPLES) / 5000.0)
+    with make_daq(bench_with(**options), seed=3) as daq:
+        daq.start(block)
+        return np.vstack([daq.exchange(part.copy()) for part in voltages.reshape(-1, block)])
+
+
+@pytest.mark.parametrize("block", [8, 48, 600])
+def test_open_loop_every_block_size_gives_the_same_samples(block):
+    np.testing.assert_array_equal(_open_loop(block), _open_loop(1))
+
+
+@pytest.mark.parametrize("options", [{"queue_blocks": 2}, {"delay_samples": 16}])
+def test_open_loop_a_queue_only_shifts_the_answer(options):
+    shift = 16
+    late = _open_loop(8, noise_scale=0.0, **options)
+    np.testing.assert_array_equal(late[shift:], _open_loop(8, noise_scale=0.0)[:-shift])
+
+
+def _exchanged(block, **options):
+    bench = bench_with({"block": block}, **options)
+    with make_daq(bench, seed=5) as daq:
+        daq.start(block)
+        tick = tick_for(bench, block + daq.latency_samples, 0.4)
+        voltages, chunks = np.zeros(block), []
+        for _ in range(SAMPLES // block):
+            readings, rows = tick.buffers(block)
+            tick_block(tick.arrays, daq.exchange(voltages), readings, rows, voltages)
+            chunks.append(tick.joined(readings, rows))
+        return np.concatenate(chunks), tick
+
+
+def _fused(block, **options):
+    bench = bench_with({"block": block}, **options)
+    with make_daq(bench, seed=5) as daq:
+        daq.start(block)
+        tick = tick_for(bench, block + daq.latency_samples, 0.4)
+        readings, rows = tick.buffers(SAMPLES)
+        assert daq.run_fused(tick.arrays, readings, rows) == SAMPLES
+        return tick.joined(readings, rows), tick
+
+
+@pytest.mark.parametrize(
+    ("block", "options"),
+    [(1, {}), (1, {"queue_blocks": 1}), (8, {}), (8, {"queue_blocks": 2}), (5, {"delay_samples": 7}), (40, {})],
+)
+def test_closed_loop_blocks_are_bit_identical_to_the_fused_run_with_their_latency(block, options):
+    exchanged, tick_e = _exchanged(block, **options)
+    fused, tick_f = _fused(block, **options)
+    assert exchanged.tobytes() == fused.tobytes()
+    for name, ours, theirs in zip(tick_e.arrays._fields, tick_e.arrays, tick_f.arrays, strict=True):
+        assert ours.tobytes() == theirs.tobytes(), name
+    assert np.abs(exchanged["command_v"]).max() > 0.3  # the loop was driving, not idling
+
+
+def test_latency_changes_the_closed_loop():
+    assert _fused(1)[0].tobytes() != _fused(8)[0].tobytes()
+
+
+def test_a_run_is_repeated_bit_for_bit_by_its_seed_and_by_no_other():
+    def whole_run(seed):
+        bench = bench_with()
+        with make_daq(bench, seed) as daq:
+            daq.start(1)
+            tick = tick_for(bench, 1 + daq.latency_samples, 0.3)
+            return np.concatenate(list(Loop(daq, tick).run())).tobytes()
+
+    assert whole_run(1) == whole_run(1)
+    assert whole_run(1) != whole_run(2)
+
+
+def test_the_loop_through_exchange_is_the_loop_fused():
+    bench = bench_with()
+    runs = []
+    for fused in (True, False):
+        with make_daq(bench, 7) as daq:
+            daq.start(bench.block)
+            tick = tick_for(bench, bench.block + daq.latency_samples, 0.3)
+            runs.append(np.concatenate(list(Loop(daq, tick, fused=fused).run())))
+    assert runs[0].tobytes() == runs[1].tobytes()

@@ -1,0 +1,221 @@
+import errno
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rig.errors import RecordingError
+from rig.recording.arrays import kind_of, read_arrays, write_arrays
+from rig.recording.journal import journal_path
+from rig.recording.reader import Recording
+from rig.recording.store import continue_recording, finalise
+from tests.rig.recording.samples import journal, rows
+
+
+@pytest.fixture
+def output(tmp_path):
+    path = tmp_path / "OUT.h5"
+    journal(journal_path(path), 3000)
+    finalise(journal_path(path), path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "not a file of vibrolock, but an empty file"),
+        (b"time;force\n0;1\n", "but a text file"),
+        (b"MATLAB 5.0 MAT-file, Platform: PCWIN64", "but a MATLAB 5 file"),
+        (b"VLJB\x01\x00", "but a journal; give the name of its recording"),
+        (bytes(range(256)), "but no HDF5 file"),
+    ],
+)
+def test_what_is_no_hdf5_file_is_called_what_it_is(tmp_path, content, message):
+    path = tmp_path / "OUT.h5"
+    path.write_bytes(content)
+    for use in (Recording, kind_of, read_arrays, continue_recording):
+        with pytest.raises(RecordingError, match=message):
+            use(path)
+    assert path.read_bytes() == content
+
+
+def test_a_missing_file_is_named(tmp_path):
+    for use in (Recording, kind_of, read_arrays):
+        with pytest.raises(RecordingError, match=r"OUT\.h5: cannot be read \(No such file or directory\)"):
+            use(tmp_path / "OUT.h5")
+    with pytest.raises(RecordingError, match="neither the file nor its journal"):
+        continue_recording(tmp_path / "OUT.h5")
+    with pytest.raises(RecordingError, match="cannot be read"):
+        finalise(tmp_path / "OUT.h5.journal", tmp_path / "OUT.h5")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_is_no_recording(tmp_path):
+    with pytest.raises(RecordingError, match="cannot be read"):
+        Recording(tmp_path)
+
+
+def test_a_file_without_permission_is_named(output, monkeypatch):
+    def refused(*_args, **_kwargs):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, "open", refused)
+    with pytest.raises(RecordingError, match=r"OUT\.h5: cannot be read \(Permission denied\)"):
+        Recording(output)
+
+
+def test_an_hdf5_file_of_another_program_is_refused(tmp_path):
+    with h5py.File(tmp_path / "OUT.h5", "w") as file:
+        file["x"] = 1
+    with pytest.raises(RecordingError, match="an HDF5 file of another program"):
+        Recording(tmp_path / "OUT.h5")
+
+
+@pytest.mark.parametrize(
+    ("schema", "message"),
+    [(2, "written by schema 2, this version reads up to 1; update"), ("x", "damaged: schema 'x'")],
+)
+def test_a_later_or_impossible_schema_is_refused(output, schema, message):
+    with h5py.File(output, "r+") as file:
+        file.attrs["schema"] = schema
+    for use in (Recording, kind_of):
+        with pytest.raises(RecordingError, match=message):
+            use(output)
+
+
+@pytest.mark.parametrize("fraction", [0.05, 0.5, 0.99])
+def test_a_truncated_file_is_called_truncated(output, fraction):
+    data = output.read_bytes()
+    output.write_bytes(data[: int(len(data) * fraction)])
+    with pytest.raises(RecordingError, match="truncated"):
+        Recording(output)
+
+
+@pytest.mark.parametrize(
+    "lost", ["configuration", "parts/0/columns", "parts/0/rows/inputs", "parts/0/points/json", "channels"]
+)
+def test_a_file_that_lacks_something_is_called_damaged(output, lost):
+    with h5py.File(output, "r+") as file:
+        del file[lost]
+    with pytest.raises(RecordingError, match=r"OUT\.h5: damaged"):
+        Recording(output)
+
+
+def test_a_flipped_bit_in_the_rows_is_noticed_by_the_checksum(output):
+    with h5py.File(output) as file:
+        chunk = file["parts/0/rows/inputs"].id.get_chunk_info(0)
+    data = bytearray(output.read_bytes())
+    data[chunk.byte_offset + chunk.size // 2] ^= 4
+    output.write_bytes(data)
+    with Recording(output) as recording:
+        assert np.array_equal(recording.parts[0].rows("theta_rad"), rows(0, 3000)["theta_rad"])
+        with pytest.raises(RecordingError, match="damaged: cannot be read"):
+            recording.parts[0].rows("inputs")
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(where=st.floats(0, 1, exclude_max=True), value=st.integers(1, 255))
+def test_a_changed_byte_anywhere_in_the_file_gives_one_clear_line_or_a_readable_recording(output, where, value):
+    broken = bytearray(output.read_bytes())
+    broken[int(where * len(broken))] ^= value
+    path, message, n_read = output.with_name("broken.h5"), "", 0
+    path.write_bytes(broken)
+    try:
+        with Recording(path) as recording:
+            n_read = sum(len(recording.parts[0].rows(name)) for name in recording.parts[0].row_dtype.names)
+    except RecordingError as error:
+        message = str(error)
+    assert n_read == 5 * 3000 or message.startswith(f"{path}: ")
+    assert "\n" not in message
+
+
+def test_an_unknown_field_is_answered_with_those_there_are(output):
+    with (
+        Recording(output) as recording,
+        pytest.raises(RecordingError, match=r"no field 'force'.*theta_rad, frequency_hz"),
+    ):
+        recording.parts[0].rows("force")
+
+
+def test_a_closed_recording_says_so(output):
+    recording = Recording(output)
+    recording.close()
+    recording.close()
+    with pytest.raises(RecordingError, match="is closed"):
+        recording.parts[0].rows("inputs")
+
+
+def test_reading_leaves_nothing_behind(tmp_path):
+    path = tmp_path / "OUT.h5"
+    before = journal(journal_path(path), 10).read_bytes()
+    with Recording(path) as recording:
+        assert recording.complete
+    assert kind_of(path) == "backbone"
+    assert [p.name for p in tmp_path.iterdir()] == ["OUT.h5.journal"]
+    assert journal_path(path).read_bytes() == before
+
+
+def test_arrays_and_attributes_come_back_as_they_were(tmp_path):
+    arrays = {
+        "force_n": np.linspace(0.026, 0.56, 12),
+        "modes/shape": np.arange(6).reshape(2, 3) * (1 + 2j),
+        "modes/names": np.array(["clamp", "µ-tip", ""]),
+        "valid": np.array([True, False]),
+        "scalar": np.float32(3.5),
+        "empty": np.zeros((0, 3)),
+        "nothing_named": np.array([], dtype=str),
+        "large": np.random.default_rng(0).normal(size=(100, 200)),
+    }
+    attributes = {"specimen": "magnet-beam", "rule": {"periods": 20}, "nan": None}
+    path = tmp_path / "MODEL.h5"
+    write_arrays(path, "nonlinear-mode", arrays, attributes)
+    kind, found, told = read_arrays(path)
+    assert (kind, told) == ("nonlinear-mode", attributes)
+    assert kind_of(path) == "nonlinear-mode"
+    assert set(found) == set(arrays)
+    for name, values in arrays.items():
+        assert found[name].dtype.kind == values.dtype.kind, name
+        np.testing.assert_array_equal(found[name], values)
+        assert found[name].shape == values.shape
+    with h5py.File(path) as file:
+        assert (file.attrs["format"], file.attrs["schema"]) == ("vibrolock", 1)
+        assert file["arrays/force_n"][-1] == 0.56
+
+
+@pytest.mark.parametrize(
+    ("arrays", "attributes", "message"),
+    [
+        ({"a b": [1]}, {}, "array name 'a b'"),
+        ({"../x": [1]}, {}, "array name '../x'"),
+        ({"x": np.array([object()])}, {}, "array 'x' is object"),
+        ({"x": [[1, 2], [3]]}, {}, "unequal length"),
+        ({"x": [1], "x/y": [2]}, {}, "array name 'x' is also the group of 'x/y'"),
+        ({"x": [1]}, {"a": {1, 2}}, "attributes: cannot be written as JSON"),
+    ],
+)
+def test_arrays_that_cannot_be_stored_leave_the_old_file(tmp_path, arrays, attributes, message):
+    path = tmp_path / "MODEL.h5"
+    write_arrays(path, "nonlinear-mode", {"x": [1.0]}, {})
+    before = path.read_bytes()
+    with pytest.raises(RecordingError, match=message):
+        write_arrays(path, "nonlinear-mode", arrays, attributes)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["MODEL.h5"]
+
+
+def test_a_model_is_no_recording_and_a_recording_no_model(tmp_path, output):
+    model = tmp_path / "MODEL.h5"
+    write_arrays(model, "nonlinear-mode", {}, {})
+    with pytest.raises(RecordingError, match="is no recording but a file of kind 'nonlinear-mode'"):
+        Recording(model)
+    with pytest.raises(RecordingError, match="holds no arrays; it is a recording of kind 'backbone'"):
+        read_arrays(output)
+
+
+def test_a_folder_that_does_not_exist_is_told(tmp_path):
+    with pytest.raises(RecordingError, match=r"cannot be written \(No such file or directory\)"):
+        write_arrays(tmp_path / "missing" / "MODEL.h5", "nonlinear-mode", {}, {})
