@@ -1,5 +1,6 @@
 """The command ``rig``. Exit status 0 only on success; errors are one line, with a traceback under ``--debug``."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,7 +10,6 @@ import typer
 __all__ = ["app", "main"]
 
 app = typer.Typer(
-    help="Phase-locked nonlinear vibration tests on virtual and real rigs, and models from the recordings.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -21,8 +21,8 @@ Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
 
 
 @app.callback()
-def _common(debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False) -> None:
-    pass
+def _common(debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may stand anywhere.")] = False) -> None:
+    """Phase-locked nonlinear vibration tests on virtual and real rigs, and models from the recordings."""
 
 
 @app.command("list")
@@ -111,7 +111,9 @@ def _say_how_it_ended(summary: dict[str, Any]) -> None:
     factor = loop["realtime_factor"]
     pace = f", {factor:.0f} times real time in the loop" if factor else ""
     ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
-    print(f"{ended}: {accepted} of {len(summary['points'])} points accepted, {loop['samples']} samples{pace}")
+    print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
+    if not summary["complete"]:
+        print("what was accepted is kept; `rig resume` measures the rest")
     for name, count in summary["counters"].items():
         if count:
             print(f"warning: {name.replace('_', ' ')}: {count} samples")
@@ -276,15 +278,32 @@ def doctor(json: Json = False) -> None:
 
 
 def main() -> None:
-    """Entry point of the command."""
-    debug = "--debug" in sys.argv
+    """Entry point of the command: 0 on success, 1 on an error, 2 on wrong use, 130 when interrupted."""
+    arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
+    debug = len(arguments) < len(sys.argv) - 1
     try:
-        app(prog_name="rig")
+        status = app(arguments, prog_name="rig", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        status = _complain("interrupted", 130)
+    except BrokenPipeError:  # whoever read our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 1
     except Exception as error:
         if debug:
             raise
-        print(f"rig: {_one_line(error)}", file=sys.stderr)
-        sys.exit(1)
+        wrong_use = getattr(error, "format_message", None)  # typer's errors, whichever click they come from
+        if wrong_use is not None and not wrong_use():
+            status = 2  # a bare `rig` has shown its help
+        elif wrong_use is not None:
+            status = _complain(f"{wrong_use()} (see rig --help)", 2)
+        else:
+            status = _complain(_one_line(error), 1)
+    sys.exit(status or 0)
+
+
+def _complain(line: str, status: int) -> int:
+    print(f"rig: {' '.join(line.split())}", file=sys.stderr)
+    return status
 
 
 def _one_line(error: Exception) -> str:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from rig.campaigns.backbone import BackbonePlan
 from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -62,6 +63,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "software_version": recording.software_version,
         "seed": recording.seed,
         "complete": recording.complete,
+        "points_planned": len(BackbonePlan.model_validate(recording.configuration["plan"]).targets()),
         "points": [{key: latest[number].get(key) for key in POINT_KEYS} for number in sorted(latest)],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {

@@ -21,7 +21,7 @@ Quantity = Literal["deflection", "slope", "curvature"]
 _DERIVATIVE: dict[Quantity, int] = {"deflection": 0, "slope": 1, "curvature": 2}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BeamModes:
     """Modes of a beam, lowest first, normalised to unit modal mass."""
 

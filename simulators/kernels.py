@@ -23,16 +23,15 @@ def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.fl
     0 V; both are flagged. A state that is no longer finite is held, and reads NaN on every channel.
     """
     combine(rig.sense, state.inputs, state.outputs)
-    flags = measure(rig, state, out_v)
-    state.counter[0] += 1
+    index = state.counter[0]
+    state.counter[0] = index + 1
+    flags = measure(rig.channels, rig.converter, rig.noise_keys, state.filters, state.outputs, index, out_v)
     if flags & DIVERGED:
         return flags
     converter = rig.converter[0]
-    held_v = 0.0
-    if not math.isnan(voltage):
-        held_v = quantise(voltage, converter.dac_step_v, converter.dac_range_v)
     if not abs(voltage) <= converter.dac_range_v:
         flags |= DAC_CLIPPED
+    held_v = 0.0 if math.isnan(voltage) else quantise(voltage, converter.dac_step_v, converter.dac_range_v)
     return flags | advance(rig, state, held_v)
 
 

@@ -38,7 +38,7 @@ class SiteKind(IntEnum):
 
 MAGNET_ONE_SIDED, MAGNET_SYMMETRIC = (int(kind) for kind in SiteKind)
 
-PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_jenkins", "i8"), ("substeps", "i8")])
+PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("substeps", "i8")])
 """Sizes (one record)."""
 
 SITE = np.dtype(
@@ -102,5 +102,4 @@ class RigState(NamedTuple):
     counter: NDArray[np.int64]
     rows: NDArray[np.float64]
     forces: NDArray[np.float64]
-    friction_trial: NDArray[np.float64]
     outputs: NDArray[np.float64]

@@ -10,7 +10,7 @@ from simulators.plant.assembly import LinearPlant
 __all__ = ["LinearModes", "coupled_modes", "structure_modes"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearModes:
     """Modes of a linear system, lowest frequency first."""
 

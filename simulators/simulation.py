@@ -14,7 +14,7 @@ from simulators.virtual_rig import VirtualRig
 __all__ = ["Simulation", "TimeSeries"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TimeSeries:
     """What a simulation gives, one entry per sample."""
 

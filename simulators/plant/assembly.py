@@ -20,7 +20,7 @@ __all__ = ["LinearPlant", "assemble"]
 Matrix = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearPlant:
     """The coupled plant ``x' = A x + b_u u + B_f f`` with site coordinates ``C_s x``; sites are magnets, then joints."""
 

@@ -45,7 +45,7 @@ def rig_arrays(
         elements[0, s, :n] = joint.stiffness
         elements[1, s, :n] = np.multiply(joint.stiffness, joint.slip)
     n_pair = (len(sensors) + 1) // 2
-    sizes = (plant.dynamics.shape[0], len(magnets), len(joints), converter.substeps)
+    sizes = (plant.dynamics.shape[0], len(magnets), converter.substeps)
     return RigArrays(
         plant=np.array([sizes], PLANT),
         step=pad(predictor),
@@ -58,7 +58,7 @@ def rig_arrays(
         converter=np.array(
             [(converter.adc_step_v, converter.adc_range_v, converter.dac_step_v, converter.dac_range_v)], CONVERTER
         ),
-        noise_keys=np.random.SeedSequence(seed).generate_state(n_pair, np.uint64),
+        noise_keys=np.random.SeedSequence(seed).generate_state(n_pair, np.uint64).astype(np.uint64),
     )
 
 
@@ -73,7 +73,6 @@ def at_rest(rig: RigArrays) -> RigState:
         counter=np.zeros(1, np.int64),
         rows=np.zeros(n_row),
         forces=np.zeros(rig.correct.shape[0]),
-        friction_trial=np.zeros(rig.elements.shape[1:]),
         outputs=np.zeros(rig.sense.shape[1]),
     )
 

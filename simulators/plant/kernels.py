@@ -76,67 +76,55 @@ def clip(value: float, limit: float) -> float:
 
 
 @kernel
-def jenkins_forces(
-    elements: NDArray[np.float64],
-    stuck: NDArray[np.float64],
-    before: NDArray[np.float64],
-    after: NDArray[np.float64],
-    deflection: NDArray[np.float64],
-    coordinates: NDArray[np.float64],
-    first: int,
-    forces: NDArray[np.float64],
-    n_local: int,
-) -> None:
-    """Forces of the Jenkins sites, whose coordinates begin at ``first``, minus their stuck part: ``k delta - sum_j f_j``.
-
-    Each element slips at its limit: ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)``, from the committed forces
-    ``before`` and ``deflection`` into ``after``. Four elements at a time: their sums do not wait for each other.
-    """
-    _, n_site, n_element = elements.shape
-    for s in range(n_site):
-        z = coordinates[first + s]
-        dz = z - deflection[s]
-        sum_0, sum_1, sum_2, sum_3 = 0.0, 0.0, 0.0, 0.0
-        for e in range(0, n_element, 4):
-            f_0 = clip(before[s, e] + elements[0, s, e] * dz, elements[1, s, e])
-            f_1 = clip(before[s, e + 1] + elements[0, s, e + 1] * dz, elements[1, s, e + 1])
-            f_2 = clip(before[s, e + 2] + elements[0, s, e + 2] * dz, elements[1, s, e + 2])
-            f_3 = clip(before[s, e + 3] + elements[0, s, e + 3] * dz, elements[1, s, e + 3])
-            after[s, e], after[s, e + 1], after[s, e + 2], after[s, e + 3] = f_0, f_1, f_2, f_3
-            sum_0 += f_0
-            sum_1 += f_1
-            sum_2 += f_2
-            sum_3 += f_3
-        forces[n_local + s] = stuck[s] * z - ((sum_0 + sum_1) + (sum_2 + sum_3))
-
-
-@kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
     """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE or 0.
 
-    Bundles of arrays are taken apart here: passed on to a callee, each of their arrays would cost a reference count.
+    Jenkins sites, minus their stuck linear part: ``k delta - sum_j f_j``; each element slips at its limit, ``f_j <-
+    clip(f_j + k_j d(delta), +-k_j delta_j)`` from its committed force. They stand here and not in a function of their own:
+    its arguments would cost more than its work. Four elements at a time, whose sums do not wait for each other.
     """
     step, correct, sites, elements, stuck = rig.step, rig.correct, rig.sites, rig.elements, rig.stuck
-    inputs, rows, forces = state.inputs, state.rows, state.forces
-    friction, trial, deflection = state.friction, state.friction_trial, state.deflection
-    n, n_local, n_jenkins = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_jenkins
-    joints = n + n_local
+    inputs, rows, forces, friction, deflection = (
+        state.inputs,
+        state.rows,
+        state.forces,
+        state.friction,
+        state.deflection,
+    )
+    n, n_local = rig.plant[0].n_state, rig.plant[0].n_local
+    _, n_jenkins, n_element = elements.shape
+    n_site = n_local + n_jenkins
     beyond = False
     inputs[n] = voltage
     for _ in range(rig.plant[0].substeps):
         combine(step, inputs, rows)
-        local_forces(sites, rows, n, forces)
-        jenkins_forces(elements, stuck, friction, trial, deflection, rows, joints, forces, n_local)
-        for s in range(n_local + n_jenkins):
-            change = forces[s] - inputs[n + 1 + s]
-            for i in range(rows.size):
-                rows[i] += change * correct[s, i]
-        beyond |= local_forces(sites, rows, n, forces)
-        jenkins_forces(elements, stuck, friction, friction, deflection, rows, joints, forces, n_local)
-        for s in range(n_local + n_jenkins):
+        for corrected in range(2):
+            beyond |= local_forces(sites, rows, n, forces)
+            for s in range(n_jenkins):
+                z = rows[n + n_local + s]
+                dz = z - deflection[s]
+                sum_0, sum_1, sum_2, sum_3 = 0.0, 0.0, 0.0, 0.0
+                for e in range(0, n_element, 4):
+                    f_0 = clip(friction[s, e] + elements[0, s, e] * dz, elements[1, s, e])
+                    f_1 = clip(friction[s, e + 1] + elements[0, s, e + 1] * dz, elements[1, s, e + 1])
+                    f_2 = clip(friction[s, e + 2] + elements[0, s, e + 2] * dz, elements[1, s, e + 2])
+                    f_3 = clip(friction[s, e + 3] + elements[0, s, e + 3] * dz, elements[1, s, e + 3])
+                    if corrected:
+                        friction[s, e], friction[s, e + 1], friction[s, e + 2], friction[s, e + 3] = f_0, f_1, f_2, f_3
+                    sum_0 += f_0
+                    sum_1 += f_1
+                    sum_2 += f_2
+                    sum_3 += f_3
+                forces[n_local + s] = stuck[s] * z - ((sum_0 + sum_1) + (sum_2 + sum_3))
+            if not corrected:
+                for s in range(n_site):
+                    change = forces[s] - inputs[n + 1 + s]
+                    for i in range(rows.size):
+                        rows[i] += change * correct[s, i]
+        for s in range(n_site):
             inputs[n + 1 + s] = forces[s]
         for s in range(n_jenkins):
-            deflection[s] = rows[joints + s]
+            deflection[s] = rows[n + n_local + s]
         for i in range(n):
             inputs[i] = rows[i]
     return MAGNET_RANGE if beyond else 0

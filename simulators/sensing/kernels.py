@@ -5,11 +5,12 @@ the same samples however it is cut into blocks, and adding a channel leaves the 
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.layout import DIVERGED, SENSOR_CLIPPED, RigArrays, RigState
+from simulators.layout import DIVERGED, SENSOR_CLIPPED
 from vibrolock.compiled import Record, kernel
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -46,39 +47,47 @@ def quantise(volts: float, step_v: float, range_v: float) -> float:
 
 
 @kernel
-def read_channel(rig: RigArrays, channel: Record, value: float, noise: float) -> tuple[float, bool]:
-    """Volts of one channel for a high-passed value (SI) and unit noise, and whether sensor or converter are at their limit."""
-    converter = rig.converter[0]
-    sensed = (value + channel.noise_rms * noise) * channel.sensitivity
+def read_channel(channel: Record, converter: Record, value: float) -> tuple[float, bool]:
+    """Volts of one channel for a sensed value (SI), and whether sensor or converter are at their limit."""
+    sensed = value * channel.sensitivity
     volts = min(max(sensed, -channel.range_v), channel.range_v)
     clipped = volts != sensed or abs(volts) > converter.adc_range_v
     return quantise(volts, converter.adc_step_v, converter.adc_range_v), clipped
 
 
 @kernel
-def measure(rig: RigArrays, state: RigState, out_v: NDArray[np.float64]) -> int:
-    """Volts of every channel for the SI values in ``state.outputs``; returns SENSOR_CLIPPED, DIVERGED or 0.
+def measure(
+    channels: NDArray[Any],
+    converters: NDArray[Any],
+    noise_keys: NDArray[np.uint64],
+    filters: NDArray[np.float64],
+    values: NDArray[np.float64],
+    sample: int,
+    out_v: NDArray[np.float64],
+) -> int:
+    """Volts of every channel for the SI ``values`` at a sample index; returns SENSOR_CLIPPED, DIVERGED or 0.
 
-    Each sensor is AC-coupled: a first-order high-pass, exact for values that change linearly between samples.
+    Each sensor is AC-coupled: a first-order high-pass, exact for values that change linearly between samples. Two
+    neighbouring channels share a pair of random numbers.
     """
     flags = 0
-    n_channel = rig.channels.size
-    sample = state.counter[0]
     second = 0.0
-    for c in range(n_channel):
-        value = state.outputs[c]
+    for c in range(channels.size):
+        channel = channels[c]
+        value = values[c]
         if not math.isfinite(value):
             flags |= DIVERGED
-        channel = rig.channels[c]
-        low = channel.hold * state.filters[0, c] + channel.old * state.filters[1, c] + channel.new * value
-        state.filters[0, c] = low
-        state.filters[1, c] = value
+        low = channel.hold * filters[0, c] + channel.old * filters[1, c] + channel.new * value
+        filters[0, c] = low
+        filters[1, c] = value
         noise = second
-        if c % 2 == 0 and (channel.noise_rms > 0.0 or (c + 1 < n_channel and rig.channels[c + 1].noise_rms > 0.0)):
-            noise, second = normal_pair(rig.noise_keys[c // 2], sample)
-        out_v[c], clipped = read_channel(rig, channel, value - low, noise)
+        if c % 2 == 0:
+            noise, second = normal_pair(noise_keys[c // 2], sample)
+        out_v[c], clipped = read_channel(channel, converters[0], value - low + channel.noise_rms * noise)
         if clipped:
             flags |= SENSOR_CLIPPED
     if flags & DIVERGED:
-        out_v[:n_channel] = math.nan
+        for c in range(channels.size):
+            out_v[c] = math.nan
+        return DIVERGED
     return flags

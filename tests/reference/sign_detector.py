@@ -7,7 +7,10 @@ from scipy.optimize import brentq
 
 from tests.reference.balance import Balance, Conditions
 from tests.reference.coupled_rig import CoupledRig, Vector
-from tests.reference.harmonic_balance import HARMONICS, RESONANCE_DEG, SAMPLES, Periodic, periodic, sequence, solve
+from tests.reference.harmonic_balance import RESONANCE_DEG, SAMPLES, Periodic, periodic, sequence, solve
+
+# the fourth mode answers the 29th harmonic strongly enough to move the zero crossings by up to two degrees
+HARMONICS = 35
 
 
 def mean_sign_product(one: Vector, other: Vector) -> float:

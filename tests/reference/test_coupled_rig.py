@@ -42,11 +42,10 @@ def test_the_beside_sensor_reads_more_than_the_drive_point_by_the_documented_rat
         assert rig.phi_sensors["acc_d"][0] / rig.phi_drive[0] == pytest.approx(ratio, abs=5e-4)
 
 
-@BOTH
-def test_the_coupled_plant_has_another_mode_than_the_structure(rig: CoupledRig, key: str) -> None:
-    plant = TimeDomain(rig.without_friction(), 0.0, 1.0)
-    linear = plant.linear + np.outer(plant.into[:, 0], plant.z_row) * float(rig.magnet_slope(np.zeros(1))[0])
+def test_the_coupled_plant_has_another_mode_than_the_structure() -> None:
+    plant = TimeDomain(ONE_SIDED.without_friction(), 0.0, 1.0)
+    linear = plant.linear + np.outer(plant.into[:, 0], plant.z_row) * float(ONE_SIDED.magnet_slope(np.zeros(1))[0])
     poles = np.linalg.eigvals(linear)
     first = min(poles[poles.imag > 1.0], key=abs)
-    assert abs(first) / (2 * np.pi) == pytest.approx(25.1, abs=0.15)
-    assert -first.real / abs(first) == pytest.approx(0.07, abs=0.01)
+    assert abs(first) / (2 * np.pi) == pytest.approx(25.1, abs=0.05)
+    assert -first.real / abs(first) == pytest.approx(0.07, abs=0.005)

@@ -12,22 +12,22 @@ BASIS = np.column_stack([np.ones_like(THETA), np.cos(THETA), -np.sin(THETA)])
 
 def parallel(delta: Vector, basis: Vector = BASIS) -> Vector:
     """Sum of the Jenkins forces themselves, without the stuck part that the site adds."""
-    return K.sum() * delta - jenkins_over_a_period(delta, basis, K, SLIP)[0]
+    return np.asarray(K.sum() * delta - jenkins_over_a_period(delta, basis, K, SLIP)[0])
 
 
 def virgin(delta: Vector) -> Vector:
     """First loading from rest."""
-    return np.asarray((K * np.minimum(delta[:, None], SLIP)).sum(axis=1))
+    return np.asarray(np.sum(K * np.minimum(delta[:, None], SLIP), axis=1))
 
 
 def test_a_stuck_clamp_adds_nothing() -> None:
-    assert np.max(np.abs(jenkins_over_a_period(0.99 * SLIP[0] * np.cos(THETA), BASIS, K, SLIP)[0])) < 1e-17
+    assert np.max(np.abs(jenkins_over_a_period(0.99 * SLIP[0] * np.cos(THETA), BASIS, K, SLIP)[0])) < 1e-15
 
 
 @pytest.mark.parametrize("amplitude", [5e-4, 1e-3, 1.7e-3, 4e-3])
 def test_the_closed_loop_is_masing(amplitude: float) -> None:
     force, top = parallel(amplitude * np.cos(THETA)), virgin(np.array([amplitude]))
-    down = THETA <= np.pi
+    down = slice(0, 513)
     swing = amplitude * (1 - np.cos(THETA[down]))
     np.testing.assert_allclose(force[down], top - 2 * virgin(swing / 2), atol=1e-12)
     np.testing.assert_allclose(force[512:], -force[:512], atol=1e-12)

@@ -1,0 +1,257 @@
+"""Runs that go wrong half-way: killed, interrupted, out of disk, out of reach, unlocked; and what is kept of them."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rig
+from controller import preset
+from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.runner import carry_out
+from rig.drivers.virtual.driver import VirtualDAQ
+from rig.errors import ConfigurationError, DaqDisconnected, RecordingError
+from rig.loop import Loop
+from rig.recording.journal import journal_path
+from rig.recording.reader import Recording
+from rig.sequencer.segments import SettleRule
+from tests.rig.rigs import bench_with
+
+LEVELS = (0.4, 0.8, 1.2, 1.6)
+
+
+def plan_with(**changes):
+    table = {
+        "bench": "magnet-beam",
+        "controller": preset("magnet-beam").model_dump(),
+        "levels_v": LEVELS,
+        "record_periods": 20,
+    }
+    return BackbonePlan.model_validate(table | changes)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    with rig.run(plan_with(), seed=1) as run:
+        yield {point["number"]: point for point in run.recording.points}
+
+
+CHILD = """
+import sys
+import rig
+from tests.rig.test_runs import plan_with
+run = rig.run(plan_with(), output=sys.argv[1], seed=1, realtime=True)
+sys.exit(0 if run.complete else 1)
+"""
+
+
+def _child(output):
+    return subprocess.Popen([sys.executable, "-c", CHILD, str(output)], cwd=Path(__file__).parents[2])
+
+
+def _wait_for_points(output, points):
+    """Wait until a recording that another process is writing holds some points."""
+    for _ in range(600):
+        time.sleep(0.05)
+        if journal_path(output).exists():
+            try:
+                with Recording(output) as recording:
+                    if len(recording.points) >= points:
+                        return
+            except RecordingError:
+                continue
+    raise AssertionError("the run made no points")
+
+
+def _same_points(points, whole):
+    assert sorted(points) == sorted(whole)
+    for number, point in points.items():
+        assert point["accepted"]
+        assert point["frequency_hz"] == pytest.approx(whole[number]["frequency_hz"], rel=1e-4)
+        assert point["amplitude_m"] == pytest.approx(whole[number]["amplitude_m"], rel=0.01)  # the settle tolerance
+        assert point["damping_ratio"] == pytest.approx(whole[number]["damping_ratio"], rel=0.01)
+
+
+def test_a_killed_run_keeps_its_rows_and_points_and_is_resumed_to_the_same_result(tmp_path, whole):
+    output = tmp_path / "run.h5"
+    child = _child(output)
+    _wait_for_points(output, 1)
+    with Recording(output) as recording:
+        rows_seen, points_seen = recording.n_rows, len(recording.points)
+        kept = recording.parts[0].read(0, rows_seen)
+    child.kill()
+    assert child.wait() == -signal.SIGKILL
+    assert not output.exists()
+    with Recording(output) as recording:
+        assert recording.n_rows >= rows_seen
+        assert len(recording.points) >= points_seen
+        assert recording.parts[0].read(0, rows_seen).tobytes() == kept.tobytes()
+        assert not recording.complete
+    with rig.resume(output) as run:
+        assert run.complete
+        assert len(run.recording.parts) == 2
+        assert run.recording.parts[1].first_sample >= rows_seen
+        assert run.recording.parts[0].read(0, rows_seen).tobytes() == kept.tobytes()
+        _same_points({point["number"]: point for point in run.recording.points}, whole)
+    assert not journal_path(output).exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_ramps_down_closes_its_file_and_says_so(tmp_path, number):
+    output = tmp_path / "run.h5"
+    child = _child(output)
+    _wait_for_points(output, 1)
+    child.send_signal(number)
+    assert child.wait() == 1
+    with Recording(output) as recording:
+        end = recording.parts[0].end
+        assert end["reason"] == "stop_requested"
+        assert not end["tripped"]
+        assert recording.points[0]["accepted"]
+        assert [point["reason"] for point in recording.points if not point["accepted"]] == ["interrupted"]
+        output_v = recording.parts[0].rows("output_v")
+        guard = recording.parts[0].rows("guard")
+    assert abs(output_v[-1]) < 1e-3
+    assert np.count_nonzero(guard == 2) == pytest.approx(2500, abs=2)  # half a second of ramp
+    assert not journal_path(output).exists()
+
+
+def test_a_full_disk_ends_the_run_safely_and_keeps_what_was_recorded(tmp_path):
+    output = tmp_path / "run.h5"
+    script = (
+        "import resource, signal, sys\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "import rig\n"
+        "from tests.rig.test_runs import plan_with\n"
+        "run = rig.run('magnet-beam/backbone', seed=1)\n"  # kernels compiled before the disk is full
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, 2_500_000))\n"
+        "try:\n"
+        "    rig.run(plan_with(), output=sys.argv[1], seed=1)\n"
+        "except rig.errors.RecordingError as error:\n"
+        "    print(error)\n"
+        "    sys.exit(7)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", "import rig.errors\n" + script, str(output)],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 7, done.stderr
+    assert str(output) in done.stdout
+    assert len(done.stdout.strip().splitlines()) == 1
+    with Recording(output) as recording:
+        assert recording.n_rows > 20_000
+        assert not recording.complete
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 2_500_000
+    with rig.resume(output) as run:
+        assert run.complete
+
+
+def test_a_level_beyond_the_voltage_limit_is_refused_before_anything_moves(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"levels_v\[3\] = 9 V: the bench magnet-beam allows up to 5 V"):
+        rig.run(plan_with(levels_v=(0.1, 0.2, 0.3, 9.0)), output=tmp_path / "run.h5")
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_force_that_the_voltage_limit_does_not_reach_is_marked_and_the_rest_goes_on(tmp_path):
+    law = preset("magnet-beam").model_dump() | {"k3": 0.0, "k4": 10.0}
+    plan = plan_with(levels_v=None, levels_n=(0.06, 0.56), controller=law)
+    bench = bench_with({"limits": {"voltage_v": 1.0}})
+    with carry_out(plan, bench, tmp_path / "run.h5", seed=1) as recording:
+        first, second = recording.points
+    assert first["accepted"]
+    assert first["force_n"] == pytest.approx(0.06, rel=0.01)
+    assert not second["settled"]
+    assert "out of reach" in second["reason"]
+    assert "frequency_hz" not in second
+
+
+def test_a_start_outside_the_pull_in_range_gives_no_point(tmp_path):
+    law = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 29.0, "frequency_window_hz": (28.0, 30.0)}
+    settle = SettleRule(longest_periods=80).model_dump()
+    with carry_out(plan_with(controller=law, settle=settle), bench_with(), tmp_path / "run.h5") as recording:
+        assert not recording.complete
+        assert all(not point["settled"] and "frequency_hz" not in point for point in recording.points)
+
+
+def test_a_plan_that_says_stop_ends_at_the_first_failed_point(tmp_path):
+    law = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 29.0, "frequency_window_hz": (28.0, 30.0)}
+    settle = SettleRule(longest_periods=80).model_dump()
+    plan = plan_with(controller=law, settle=settle, on_failure="stop")
+    with carry_out(plan, bench_with(), tmp_path / "run.h5") as recording:
+        assert recording.parts[0].end["reason"] == "plan_stopped"
+        assert len(recording.points) == 1
+
+
+def test_a_trip_ends_the_run_and_the_file_names_channel_value_and_sample(tmp_path):
+    bench = bench_with({"limits": {"displacement_m": 1.0e-3}})
+    with carry_out(plan_with(), bench, tmp_path / "run.h5") as recording:
+        end = recording.parts[0].end
+        accepted = [point for point in recording.points if point["accepted"]]
+    assert end["tripped"]
+    assert "displacement amplitude above its limit on channel" in end["text"]
+    assert "sample" in end["text"]
+    assert 0 < len(accepted) < len(LEVELS)
+
+
+def test_a_device_that_disappears_ends_the_run_and_keeps_its_rows(tmp_path, monkeypatch):
+    count = 0
+
+    def vanish(self, voltages, inputs):
+        nonlocal count
+        count += 1
+        if count > 2000:
+            raise DaqDisconnected("virtual: unplugged; plug it in and resume")
+        inputs[:] = 0.0
+
+    monkeypatch.setattr("rig.campaigns.runner.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr(VirtualDAQ, "_exchange", vanish)
+    with carry_out(plan_with(), bench_with(), tmp_path / "run.h5") as recording:
+        end = recording.parts[0].end
+        assert end["reason"] == "driver_failed"
+        assert "unplugged" in end["text"]
+        assert recording.n_rows == 2000
+
+
+def test_up_and_down_with_repeats_measures_every_level_in_its_direction(tmp_path):
+    plan = plan_with(direction="up-down", repeats=2, levels_v=(0.4, 0.8))
+    with rig.run(plan) as run:
+        assert run.complete
+        backbone = run.backbone()
+    assert backbone.directions == ("up", "up", "down") * 2
+    assert backbone.repeats == (1, 1, 1, 2, 2, 2)
+    assert backbone.frequency_hz[0] == pytest.approx(backbone.frequency_hz[2], rel=2e-4)
+
+
+def test_an_existing_file_is_not_overwritten_unasked(tmp_path):
+    output = tmp_path / "run.h5"
+    output.write_text("precious")
+    with pytest.raises(RecordingError, match="exists already"):
+        rig.run(plan_with(), output=output)
+    assert output.read_text() == "precious"
+
+
+def test_a_complete_recording_is_resumed_to_itself(tmp_path):
+    output = tmp_path / "run.h5"
+    rig.run(plan_with(levels_v=(0.4,)), output=output).close()
+    before = output.read_bytes()
+    with rig.resume(output) as run:
+        assert run.complete
+    assert output.read_bytes() == before
+
+
+def test_the_same_seed_gives_the_same_recording_bit_for_bit(tmp_path):
+    rows = []
+    for name in ("a.h5", "b.h5"):
+        with rig.run(plan_with(levels_v=(0.4,)), output=tmp_path / name, seed=9) as run:
+            rows.append(run.recording.parts[0].read(0, run.recording.n_rows).tobytes())
+    assert rows[0] == rows[1]

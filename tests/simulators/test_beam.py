@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from simulators.beam import BeamModes, Boundary, beam_modes
+
+LENGTH_M, STIFFNESS, MASS = 0.55, 184.0, 1.3
+CLAMPED_FREE = (1.8751040687, 4.6940911330, 7.8547574382, 10.9955407349)
+FREE_FREE = (4.7300407449, 7.8532046241, 10.9956078380)
+
+
+def beam(
+    n_element: int = 40, boundary: Boundary = "clamped-free", lumped: tuple[tuple[float, float], ...] = (), n_mode: int = 4
+) -> BeamModes:
+    return beam_modes(
+        length_m=LENGTH_M,
+        bending_stiffness_n_m2=STIFFNESS,
+        mass_per_length_kg_m=MASS,
+        n_element=n_element,
+        n_mode=n_mode,
+        boundary=boundary,
+        lumped=lumped,
+    )
+
+
+def omega_rad_s(beta_l: tuple[float, ...]) -> np.ndarray:
+    return np.array(beta_l) ** 2 / LENGTH_M**2 * np.sqrt(STIFFNESS / MASS)
+
+
+def tip_curvature_error(n_element: int) -> float:
+    # Closed form: phi'' at the clamp is as large as beta^2 times phi at the tip.
+    modes = beam(n_element)
+    root, tip = modes.shape(0.0, "curvature")[0], modes.shape(LENGTH_M)[0]
+    return abs(abs(root / tip) / (CLAMPED_FREE[0] / LENGTH_M) ** 2 - 1.0)
+
+
+def test_cantilever_has_the_frequencies_of_the_closed_form() -> None:
+    assert beam(80).omega_rad_s == pytest.approx(omega_rad_s(CLAMPED_FREE), rel=1e-6)
+
+
+def test_free_beam_has_two_rigid_body_modes_and_the_frequencies_of_the_closed_form() -> None:
+    modes = beam(80, "free-free", n_mode=5)
+    assert np.all(modes.omega_rad_s[:2] == 0.0)
+    assert modes.omega_rad_s[2:] == pytest.approx(omega_rad_s(FREE_FREE), rel=1e-6)
+
+
+def test_frequencies_converge_with_the_fourth_power_of_the_element_length() -> None:
+    exact = omega_rad_s(CLAMPED_FREE)
+    coarse, fine = (beam(n).omega_rad_s / exact - 1.0 for n in (8, 16))
+    assert np.all(coarse[1:] > 0.0)
+    assert np.log2(coarse[1:] / fine[1:]) == pytest.approx(np.full(3, 4.0), abs=0.15)
+
+
+def test_curvature_at_the_clamp_converges_with_the_second_power() -> None:
+    assert np.log2(tip_curvature_error(20) / tip_curvature_error(40)) == pytest.approx(2.0, abs=0.1)
+
+
+def test_tip_of_a_uniform_cantilever_moves_twice_its_root_mean_square() -> None:
+    # Closed form: a mode normalised to unit mass has the tip deflection 2 / sqrt(m).
+    assert np.abs(beam(80).shape(LENGTH_M)) == pytest.approx(np.full(4, 2.0 / np.sqrt(MASS * LENGTH_M)), rel=1e-5)
+
+
+def test_mass_at_the_tip_lowers_the_frequency_as_in_the_closed_form() -> None:
+    ratio = 0.3
+
+    def characteristic(x: float) -> float:
+        return 1 + np.cos(x) * np.cosh(x) + ratio * x * (np.cos(x) * np.sinh(x) - np.sin(x) * np.cosh(x))
+
+    beta_l = (brentq(characteristic, 1.0, 1.8751), brentq(characteristic, 3.5, 4.6941))
+    modes = beam(80, lumped=((LENGTH_M, ratio * MASS * LENGTH_M),))
+    assert modes.omega_rad_s[:2] == pytest.approx(omega_rad_s(beta_l), rel=1e-6)
+
+
+def test_modes_are_mass_normalised_and_orthogonal_with_lumped_masses_anywhere() -> None:
+    lumped = ((0.2111, 0.05), (0.55, 0.1))
+    modes = beam(40, lumped=lumped)
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+    size = LENGTH_M / 40
+    positions = (np.arange(40)[:, None] + (nodes + 1) / 2) * size
+    shapes = np.array([modes.shape(x) for x in positions.ravel()])
+    mass = MASS * size / 2 * (shapes.T * np.tile(weights, 40)) @ shapes
+    mass += sum(m * np.outer(modes.shape(x), modes.shape(x)) for x, m in lumped)
+    assert mass == pytest.approx(np.eye(4), abs=1e-9)
+
+
+@pytest.mark.parametrize("position_m", [0.003, 0.2, 0.3333, 0.549])
+def test_slope_and_curvature_are_the_derivatives_of_the_deflection(position_m: float) -> None:
+    modes, step = beam(), 1e-5
+    left, here, right = (modes.shape(position_m + k * step) for k in (-1, 0, 1))
+    slopes = modes.shape(position_m + step, "slope") - modes.shape(position_m - step, "slope")
+    assert modes.shape(position_m, "slope") == pytest.approx((right - left) / (2 * step), rel=1e-6, abs=1e-5)
+    assert modes.shape(position_m, "curvature") == pytest.approx(slopes / (2 * step), rel=1e-6, abs=1e-4)
+    assert np.all(np.isfinite(here))
