@@ -21,7 +21,9 @@ Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
 
 
 @app.callback()
-def _common(debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may stand anywhere.")] = False) -> None:
+def _common(
+    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may stand anywhere.")] = False,
+) -> None:
     """Phase-locked nonlinear vibration tests on virtual and real rigs, and models from the recordings."""
 
 

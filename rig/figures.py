@@ -80,7 +80,7 @@ def _properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = 
             amplitude,
             100 * mode.damping_ratio[order],
             196 * mode.damping_ratio_std[order],
-            label="active power of the fundamental",
+            label="active power of the fundamental" if mode.source == "backbone" else "one-mode fit",
             **error,
         )
         if np.isfinite(mode.damping_ratio_total_power).any():
@@ -140,6 +140,7 @@ def _harmonics(axis: "Axes", mode: NonlinearMode) -> None:
         axis.legend(fontsize=8)
         return
     axis.plot(mode.modal_frequency_hz, _engineering(mode.amplitude_m)[0], "o-", ms=4, color=MAIN)
+    axis.locator_params(axis="x", nbins=5)
     axis.set(xlabel="modal frequency, Hz", ylabel=f"displacement amplitude, {_engineering(mode.amplitude_m)[1]}")
 
 
@@ -155,12 +156,13 @@ def _draw_responses(page: "Figure", source: Path) -> None:
         colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.9)
         order = np.argsort(response.frequency_hz)
         label = response.label or f"{response.level:g}"
-        top.semilogy(response.frequency_hz[order], scale * response.amplitude_m[order], ".-", color=colour, label=label)
-        bottom.plot(response.frequency_hz[order], response.phase_lag_deg[order], ".-", color=colour)
+        line = ".--" if response.controlled == "force" else ".-"
+        top.semilogy(response.frequency_hz[order], scale * response.amplitude_m[order], line, color=colour, label=label)
+        bottom.plot(response.frequency_hz[order], response.phase_lag_deg[order], line, color=colour)
     top.set(ylabel=f"displacement amplitude, {unit}")
     bottom.set(xlabel="frequency, Hz", ylabel="phase lag of displacement, deg")
     bottom.axhline(90.0, color=REJECTED, lw=0.8)
-    top.legend(fontsize=7, ncols=2, loc="upper right")
+    page.legend(fontsize=8, loc="outside right upper")
     _title(page, f"{responses[0].specimen or 'specimen'}: stepped-sine responses, {len(responses)} levels")
 
 

@@ -2,7 +2,7 @@
 
 Two-node elements with cubic Hermite shapes for deflection and slope and the consistent mass matrix; lumped masses may sit
 anywhere. Frequencies converge with the fourth power of the element length, deflections with the same, curvatures with
-the second. Shear, rotary inertia and rotation of the lumped masses are not modelled.
+the second (with the fourth at a clamp). Shear, rotary inertia and rotation of the lumped masses are not modelled.
 """
 
 from collections.abc import Sequence

@@ -41,11 +41,18 @@ def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
 
 @kernel
 def judge_period(
-    settling: Record, rule: Record, error: float, response: float, force: float, wanted_force: float, saturated: bool
+    settling: Record,
+    rule: Record,
+    locked: bool,
+    error: float,
+    response: float,
+    force: float,
+    wanted_force: float,
+    saturated: bool,
 ) -> None:
     """Take in one period's means and apply the settle rule.
 
-    Settled is: the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the averaged response
+    Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the averaged response
     amplitude within ``amplitude`` (relative) of what it was that many periods before, for ``settled_periods`` in a row.
     With a force level, the averaged force must be within ``amplitude`` of it too.
     """
@@ -66,7 +73,7 @@ def judge_period(
         drift = miss if abs(miss) > abs(drift) else drift
     settling.drift = drift
     off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
-    settling.good_periods = settling.good_periods + 1 if off <= 1.0 else 0
+    settling.good_periods = settling.good_periods + 1 if locked and off <= 1.0 else 0
     settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
     unreached = saturated and abs(drift) > 2.0 * rule.amplitude
     settling.saturated_periods = settling.saturated_periods + 1 if unreached else 0

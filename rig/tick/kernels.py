@@ -19,7 +19,7 @@ from controller.kernels import (
     track,
     wrap,
 )
-from controller.layout import FORCE, SIGN
+from controller.layout import FORCE, LOCKED, SIGN
 from rig.safety.kernels import NON_FINITE_OUTPUT, permitted_amplitude, shut_down, watch_input, watch_motion
 from rig.safety.layout import ARMED
 from rig.sequencer.kernels import advance, judge_period
@@ -93,8 +93,16 @@ def close_period(t: TickArrays, present: bool) -> None:
         error = loop.sum_error / n
         next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
         wanted = t.progress[0].level if law.amplitude_law == FORCE else 0.0
+        locked = t.lock[0].state == LOCKED
         judge_period(
-            t.settling[0], t.rule[0], error, loop.sum_response / n, loop.sum_force / n, wanted, loop.saturated == 1
+            t.settling[0],
+            t.rule[0],
+            locked,
+            error,
+            loop.sum_response / n,
+            loop.sum_force / n,
+            wanted,
+            loop.saturated == 1,
         )
     loop.sum_error = 0.0
     loop.sum_response = 0.0

@@ -183,6 +183,24 @@ def test_a_start_outside_the_pull_in_range_gives_no_point(tmp_path):
         assert all(not point["settled"] and "frequency_hz" not in point for point in recording.points)
 
 
+@pytest.mark.parametrize("channel", [0, 1])
+def test_a_sensor_that_reads_only_noise_gives_no_point(tmp_path, monkeypatch, channel):
+    exchange, noise = VirtualDAQ._exchange, np.random.default_rng(1)
+
+    def dead(self, voltages, inputs):
+        exchange(self, voltages, inputs)
+        inputs[:, channel] = 1e-4 * noise.normal(size=len(inputs))
+
+    monkeypatch.setattr("rig.campaigns.runner.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr(VirtualDAQ, "_exchange", dead)
+    settle = SettleRule(longest_periods=100).model_dump()
+    bench = bench_with({"block": 10})
+    with carry_out(plan_with(levels_v=(0.4,), settle=settle), bench, tmp_path / "run.h5") as recording:
+        assert not recording.complete
+        assert not any(point["accepted"] for point in recording.points)
+        assert "frequency_hz" not in recording.points[0]
+
+
 def test_a_plan_that_says_stop_ends_at_the_first_failed_point(tmp_path):
     law = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 29.0, "frequency_window_hz": (28.0, 30.0)}
     settle = SettleRule(longest_periods=80).model_dump()

@@ -1,0 +1,263 @@
+"""The command as its users type it: what it prints, its exit status, and one line for every mistake."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import scipy.io
+
+from rig.cli import main
+
+PLAN = """
+kind = "backbone"
+bench = "magnet-beam"
+levels_v = [0.4, 0.8]
+record_periods = 20
+
+[controller]
+low_pass_rad_s = 6.283185307179586
+k1 = 2.0
+k2 = 6.283185307179586
+centre_frequency_hz = 24.0
+frequency_window_hz = [21.933, 26.807]
+"""
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def run(line):
+        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        streams = capsys.readouterr()
+        return stop.value.code, streams.out, streams.err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    import rig
+
+    folder = tmp_path_factory.mktemp("recording")
+    (folder / "plan.toml").write_text(PLAN)
+    rig.run(folder / "plan.toml", output=folder / "run.h5").close()
+    return folder / "run.h5"
+
+
+def test_a_plan_runs_from_a_file_and_prints_a_line_for_each_point(command, tmp_path):
+    (tmp_path / "plan.toml").write_text(PLAN)
+    status, out, err = command("run plan.toml -o run.h5 --seed 3")
+    assert status == 0
+    assert "2 of 2 points accepted" in out
+    assert err.count("point ") == 2
+    assert (tmp_path / "run.h5").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.toml", "run.h5"]
+
+
+def test_show_answers_in_json_with_everything_the_design_promises(command, recording):
+    status, out, _ = command(f"show {recording} --json")
+    assert status == 0
+    summary = json.loads(out)
+    assert summary["kind"] == "backbone"
+    assert summary["specimen"]
+    for key in ("force_n", "frequency_hz", "damping_ratio", "amplitude_m", "phase_error_deg", "settled", "periods"):
+        assert all(key in point for point in summary["points"])
+    for key in ("samples", "sample_rate_hz", "overruns", "periods", "wall_s", "realtime_factor", "end_to_end_factor"):
+        assert summary["loop"][key] is not None
+
+
+def test_show_prints_a_table(command, recording):
+    status, out, _ = command(f"show {recording}")
+    assert status == 0
+    assert "frequency Hz" in out
+    assert out.count(" ok") == 2
+
+
+def test_a_recording_becomes_a_model_and_a_figure(command, recording, tmp_path):
+    status, out, _ = command(f"identify {recording} -o model.h5 --json")
+    assert status == 0
+    points = json.loads(out)["points"]
+    assert len(points) == 2
+    assert {"modal_frequency_hz", "damping_ratio", "modal_amplitude", "mac", "force_n"} <= set(points[0])
+    for source in (recording, tmp_path / "model.h5"):
+        for ending in ("png", "pdf", "svg"):
+            assert command(f"plot {source} -o figure.{ending}")[0] == 0
+            assert (tmp_path / f"figure.{ending}").stat().st_size > 5000
+    status, out, _ = command("show model.h5")
+    assert status == 0
+    assert "modal frequency Hz" in out
+
+
+def test_measured_responses_are_imported_identified_shown_and_plotted(command, tmp_path):
+    frequency = np.linspace(79.0, 81.0, 41)
+    levels = []
+    for amplitude, natural, zeta in ((5.0, 80.3, 0.0015), (10.0, 80.1, 0.002)):
+        w, w0 = 2 * np.pi * frequency, 2 * np.pi * natural
+        force = 0.5 * (w0**2 - w**2 + 2j * zeta * w0 * w) * (amplitude / w**2)
+        levels.append({"f": frequency, "force": abs(force), "amp": np.full(41, amplitude), "phase": -np.angle(force)})
+    scipy.io.savemat(tmp_path / "data.mat", {"levels": np.array(levels, dtype=object)})
+    (tmp_path / "map.toml").write_text(MAPPING)
+    status, out, err = command("import data.mat --format mat --mapping map.toml -o responses.h5")
+    assert status == 0, err
+    assert "2 levels" in out
+    status, out, err = command("identify responses.h5 -o model.h5 --json")
+    assert status == 0, err
+    points = json.loads(out)["points"]
+    assert [p["modal_frequency_hz"] for p in points] == pytest.approx([80.3, 80.1], rel=1e-6)
+    assert [p["damping_ratio"] for p in points] == pytest.approx([0.0015, 0.002], rel=1e-4)
+    assert command("plot responses.h5 -o responses.png")[0] == 0
+    assert command("plot model.h5 -o model.png")[0] == 0
+
+
+MAPPING = """
+specimen = "beam"
+source = "generated"
+
+[units]
+frequency = "Hz"
+force = "N"
+response = "m/s2"
+values = "peak"
+
+[phase]
+unit = "rad"
+of = "displacement"
+sense = "response-minus-force"
+
+[[sets]]
+levels = "levels"
+frequency = "f"
+force = "force"
+response = "amp"
+phase = "phase"
+controlled = "response"
+level_values = [5, 10]
+label = "{value:g} {unit}"
+"""
+
+
+def test_list_names_what_is_shipped(command):
+    status, out, _ = command("list --json")
+    assert status == 0
+    shipped = json.loads(out)
+    assert {"magnet-beam", "magnet-beam-symmetric"} <= {bench["name"] for bench in shipped["benches"]}
+    assert "magnet-beam/backbone" in {plan["name"] for plan in shipped["plans"]}
+    assert "virtual" in shipped["drivers"]
+    assert "magnet-beam/backbone" in command("list")[1]
+
+
+def test_doctor_says_what_the_machine_can_promise(command):
+    status, out, _ = command("doctor --json")
+    assert status == 0
+    assert {"processors", "realtime_scheduling", "wake_up_lateness_us", "free_disk_gb", "drivers"} <= set(
+        json.loads(out)
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "named"),
+    [
+        ("run nosuch -o x.h5", 1, "magnet-beam/backbone"),
+        ("run magnet-beam/backbone", 2, "--output"),
+        ("run magnet-beam/backbone -o nowhere/x.h5", 1, "no such folder"),
+        ("run magnet-beam/backbone -o x.h5 --bench nosuch", 1, "magnet-beam-symmetric"),
+        ("run magnet-beam/backbone -o x.h5 --daq nosuch", 1, "virtual"),
+        ("run magnet-beam/backbone -o x.h5 --seed -1", 2, "--seed"),
+        ("run missing.toml -o x.h5", 1, "no such file"),
+        ("resume x.h5", 1, "x.h5"),
+        ("show x.h5", 1, "x.h5"),
+        ("show .", 1, "."),
+        ("plot x.h5 -o x.gif", 1, ".png"),
+        ("identify x.h5 -o m.h5 --model tanh", 1, "nonlinear-mode"),
+        ("import x.mat --mapping m.toml -o y.h5", 1, "m.toml"),
+        ("frobnicate", 2, "frobnicate"),
+    ],
+)
+def test_a_mistake_is_answered_in_one_line_and_leaves_no_file(command, tmp_path, line, status, named):
+    code, out, err = command(line)
+    assert code == status
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert err.startswith("rig: ")
+    assert named in err
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (("levels_v", "levels_w"), "levels_w: unknown key, did you mean levels_v?"),
+        (("[0.4, 0.8]", "[0.4, -0.8]"), "levels_v[1] = -0.8: allowed is above 0"),
+        (("[0.4, 0.8]", "[]"), "levels_v = []"),
+        (("[0.4, 0.8]", "[0.4, 0.4]"), "given twice"),
+        (("[0.4, 0.8]", "[0.4, nan]"), "levels_v[1]"),
+        (("record_periods = 20", 'record_periods = "twenty"'), "record_periods = 'twenty'"),
+        (("record_periods = 20", "record_periods = 0"), "greater than or equal to 4"),
+        (("k2 = 6.283185307179586", "k2 = -1"), "controller.k2 = -1"),
+        (("k2 = 6.283185307179586", ""), "controller.k2: is missing"),
+        (("[21.933, 26.807]", "[25.0, 26.807]"), "frequency_window_hz"),
+        (("[21.933, 26.807]", "[10.0, 26.807]"), "the bench magnet-beam allows"),
+        (('"magnet-beam"', '"nosuch"'), "there is no such bench"),
+        (('"backbone"', '"backbones"'), "kind = 'backbones'"),
+        (('"backbone"', "backbone"), "is not TOML"),
+    ],
+)
+def test_a_bad_plan_is_refused_with_path_value_and_what_is_allowed(command, tmp_path, change, named):
+    (tmp_path / "plan.toml").write_text(PLAN.replace(*change, 1))
+    code, _, err = command("run plan.toml -o run.h5")
+    assert code == 1
+    assert named in err
+    assert len(err.strip().splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
+
+
+def test_debug_shows_the_traceback(command, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["rig", "show", "missing.h5", "--debug"])
+    from rig.errors import RecordingError
+
+    with pytest.raises(RecordingError):
+        main()
+
+
+def test_a_run_with_a_failed_point_exits_with_one(command, tmp_path):
+    text = PLAN.replace("centre_frequency_hz = 24.0", "centre_frequency_hz = 29.0")
+    text = text.replace("[21.933, 26.807]", "[28.0, 30.0]") + "\n[settle]\nlongest_periods = 80\n"
+    (tmp_path / "plan.toml").write_text(text)
+    status, out, err = command("run plan.toml -o run.h5")
+    assert status == 1
+    assert "0 of 2 points accepted" in out
+    assert err.count("FAILED") == 2
+    assert command("identify run.h5 -o model.h5")[0] == 1
+    assert not (tmp_path / "model.h5").exists()
+    assert command("plot run.h5 -o run.png")[0] == 0
+
+
+def test_a_later_schema_is_named(command, recording, tmp_path):
+    import shutil
+
+    import h5py
+
+    shutil.copy(recording, tmp_path / "later.h5")
+    with h5py.File(tmp_path / "later.h5", "r+") as file:
+        file.attrs["schema"] = 99
+    status, _, err = command("show later.h5")
+    assert status == 1
+    assert "99" in err
+
+
+def test_the_help_needs_none_of_the_heavy_libraries():
+    code = (
+        "import sys; sys.argv = ['rig', '--help']\n"
+        "from rig.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print([m for m in ('numba', 'scipy', 'h5py', 'matplotlib', 'pydantic', 'numpy') if m in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+    assert "identify" in done.stdout

@@ -1,0 +1,90 @@
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from simulators.virtual_rig import VirtualRig
+
+
+def table(**changes: Any) -> dict[str, Any]:
+    """The one-sided specimen written out, with changes."""
+    full = VirtualRig(specimen="magnet-beam").model_dump() | {"specimen": None}
+    for key, value in changes.items():
+        full[key] = full[key] | value if isinstance(value, dict) else value
+    return full
+
+
+JOINT = {"at": "clamp", "quantity": "curvature", "relative_to_mode_1": True}
+MAGNET = {"kind": "one_sided", "at": "magnet", "strength_n_m4": 1e-8, "gap_m": 0.011}
+MODAL = {"kind": "modal", "frequency_hz": [20.0, 30.0], "damping_ratio": [0.01, 0.01]}
+
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"specimen": "magnet-beem"}, "specimen = 'magnet-beem': allowed is one of magnet-beam, magnet-beam-symmetric"),
+    ({"specimen": "magnet-beam", "voltage": 1}, "voltage"),
+    ({"specimen": "magnet-beam", "exciter": {"armature_mass": 0.2}}, "exciter.armature_mass\n"),
+    ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": -0.2}}, "greater than 0"),
+    ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": "0.2"}}, "valid number"),
+    ({"specimen": "magnet-beam", "converter": {"substeps": 0}}, "greater than or equal to 1"),
+    ({"specimen": "magnet-beam", "converter": {"sample_rate_hz": float("nan")}}, "finite number"),
+    ({"specimen": "magnet-beam", "structure": {"length_m": 0.4}}, "points_m.acc_magnet = 0.40065: allowed is 0 to length_m = 0.4"),
+    ({"specimen": "magnet-beam", "structure": {"boundary": "pinned"}}, "'clamped-free' or 'free-free'"),
+    ({"specimen": "magnet-beam", "structure": {"damping_ratio": []}}, "at least 1 item"),
+    (
+        {"specimen": "magnet-beam", "structure": {"lumped_masses": [{"at": "x", "mass_kg": 1.0}]}},
+        r"lumped_masses\[0\].at",
+    ),
+    ({"specimen": "magnet-beam", "stinger": {"at": "dive"}}, "stinger.at = 'dive': allowed is one of clamp, drive"),
+    ({"specimen": "magnet-beam", "stinger": {"at": "clamp"}}, "stinger.at = 'clamp': allowed is a point that moves"),
+    (table(sensors=[]), "at least 1 item"),
+    (
+        table(sensors=[{"name": "a", "kind": "force", "sensitivity_v_per_unit": 1.0, "range_v": 5.0}] * 2),
+        "two are named 'a'",
+    ),
+    (
+        table(sensors=[{"name": "a", "kind": "acceleration", "sensitivity_v_per_unit": 1.0, "range_v": 5.0}]),
+        "at: is missing",
+    ),
+    (table(friction=[JOINT | {"stiffness": [1e6], "slip": [1e-3]}]), "friction: stiffness 1e\\+06 in all"),
+    (table(friction=[JOINT | {"stiffness": [1.0, 2.0], "slip": [1e-3]}]), "slip: has 1 values, allowed is 2"),
+    (
+        table(friction=[JOINT | {"stiffness": [1.0], "slip": [1e-3], "quantity": "deflection"}]),
+        "a coordinate that mode 1 moves",
+    ),
+    (table(magnets=[MAGNET | {"gap_m": 0.0}]), "greater than 0"),
+    (table(magnets=[MAGNET | {"at": "tipp"}]), r"magnets\[0\].at = 'tipp': allowed is one of"),
+    (table() | {"structure": MODAL | {"shapes": {"drive": [1.0]}}}, "shapes.drive: has 1 values, allowed is 2"),
+    (
+        table(magnets=[], sensors=table()["sensors"][:1])
+        | {"structure": MODAL | {"shapes": {"drive": [1.0, 1.0], "clamp": [1.0, 1.0]}}},
+        "quantity = 'curvature'",
+    ),
+]
+
+
+@pytest.mark.parametrize(("config", "message"), BAD)
+def test_bad_rig_is_refused_with_the_field_and_what_is_allowed(config: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        VirtualRig.model_validate(config)
+
+
+def test_written_out_table_is_a_good_one() -> None:
+    assert VirtualRig.model_validate(table()).structure == VirtualRig(specimen="magnet-beam").structure
+
+
+def test_parts_are_frozen() -> None:
+    rig = VirtualRig(specimen="magnet-beam")
+    with pytest.raises(ValidationError, match="frozen"):
+        rig.seed = 3  # type: ignore[misc]
+
+
+def test_every_field_is_described() -> None:
+    def undescribed(schema: dict[str, Any]) -> list[str]:
+        parts = [schema, *schema["$defs"].values()]
+        return [
+            f"{part['title']}.{name}"
+            for part in parts
+            for name, field in part["properties"].items()
+            if "description" not in field
+        ]
+
+    assert undescribed(VirtualRig.model_json_schema()) == []
