@@ -24,9 +24,9 @@ __all__ = ["VirtualRig"]
 class VirtualRig(Part):
     """Everything a virtual rig is; `build` turns it into the arrays that `simulators.kernels.sample` runs on.
 
-    ``VirtualRig(specimen="magnet-beam")`` is a shipped one. Further tables change it key by key:
-    ``VirtualRig.model_validate({"specimen": "magnet-beam", "converter": {"substeps": 4}})``; a list is replaced whole.
-    Without ``specimen`` all parts are given.
+    ``VirtualRig.shipped("magnet-beam")`` is a shipped one, ``{"specimen": "magnet-beam"}`` the same as a table. Further
+    tables change it key by key: ``VirtualRig.shipped("magnet-beam", converter={"substeps": 4})``; a list is replaced
+    whole. Without ``specimen`` all parts are given.
     """
 
     specimen: str | None = None
@@ -51,6 +51,11 @@ class VirtualRig(Part):
     """Multiplies the noise of every sensor; 0 for none, 10 for a bad day."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of the noise."""
+
+    @classmethod
+    def shipped(cls, specimen: str, **changes: Any) -> "VirtualRig":
+        """A shipped specimen, with changes by table or value; `pydantic.ValidationError` where they do not fit."""
+        return cls.model_validate({"specimen": specimen, **changes})
 
     @model_validator(mode="before")
     @classmethod

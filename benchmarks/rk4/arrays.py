@@ -12,13 +12,12 @@ __all__ = ["Rk4Arrays", "Rk4State", "build"]
 
 
 class Rk4Arrays(NamedTuple):
-    """The continuous plant: ``derivative`` [n_input, n_row] maps ``[x, u, f]`` to x'; ``coordinates`` x to the sites."""
+    """The continuous plant: ``derivative`` [n_input, n_row] maps ``[x, u, f]`` to the rates of ``[x, site coordinates]``."""
 
     step_s: NDArray[np.float64]
     substeps: NDArray[np.int64]
     n_state: NDArray[np.int64]
     derivative: NDArray[np.float64]
-    coordinates: NDArray[np.float64]
     sites: NDArray[Any]
     elements: NDArray[np.float64]
     stuck: NDArray[np.float64]
@@ -26,16 +25,16 @@ class Rk4Arrays(NamedTuple):
 
 
 class Rk4State(NamedTuple):
-    """``inputs`` is the vector ``[x, u, f]``; Jenkins state as in `simulators.layout.RigState`; the rest is scratch."""
+    """``inputs``: ``[x, u, f]``; ``start``: ``[x, site coordinates]``; Jenkins state as in the rig; the rest is scratch."""
 
     inputs: NDArray[np.float64]
+    start: NDArray[np.float64]
     deflection: NDArray[np.float64]
     friction: NDArray[np.float64]
-    start: NDArray[np.float64]
     stage: NDArray[np.float64]
     slope: NDArray[np.float64]
     total: NDArray[np.float64]
-    rows: NDArray[np.float64]
+    forces: NDArray[np.float64]
     outputs: NDArray[np.float64]
 
 
@@ -44,28 +43,26 @@ def build(rig: VirtualRig, substeps: int = 8) -> tuple[Rk4Arrays, Rk4State]:
     arrays, state = rig.build()
     plant = rig.plant
     columns = np.column_stack([plant.dynamics, plant.voltage_column, plant.site_columns])
-    n = plant.dynamics.shape[0]
-    derivative, coordinates = pad(columns.T), pad(plant.site_rows.T)
+    derivative = pad(np.vstack([columns, plant.site_rows @ columns]).T)
     reference = Rk4Arrays(
         step_s=np.array([1.0 / (rig.converter.sample_rate_hz * substeps)]),
         substeps=np.array([substeps]),
-        n_state=np.array([n]),
+        n_state=np.array([plant.dynamics.shape[0]]),
         derivative=derivative,
-        coordinates=coordinates,
         sites=arrays.sites,
         elements=arrays.elements,
         stuck=arrays.stuck,
         sense=arrays.sense,
     )
-    n_row = derivative.shape[1]
+    start, stage, slope, total = np.zeros((4, derivative.shape[1]))
     return reference, Rk4State(
-        inputs=np.zeros(derivative.shape[0]),
-        deflection=state.deflection,
-        friction=state.friction,
-        start=np.zeros(n),
-        stage=np.zeros(coordinates.shape[0]),
-        slope=np.zeros(n_row),
-        total=np.zeros(n_row),
-        rows=np.zeros(coordinates.shape[1]),
-        outputs=state.outputs,
+        np.zeros(derivative.shape[0]),
+        start,
+        state.deflection,
+        state.friction,
+        stage,
+        slope,
+        total,
+        state.forces,
+        state.outputs,
     )

@@ -1,4 +1,8 @@
-"""Classic fourth-order Runge-Kutta method on the plant of the virtual rig, friction committed once per sub-step."""
+"""Classic fourth-order Runge-Kutta method on the plant of the virtual rig, friction committed once per sub-step.
+
+Written with the same care for speed as the rig's own integrator, so that a comparison is fair: site coordinates are
+integrated along with the state, whose derivative gives theirs at no cost.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,53 +13,51 @@ from vibrolock.compiled import kernel
 
 
 @kernel
-def site_forces(rig: Rk4Arrays, state: Rk4State, n: int, commit: bool) -> None:
-    """Site forces at ``state.stage`` into the input vector, which holds n states and the voltage before them."""
-    combine(rig.coordinates, state.stage, state.rows)
-    forces = state.inputs[n + 1 :]
-    local_forces(rig.sites, state.rows, 0, forces)
-    _, n_jenkins, n_element = rig.elements.shape
-    for s in range(n_jenkins):
-        z = state.rows[rig.sites.size + s]
-        total = 0.0
-        for e in range(n_element):
-            force = state.friction[s, e] + rig.elements[0, s, e] * (z - state.deflection[s])
-            force = clip(force, rig.elements[1, s, e])
-            if commit:
-                state.friction[s, e] = force
-            total += force
-        if commit:
-            state.deflection[s] = z
-        forces[rig.sites.size + s] = rig.stuck[s] * z - total
-
-
-@kernel
 def sample(rig: Rk4Arrays, state: Rk4State, voltage: float, out: NDArray[np.float64]) -> int:
     """Outputs (SI) into ``out`` [n_channel], then one sample with ``voltage`` (V) held; returns 0."""
     combine(rig.sense, state.inputs, state.outputs)
     for c in range(out.size):
         out[c] = state.outputs[c]
-    inputs, stage, slope, total = state.inputs, state.stage, state.slope, state.total
-    start, n, h = state.start, rig.n_state[0], rig.step_s[0]
+    derivative, sites, elements, stuck = rig.derivative, rig.sites, rig.elements, rig.stuck
+    inputs, start, stage, slope, total = state.inputs, state.start, state.stage, state.slope, state.total
+    forces, friction, deflection = state.forces, state.friction, state.deflection
+    n, h = rig.n_state[0], rig.step_s[0]
+    n_local = sites.size
+    _, n_jenkins, n_element = elements.shape
     inputs[n] = voltage
     for _ in range(rig.substeps[0]):
-        for i in range(n):
-            start[i] = inputs[i]
+        for i in range(start.size):
+            stage[i] = start[i]
             total[i] = 0.0
-        for k in range(4):
-            ahead = 0.0 if k == 0 else (h if k == 3 else 0.5 * h)
+        # Four stages, and a fifth look at the sites to commit what they came to.
+        for k in range(5):
+            local_forces(sites, stage, n, forces)
+            for s in range(n_jenkins):
+                z = stage[n + n_local + s]
+                dz = z - deflection[s]
+                force = stuck[s] * z
+                for e in range(n_element):
+                    held = clip(friction[s, e] + elements[0, s, e] * dz, elements[1, s, e])
+                    if k == 4:
+                        friction[s, e] = held
+                    force -= held
+                forces[n_local + s] = force
+                if k == 4:
+                    deflection[s] = z
+            for s in range(n_local + n_jenkins):
+                inputs[n + 1 + s] = forces[s]
             for i in range(n):
-                inputs[i] = start[i] if k == 0 else start[i] + ahead * slope[i]
-                stage[i] = inputs[i]
-            site_forces(rig, state, n, False)
-            combine(rig.derivative, inputs, slope)
-            weight = h / 6.0 if k in (0, 3) else h / 3.0
-            for i in range(n):
+                inputs[i] = stage[i]
+            if k == 4:
+                break
+            combine(derivative, inputs, slope)
+            weight = h / 6.0 if k == 0 or k == 3 else h / 3.0
+            ahead = h if k == 2 else 0.5 * h
+            for i in range(start.size):
                 total[i] += weight * slope[i]
-        for i in range(n):
-            inputs[i] = start[i] + total[i]
-            stage[i] = inputs[i]
-        site_forces(rig, state, n, True)
+                stage[i] = start[i] + (total[i] if k == 3 else ahead * slope[i])
+        for i in range(start.size):
+            start[i] = stage[i]
     return 0
 
 

@@ -10,7 +10,7 @@ from simulators.virtual_rig import VirtualRig
 
 def ideal(specimen: str = "magnet-beam", **changes: Any) -> VirtualRig:
     """A specimen with nothing between physics and samples: no noise, no quantisation, no high-pass, no limits."""
-    table = VirtualRig(specimen=specimen).model_dump()
+    table = VirtualRig.shipped(specimen).model_dump()
     for sensor in table["sensors"]:
         sensor |= {"noise_rms": 0.0, "high_pass_hz": 0.0, "sensitivity_v_per_unit": 1.0, "range_v": 1e9}
     table["converter"] |= {"adc_bits": 0, "dac_bits": 0, "adc_range_v": 1e9, "dac_range_v": 1e9}

@@ -8,7 +8,7 @@ from simulators.virtual_rig import VirtualRig
 
 def table(**changes: Any) -> dict[str, Any]:
     """The one-sided specimen written out, with changes."""
-    full = VirtualRig(specimen="magnet-beam").model_dump() | {"specimen": None}
+    full = VirtualRig.shipped("magnet-beam").model_dump() | {"specimen": None}
     for key, value in changes.items():
         full[key] = full[key] | value if isinstance(value, dict) else value
     return full
@@ -26,7 +26,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": "0.2"}}, "valid number"),
     ({"specimen": "magnet-beam", "converter": {"substeps": 0}}, "greater than or equal to 1"),
     ({"specimen": "magnet-beam", "converter": {"sample_rate_hz": float("nan")}}, "finite number"),
-    ({"specimen": "magnet-beam", "structure": {"length_m": 0.4}}, "points_m.acc_magnet = 0.40065: allowed is 0 to length_m = 0.4"),
+    (
+        {"specimen": "magnet-beam", "structure": {"length_m": 0.4}},
+        "points_m.acc_magnet = 0.40065: allowed is 0 to length_m = 0.4",
+    ),
     ({"specimen": "magnet-beam", "structure": {"boundary": "pinned"}}, "'clamped-free' or 'free-free'"),
     ({"specimen": "magnet-beam", "structure": {"damping_ratio": []}}, "at least 1 item"),
     (
@@ -68,11 +71,11 @@ def test_bad_rig_is_refused_with_the_field_and_what_is_allowed(config: dict[str,
 
 
 def test_written_out_table_is_a_good_one() -> None:
-    assert VirtualRig.model_validate(table()).structure == VirtualRig(specimen="magnet-beam").structure
+    assert VirtualRig.model_validate(table()).structure == VirtualRig.shipped("magnet-beam").structure
 
 
 def test_parts_are_frozen() -> None:
-    rig = VirtualRig(specimen="magnet-beam")
+    rig = VirtualRig.shipped("magnet-beam")
     with pytest.raises(ValidationError, match="frozen"):
         rig.seed = 3  # type: ignore[misc]
 

@@ -50,7 +50,7 @@ def test_readings_of_a_rig_at_rest_have_the_noise_that_was_asked_for() -> None:
 @settings(max_examples=20, deadline=None)
 @given(cuts=st.lists(st.integers(0, 500), max_size=6), seed=st.integers(0, 2**32))
 def test_samples_do_not_depend_on_the_blocks_they_come_in(cuts: list[int], seed: int) -> None:
-    rig, whole_state = VirtualRig(specimen="magnet-beam").build(seed)
+    rig, whole_state = VirtualRig.shipped("magnet-beam").build(seed)
     voltages = np.sin(0.03 * np.arange(500))
     whole, blocks = np.empty((500, 4)), np.empty((500, 4))
     state = RigState(*(array.copy() for array in whole_state))
@@ -65,7 +65,7 @@ def test_samples_do_not_depend_on_the_blocks_they_come_in(cuts: list[int], seed:
 def test_seeds_differ_and_the_same_seed_repeats() -> None:
     outs = []
     for seed in (1, 2, 1):
-        rig, state = VirtualRig(specimen="magnet-beam").build(seed)
+        rig, state = VirtualRig.shipped("magnet-beam").build(seed)
         outs.append(np.empty((200, 4)))
         run_open_loop(rig, state, np.zeros(200), outs[-1])
     assert np.array_equal(outs[0], outs[2])

@@ -26,7 +26,7 @@ def test_quantised_voltage_is_a_code_within_half_a_step(volts: float) -> None:
 
 
 def test_sixteen_bits_are_what_the_data_sheets_of_the_sensors_make_of_them() -> None:
-    rig = VirtualRig(specimen="magnet-beam")
+    rig = VirtualRig.shipped("magnet-beam")
     per_bit = rig.converter.adc_step_v / rig.sensitivities_v_per_unit
     assert per_bit[:2] == pytest.approx([2.7e-3, 0.03], rel=0.02)
     assert rig.sensors[0].range_v / rig.sensors[0].sensitivity_v_per_unit == pytest.approx(44.5, rel=1e-3)
@@ -72,27 +72,27 @@ def test_converter_beyond_its_range_clips_and_says_so() -> None:
 
 @pytest.mark.parametrize(("voltage", "clipped"), [(9.9, False), (10.0, False), (10.1, True), (-np.inf, True)])
 def test_voltage_beyond_the_converter_is_clipped_and_said_so(voltage: float, clipped: bool) -> None:
-    rig, state = VirtualRig(specimen="magnet-beam").build()
+    rig, state = VirtualRig.shipped("magnet-beam").build()
     flags = sample(rig, state, voltage, np.empty(4))
     assert bool(flags & Flag.DAC_CLIPPED) is clipped
     assert abs(state.inputs[rig.plant["n_state"][0]]) <= 10.0
 
 
 def test_voltage_that_is_no_number_becomes_zero_volts_and_is_flagged() -> None:
-    rig, state = VirtualRig(specimen="magnet-beam").build()
+    rig, state = VirtualRig.shipped("magnet-beam").build()
     assert sample(rig, state, math.nan, np.empty(4)) & Flag.DAC_CLIPPED
     assert state.inputs[rig.plant["n_state"][0]] == 0.0
 
 
 def test_output_is_quantised() -> None:
-    rig, state = VirtualRig(specimen="magnet-beam").build()
+    rig, state = VirtualRig.shipped("magnet-beam").build()
     sample(rig, state, 0.123456, np.empty(4))
     held_v = state.inputs[rig.plant["n_state"][0]]
     assert held_v == STEP_V * round(0.123456 / STEP_V)
 
 
 def test_state_that_is_not_finite_reads_nan_is_held_and_flagged() -> None:
-    rig, state = VirtualRig(specimen="magnet-beam").build()
+    rig, state = VirtualRig.shipped("magnet-beam").build()
     state.inputs[0] = np.inf
     held = state.inputs.copy()
     out_v = np.empty((3, 4))
@@ -102,7 +102,7 @@ def test_state_that_is_not_finite_reads_nan_is_held_and_flagged() -> None:
 
 
 def test_records_hold_what_the_kernels_read() -> None:
-    rig, _ = VirtualRig(specimen="magnet-beam").build()
+    rig, _ = VirtualRig.shipped("magnet-beam").build()
     assert rig.channels.dtype == CHANNEL
     assert rig.converter.dtype == CONVERTER
 

@@ -61,7 +61,7 @@ def test_force_drops_out_near_resonance() -> None:
 
 def test_strong_resonant_force_of_a_one_sided_magnet_is_mostly_harmonics() -> None:
     # At phase resonance at 0.5 N the documents have F2/F1 = 1.8; a drive close to it must show the same nature.
-    run = Simulation(VirtualRig(specimen="magnet-beam")).run(sine(2.5, 25.2, 40_000))
+    run = Simulation(VirtualRig.shipped("magnet-beam")).run(sine(2.5, 25.2, 40_000))
     harmonics = [abs(fundamental(run.force_n, h * 25.2, 20 * h)) for h in (1, 2, 3)]
     assert harmonics[1] > 0.5 * harmonics[0]
     assert harmonics[2] > 0.1 * harmonics[0]
@@ -84,7 +84,7 @@ def test_sensors_are_read_before_the_voltage_acts() -> None:
 
 
 def test_magnet_that_leaves_its_range_is_flagged_and_the_state_stays_finite() -> None:
-    run = Simulation(VirtualRig(specimen="magnet-beam")).run(sine(10.0, 25.5, 10_000))
+    run = Simulation(VirtualRig.shipped("magnet-beam")).run(sine(10.0, 25.5, 10_000))
     beyond = np.abs(run.displacement_m["magnet"]) > 0.7 * 0.011
     assert beyond.any()
     assert run.flag & Flag.MAGNET_RANGE
@@ -96,8 +96,8 @@ def test_magnet_that_leaves_its_range_is_flagged_and_the_state_stays_finite() ->
 
 def test_run_goes_on_where_the_last_one_ended() -> None:
     voltages = sine(1.0, 24.0, 600)
-    whole = Simulation(VirtualRig(specimen="magnet-beam"), seed=5).run(voltages)
-    simulation = Simulation(VirtualRig(specimen="magnet-beam"), seed=5)
+    whole = Simulation(VirtualRig.shipped("magnet-beam"), seed=5).run(voltages)
+    simulation = Simulation(VirtualRig.shipped("magnet-beam"), seed=5)
     first, second = simulation.run(voltages[:250]), simulation.run(voltages[250:])
     for name, signal in whole.measured.items():
         assert np.array_equal(signal, np.concatenate([first.measured[name], second.measured[name]]))
@@ -106,4 +106,4 @@ def test_run_goes_on_where_the_last_one_ended() -> None:
 
 def test_voltages_in_the_wrong_shape_are_refused() -> None:
     with pytest.raises(ValueError, match=r"voltages: shape \(2, 2\), allowed is one row"):
-        Simulation(VirtualRig(specimen="magnet-beam")).run(np.zeros((2, 2)))
+        Simulation(VirtualRig.shipped("magnet-beam")).run(np.zeros((2, 2)))

@@ -38,46 +38,46 @@ def test_every_shipped_specimen_is_tested_here() -> None:
 
 
 def test_geometry_reproduces_the_calibrated_frequencies(specimen: str) -> None:
-    rig, data = VirtualRig(specimen=specimen), CALIBRATED[specimen]
+    rig, data = VirtualRig.shipped(specimen), CALIBRATED[specimen]
     assert rig.structure.omega_rad_s == pytest.approx(data["w"], rel=1e-7)
     assert 2 * np.pi * rig.linear_modes.frequency_hz == pytest.approx(data["wl"], rel=1e-7)
 
 
 def test_geometry_reproduces_the_calibrated_shapes(specimen: str) -> None:
-    rig, data = VirtualRig(specimen=specimen), CALIBRATED[specimen]
+    rig, data = VirtualRig.shipped(specimen), CALIBRATED[specimen]
     for at in ("drive", "magnet", "acc_drive", "acc_magnet"):
         assert rig.shape(at) == pytest.approx(data[at], abs=1e-8)
     assert rig.plant.signs * rig.structure.shape("clamp", "curvature") == pytest.approx(data["clamp"], rel=1e-7)
 
 
 def test_first_modes_are_those_of_the_paper(specimen: str) -> None:
-    modes = VirtualRig(specimen=specimen).linear_modes
+    modes = VirtualRig.shipped(specimen).linear_modes
     assert modes.frequency_hz[:2] == pytest.approx([24.370, 134.06], abs=5e-4)
     assert modes.damping_ratio[:2] == pytest.approx([0.00400, 0.0007], abs=1e-6)
 
 
 @pytest.mark.parametrize(("name", "ratio"), [("magnet-beam", 1.113), ("magnet-beam-symmetric", 1.128)])
 def test_accelerometer_beside_the_drive_point_reads_more_than_the_drive_point(name: str, ratio: float) -> None:
-    rig = VirtualRig(specimen=name)
+    rig = VirtualRig.shipped(name)
     assert rig.shape("acc_drive")[0] / rig.shape("drive")[0] == pytest.approx(ratio, abs=5e-4)
 
 
 def test_coupled_rig_has_another_mode_than_the_structure() -> None:
-    modes = VirtualRig(specimen="magnet-beam").coupled_modes
+    modes = VirtualRig.shipped("magnet-beam").coupled_modes
     assert modes.frequency_hz[0] == pytest.approx(25.1, abs=0.05)
     assert modes.damping_ratio[0] == pytest.approx(0.07, abs=0.005)
 
 
 def test_channels_come_in_the_documented_order(specimen: str) -> None:
-    assert VirtualRig(specimen=specimen).channel_names == ("force", "drive", "acc_drive", "acc_magnet")
+    assert VirtualRig.shipped(specimen).channel_names == ("force", "drive", "acc_drive", "acc_magnet")
 
 
 def test_every_number_that_was_chosen_is_said_to_be(specimen: str) -> None:
-    assert set(VirtualRig(specimen=specimen).provenance) == {"published", "calibrated", "chosen", "unverified"}
+    assert set(VirtualRig.shipped(specimen).provenance) == {"published", "calibrated", "chosen", "unverified"}
 
 
 def test_dumped_rig_validates_to_itself(specimen: str) -> None:
-    rig = VirtualRig.model_validate({"specimen": specimen, "converter": {"substeps": 4}})
+    rig = VirtualRig.shipped(specimen, converter={"substeps": 4})
     again = VirtualRig.model_validate(rig.model_dump())
     assert again == rig
     assert again.converter.substeps == 4
@@ -85,7 +85,7 @@ def test_dumped_rig_validates_to_itself(specimen: str) -> None:
 
 
 def test_given_modes_make_the_same_rig_as_the_geometry_they_came_from() -> None:
-    beam = VirtualRig(specimen="magnet-beam")
+    beam = VirtualRig.shipped("magnet-beam")
     shapes = {at: tuple(beam.structure.shape(at)) for at in ("drive", "magnet", "acc_drive", "acc_magnet")}
     curvature = beam.structure.shape("clamp", "curvature")
     table = beam.model_dump() | {

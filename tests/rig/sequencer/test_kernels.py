@@ -1,0 +1,157 @@
+"""The settle rule and the walk through the segments, period by period."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.layout import LOCK, LockState
+from rig.safety.layout import EndReason, GuardMode
+from rig.safety.limits import guard_record
+from rig.sequencer.kernels import advance, judge_period
+from rig.sequencer.layout import PROGRESS, SETTLING, OnFailure, Outcome, SegmentKind
+from rig.sequencer.segments import Segment, SettleRule, segment_table
+
+RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)
+
+
+def _judge(periods, locked=True, wanted_force=0.0, saturated=False):
+    settling = np.zeros(1, SETTLING)
+    rule = RULE.build()
+    for error_deg, response, force in periods:
+        judge_period(settling[0], rule[0], locked, math.radians(error_deg), response, force, wanted_force, saturated)
+    return settling[0]
+
+
+def test_a_quiet_vibration_settles_after_twice_the_average_and_the_settled_periods():
+    assert _judge([(0.5, 1.0, 1.0)] * (2 * 5 + 8 - 2))["good_periods"] == 7
+    assert _judge([(0.5, 1.0, 1.0)] * (2 * 5 + 8 - 1))["good_periods"] == 8
+
+
+def test_only_the_averaged_error_counts():
+    swinging = [(20.0 * (-1) ** k, 1.0, 1.0) for k in range(40)]
+    assert _judge(swinging)["good_periods"] == 0  # five periods of +-20 deg average to +-4 deg
+    fast = [(20.0 * math.cos(2 * math.pi * k / 5), 1.0, 1.0) for k in range(40)]
+    assert _judge(fast)["good_periods"] > 8
+
+
+@given(st.floats(0.0021, 0.1))
+def test_a_drifting_amplitude_does_not_settle(rate):
+    assert _judge([(0.0, (1.0 + rate) ** k, 1.0) for k in range(60)])["good_periods"] == 0
+
+
+@given(st.floats(0.0, 0.0019))
+def test_a_slow_enough_drift_does(rate):
+    assert _judge([(0.0, (1.0 + rate) ** k, 1.0) for k in range(60)])["good_periods"] > 8
+
+
+def test_nothing_settles_without_a_lock():
+    assert _judge([(0.0, 1.0, 1.0)] * 100, locked=False)["good_periods"] == 0
+
+
+def test_a_force_level_must_be_reached():
+    assert _judge([(0.0, 1.0, 0.98)] * 60, wanted_force=1.0)["good_periods"] == 0
+    assert _judge([(0.0, 1.0, 0.995)] * 60, wanted_force=1.0)["good_periods"] > 8
+
+
+def test_a_level_that_saturates_and_is_not_reached_is_counted():
+    assert _judge([(0.0, 1.0, 0.9)] * 60, wanted_force=1.0, saturated=True)["saturated_periods"] > 20
+    assert _judge([(0.0, 1.0, 0.995)] * 60, wanted_force=1.0, saturated=True)["saturated_periods"] == 0
+
+
+class Walk:
+    """A sequencer without a rig: cycles are dealt out by hand."""
+
+    def __init__(self, *segments):
+        self.table, self.outcomes = segment_table(segments)
+        self.progress = np.zeros(1, PROGRESS)
+        self.progress["segments"] = len(segments)
+        self.settling, self.lock, self.guard = np.zeros(1, SETTLING), np.zeros(1, LOCK), guard_record(True)
+        self.lock["state"] = LockState.LOCKED
+        self.cycle, self.sample, self.levels = 0.0, 0, []
+
+    def go(self, periods, per_period=50):
+        for _ in range(int(periods * per_period)):
+            advance(
+                self.progress[0], self.table, self.outcomes, self.settling[0], RULE.build()[0], self.lock[0],
+                self.guard[0], self.cycle, self.sample,
+            )  # fmt: skip
+            self.levels.append(float(self.progress["level"][0]))
+            self.cycle += 1.0 / per_period
+            self.sample += 1
+        return self
+
+    def codes(self):
+        return [Outcome(int(code)).name for code in self.outcomes["outcome"]]
+
+
+def _point(number, level, on_failure=OnFailure.SKIP):
+    return (
+        Segment(SegmentKind.RAMP, number, level, 10.0),
+        Segment(SegmentKind.SETTLE, number, level, 30.0, on_failure),
+        Segment(SegmentKind.RECORD, number, level, 20.0, on_failure),
+    )
+
+
+def test_a_ramp_is_half_a_cosine_between_the_levels():
+    walk = Walk(Segment(SegmentKind.HOLD, -1, 1.0, 1.0), Segment(SegmentKind.RAMP, 0, 3.0, 10.0)).go(13)
+    ramp = np.array(walk.levels[50:550])
+    expected = 1.0 + 2.0 * 0.5 * (1 - np.cos(np.pi * np.arange(ramp.size) / ramp.size))
+    np.testing.assert_allclose(ramp[5:-5], expected[5:-5], atol=2.0 * np.pi / 500 * 3)
+    assert max(np.abs(np.diff(walk.levels[60:]))) < 0.02
+
+
+def test_a_plan_that_settles_is_recorded_and_ends_the_run():
+    walk = Walk(*_point(0, 1.0))
+    walk.go(12)
+    walk.settling["good_periods"] = RULE.settled_periods
+    walk.go(25)
+    assert walk.codes() == ["DONE"] * 3
+    assert EndReason(int(walk.guard["reason"][0])) is EndReason.COMPLETED
+    assert walk.outcomes["periods"][2] == pytest.approx(20.0, abs=0.05)
+
+
+def test_a_point_that_does_not_settle_is_skipped_and_the_next_is_tried():
+    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(42)
+    assert walk.codes()[:3] == ["DONE", "NOT_SETTLED", "SKIPPED"]
+    assert walk.codes()[3] == "RUNNING"
+
+
+def test_a_point_that_does_not_settle_stops_a_plan_that_says_so():
+    walk = Walk(*_point(0, 1.0, OnFailure.STOP), *_point(1, 2.0)).go(60)
+    assert walk.codes() == ["DONE", "NOT_SETTLED", "PENDING", "PENDING", "PENDING", "PENDING"]
+    assert EndReason(int(walk.guard["reason"][0])) is EndReason.PLAN_STOPPED
+
+
+def test_a_lost_lock_fails_the_point_and_is_sought_again_at_the_next_level():
+    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(12)
+    walk.lock["state"] = LockState.LOST
+    walk.go(1)
+    assert walk.codes()[:3] == ["DONE", "LOST_LOCK", "SKIPPED"]
+    assert LockState(int(walk.lock["state"][0])) is LockState.ACQUIRING
+
+
+def test_a_lost_lock_trips_a_plan_that_stops():
+    walk = Walk(*_point(0, 1.0, OnFailure.STOP)).go(12)
+    walk.lock["state"] = LockState.LOST
+    walk.go(1)
+    assert EndReason(int(walk.guard["reason"][0])) is EndReason.LOST_LOCK
+
+
+def test_a_disturbed_record_spoils_the_point():
+    walk = Walk(*_point(0, 1.0)).go(12)
+    walk.settling["good_periods"] = RULE.settled_periods
+    walk.go(1)
+    walk.settling["bad_periods"] = RULE.average_periods
+    walk.go(1)
+    assert walk.codes() == ["DONE", "DONE", "DISTURBED"]
+
+
+def test_a_stop_interrupts_the_segment_under_way():
+    walk = Walk(*_point(0, 1.0)).go(12)
+    walk.guard["stop_requested"] = 1
+    walk.go(1)
+    assert walk.codes() == ["DONE", "INTERRUPTED", "PENDING"]
+    assert GuardMode(int(walk.guard["mode"][0])) is GuardMode.RAMPING
