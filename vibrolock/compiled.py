@@ -4,7 +4,7 @@ A kernel is a module-level function in a file called ``kernels.py``: plain array
 and out, no allocation per sample, never raising. It returns codes; its caller raises.
 
 numba's own cache does not notice when a kernel that is called from another file has changed. The cache folder therefore
-carries a hash of all kernel sources of the distribution, and a changed source starts an empty folder.
+carries a hash of all kernel sources and record layouts of the distribution, and a changed source starts an empty folder.
 """
 
 import getpass
@@ -28,12 +28,13 @@ Record: TypeAlias = Any
 """One record of a structured array inside a kernel; numba knows its fields, the type checker does not."""
 
 _PACKAGES = ("vibrolock", "controller", "simulators", "rig")
+_COMPILED_FROM = ("kernels.py", "layout.py")  # the code, and the constants and record layouts compiled into it
 _UNUSED_AFTER_DAYS = 30
 
 
 def _source_hash() -> str:
     root = Path(__file__).parent.parent
-    sources = sorted(path for name in _PACKAGES for path in (root / name).rglob("kernels.py"))
+    sources = sorted(path for name in _PACKAGES for file in _COMPILED_FROM for path in (root / name).rglob(file))
     digest = hashlib.sha256(f"numba {numba.__version__}".encode())
     for path in sources:
         digest.update(path.relative_to(root).as_posix().encode())
