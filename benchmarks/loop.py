@@ -80,11 +80,11 @@ def rk4(bench: Bench) -> Callable[[], float]:
     out = np.zeros(state.outputs.size)
     voltages = 0.5 * np.sin(2 * np.pi * 24.4 * np.arange(SAMPLES) / bench.sample_rate_hz)
     truth = np.zeros((SAMPLES, out.size))
-    rk4_kernels.run_open_loop(arrays, state, voltages[:10], truth[:10])
+    rk4_kernels.run(arrays, state, voltages[:10], truth[:10])
 
     def once() -> float:
         start = time.perf_counter()
-        rk4_kernels.run_open_loop(arrays, state, voltages, truth)
+        rk4_kernels.run(arrays, state, voltages, truth)
         return 1e6 * (time.perf_counter() - start) / SAMPLES
 
     return once

@@ -28,7 +28,7 @@ Record: TypeAlias = Any
 """One record of a structured array inside a kernel; numba knows its fields, the type checker does not."""
 
 _PACKAGES = ("vibrolock", "controller", "simulators", "rig")
-_COMPILED_FROM = ("kernels.py", "layout.py")  # the code, and the constants and record layouts compiled into it
+_COMPILED_FROM = ("kernels.py", "layout.py", "compiled.py")  # the code, constants and layouts in it, the compiler's options
 _UNUSED_AFTER_DAYS = 30
 
 
@@ -73,5 +73,5 @@ setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (ma
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile with numba, cached on disk, in IEEE arithmetic only (no fastmath) so that runs repeat bit for bit."""
-    compiled: Callable[P, R] = numba.njit(cache=True, error_model="numpy", fastmath=False)(function)
+    compiled: Callable[P, R] = numba.njit(cache=True, error_model="numpy", fastmath=False, _nrt=False)(function)
     return compiled

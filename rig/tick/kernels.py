@@ -29,12 +29,13 @@ from vibrolock.compiled import Record, kernel
 
 
 @kernel
-def phase_on_output(history: np.ndarray, loop: Record, dt: float) -> float:
-    """Oscillator phase that was on the output when this sample's inputs were measured, in [0, 2 pi)."""
-    size = history.size
-    now = history[(loop.sample - loop.lead_whole) % size]
-    before = history[(loop.sample - loop.lead_whole - 1) % size]
-    theta = now.theta - loop.lead_fraction * dt * before.omega
+def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: float) -> float:
+    """Oscillator phase that was on the output when this sample's inputs were measured, in [0, 2 pi).
+
+    ``seen`` is the ring's entry of the last whole sample that the inputs show.
+    """
+    before = seen - 1 if seen > 0 else history.size - 1
+    theta = history[seen].theta - lead_fraction * dt * history[before].omega
     return float(theta + TWO_PI if theta < 0.0 else theta)
 
 
@@ -129,8 +130,10 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
     """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``."""
     law, loop, guard, progress = t.law[0], t.loop[0], t.guard[0], t.progress[0]
     now = loop.sample
-    seen = t.history[(now - loop.lead_whole) % t.history.size]
-    theta_in = phase_on_output(t.history, loop, law.dt_s)
+    slot = now % t.history.size
+    shown = slot - loop.lead_whole if slot >= loop.lead_whole else slot - loop.lead_whole + t.history.size
+    seen = t.history[shown]
+    theta_in = phase_on_output(t.history, shown, loop.lead_fraction, law.dt_s)
     row.theta_rad = theta_in
     row.frequency_hz = seen.omega / TWO_PI
     row.output_v = seen.output_v
@@ -180,7 +183,7 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
         shut_down(guard, NON_FINITE_OUTPUT, -1, output, now, True)
         output = 0.0
 
-    sent = t.history[now % t.history.size]
+    sent = t.history[slot]
     sent.theta = loop.theta
     sent.omega = loop.omega
     sent.amplitude_v = amplitude
