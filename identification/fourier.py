@@ -5,6 +5,10 @@ wandering frequency smears nothing and no whole number of samples per period is 
 ``(t - t_mid) Re(Z exp(i theta))``, is fitted along as a nuisance. It does not move the fundamental itself (over whole
 periods the two are orthogonal), but without it a drift leaks into the static part and the higher harmonics, which are
 often a thousand times smaller, and counts as noise in the residual. Its size is reported.
+
+A detector's ripple swings the oscillator's phase within every period. A periodic vibration is a Fourier series in time,
+that is in an even phase: on the swinging one, harmonics leak into each other (a swing of one milliradian takes 0.1 % of
+F_2 for F_1). What repeats within every period is therefore taken out of the phase first; slow wander stays.
 """
 
 from collections.abc import Sequence
@@ -77,7 +81,7 @@ def periodic_vibration(
     if harmonics < 1:
         raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
     frequency_hz, periods, count, warnings = _whole_periods(theta, rate_hz, harmonics)
-    theta, data = theta[:count], data[:, :count]
+    theta, data = _without_ripple(theta[:count], harmonics), data[:, :count]
     design = _design(theta, harmonics)
     solution = np.linalg.lstsq(design, data.T, rcond=None)[0]
     residual = data.T - design @ solution
@@ -123,6 +127,24 @@ def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float,
             f"{periods} periods only: standard errors take the residual for white noise, drift is not fitted"
         )
     return float(step * rate_hz / (2.0 * np.pi)), periods, count, tuple(warnings)
+
+
+def _without_ripple(theta: Float, harmonics: int) -> Float:
+    """``theta`` less what of it repeats within every period, harmonics 1..H; unchanged below four periods.
+
+    What repeats is fitted to the phase's deviation from its own mean over one period, so that slow wander stays.
+    """
+    if theta[-1] - theta[0] < 2.0 * np.pi * (_MIN_BATCHES - 0.5):
+        return theta
+    straight = np.linspace(theta[0], theta[-1], theta.size)
+    period = round(2.0 * np.pi / (straight[1] - straight[0]))
+    mean = np.convolve(theta - straight, np.full(period, 1.0 / period), mode="valid")
+    inside = slice(period // 2, period // 2 + mean.size)
+    columns = _design(straight, harmonics)[:, 1 : 2 * harmonics + 1]
+    weight = np.hanning(mean.size)  # else the ends of a slow wander leak into the fit
+    swing = (theta - straight)[inside] - mean
+    fitted = np.linalg.lstsq(columns[inside] * weight[:, None], swing * weight, rcond=None)[0]
+    return np.asarray(theta - columns @ fitted)
 
 
 def _design(theta: Float, harmonics: int) -> Float:

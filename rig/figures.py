@@ -1,6 +1,5 @@
 """Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -184,34 +183,42 @@ def _draw_recording(page: "Figure", recording: Recording) -> None:
     _title(page, text + (f", {left_out} not accepted" if left_out else ""))
 
 
-MOST_TRACE_POINTS = 6000
+TRACE_BINS = 1200
 
 
 def _draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None:
-    """The loop over time: oscillator frequency with the force level, and the phase error."""
+    """The loop over time: oscillator frequency with the output amplitude, and the phase error; mean and range of each bin."""
     rate = float(recording.configuration["bench"]["sample_rate_hz"])
     level = frequency.twinx()
-    step = max(1, recording.n_rows // MOST_TRACE_POINTS)
-    start = 0
+    width = max(1, recording.n_rows // TRACE_BINS)
+    start, largest = 0, 1.0
     for part in recording.parts:
-        kept = slice(None, None, step)
-        seconds = (start + np.arange(part.n_rows)[kept]) / rate
-        frequency.plot(seconds, part.rows("frequency_hz")[kept], color=MAIN, lw=0.7)
-        level.plot(seconds, np.abs(part.rows("command_v")[kept]), color=SECOND, lw=0.9)
-        degrees = np.degrees(part.rows("phase_error_rad")[kept])
-        error.plot(seconds, degrees, color=MAIN, lw=0.5)
+        if part.n_rows < width:
+            continue
+        bins = part.n_rows // width
+        seconds = (start + width * (np.arange(bins) + 0.5)) / rate
+        _band(frequency, seconds, part.rows("frequency_hz"), width)
+        level.plot(seconds, _binned(np.abs(part.rows("command_v")), width).mean(axis=1), color=SECOND, lw=0.9)
+        degrees = np.degrees(part.rows("phase_error_rad"))
+        _band(error, seconds, degrees, width)
+        running = degrees[part.rows("segment") >= 0]
+        largest = max(largest, float(np.quantile(np.abs(running), 0.995)) if running.size else 0.0)
         start += part.n_rows
     frequency.set(xlabel="time, s", ylabel="oscillator frequency, Hz")
     frequency.yaxis.label.set_color(MAIN)
     level.set_ylabel("output amplitude, V", color=SECOND)
     level.grid(False)
     level.spines["right"].set_visible(True)
-    limit = _symmetric_limit(recording)
-    error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-limit, limit))
+    error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-1.3 * largest, 1.3 * largest))
 
 
-def _symmetric_limit(recording: Recording) -> float:
-    """Bound that holds all but the largest hundredth of the phase errors."""
-    parts = [np.abs(np.degrees(part.rows("phase_error_rad")[::50])) for part in recording.parts if part.n_rows]
-    largest = float(np.quantile(np.concatenate(parts), 0.99)) if parts else 1.0
-    return 1.3 * max(1.0, largest) if math.isfinite(largest) else 180.0
+def _binned(values: np.ndarray, width: int) -> np.ndarray:
+    """``values`` in rows of ``width``; an incomplete row at the end is left out."""
+    return np.asarray(values[: values.size // width * width].reshape(-1, width))
+
+
+def _band(axis: "Axes", seconds: np.ndarray, values: np.ndarray, width: int) -> None:
+    """Mean of each bin as a line, its range as a band: plain decimation would alias the ripple of the detector."""
+    rows = _binned(values.astype(float), width)
+    axis.fill_between(seconds, rows.min(axis=1), rows.max(axis=1), color=MAIN, alpha=0.25, lw=0)
+    axis.plot(seconds, rows.mean(axis=1), color=MAIN, lw=0.8)

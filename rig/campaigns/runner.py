@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 import vibrolock
+from controller import LockState
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.evaluate import failed_point, measured_point
@@ -25,7 +26,7 @@ from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.recording.store import continue_recording, finalise
-from rig.safety.layout import EndReason
+from rig.safety.layout import EndReason, GuardMode
 from rig.safety.limits import describe_end
 from rig.sequencer.layout import Outcome, SegmentKind
 from rig.sequencer.segments import Segment
@@ -174,6 +175,7 @@ class _Run:
         self.finished = len(done)
         self.failed = 0
         self.next_segment = 0
+        self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept: deque[tuple[int, np.ndarray]] = deque()
         self.write_error: RecordingError | None = None
 
@@ -183,6 +185,7 @@ class _Run:
         with _stop_on_signals(self.tick):
             for rows in self.loop.run():
                 self._write(self.journal.rows, rows)
+                self._note_changes(rows)
                 self._collect(rows)
                 self.progress.advance(rows, self.tick)
         self._mark_interrupted()
@@ -199,6 +202,16 @@ class _Run:
         except RecordingError as error:
             self.write_error = error
             self.tick.request_stop()
+
+    def _note_changes(self, rows: np.ndarray) -> None:
+        """Every change of lock state and guard becomes an event, with its sample."""
+        first = self.tick.sample - rows.size
+        for name, kind in (("lock", LockState), ("guard", GuardMode)):
+            values = np.concatenate([[self.last[name]], rows[name]])
+            for index in np.flatnonzero(np.diff(values.astype(int))):
+                state = kind(int(rows[name][index])).name.lower()
+                self._write(self.journal.event, {"sample": first + int(index), "what": name, "state": state})
+            self.last[name] = int(rows[name][-1])
 
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the point under way, and evaluate the points that are over."""
@@ -223,7 +236,8 @@ class _Run:
     def _first_needed(self) -> int:
         if self.next_segment < self.tick.outcomes.size:
             entry = self.tick.outcomes[self.next_segment]
-            if int(entry["outcome"]) == Outcome.RUNNING:
+            records = int(self.tick.arrays.segments[self.next_segment]["kind"]) == SegmentKind.RECORD
+            if records and int(entry["outcome"]) == Outcome.RUNNING:
                 return int(entry["first_sample"])
         return self.tick.sample
 

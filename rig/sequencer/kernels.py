@@ -52,9 +52,9 @@ def judge_period(
 ) -> None:
     """Take in one period's means and apply the settle rule.
 
-    Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the averaged response
-    amplitude within ``amplitude`` (relative) of what it was that many periods before, for ``settled_periods`` in a row.
-    With a force level, the averaged force must be within ``amplitude`` of it too.
+    Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the
+    averaged response amplitude within ``amplitude`` (relative) of what it was that many periods before, for
+    ``settled_periods`` in a row. With a force level, the averaged force must be within ``amplitude`` of it too.
     """
     n = rule.average_periods
     slot = settling.count % (2 * LONGEST_AVERAGE)

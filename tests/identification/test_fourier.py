@@ -46,7 +46,15 @@ def test_a_wandering_frequency_smears_nothing() -> None:
     theta = theta + 0.4 * np.sin(theta / 17.0)
     harmonics = random_harmonics(1)
     result = periodic_vibration(theta, sampled(harmonics, theta), CHANNELS, sample_rate_hz=RATE_HZ)
-    np.testing.assert_allclose(result.harmonics, harmonics, atol=1e-9)
+    np.testing.assert_allclose(result.harmonics, harmonics, atol=1e-5)
+
+
+def test_an_oscillator_that_swings_within_the_period_mixes_no_harmonics() -> None:
+    even = phase(24.37, 50.0)
+    swinging = even + 2e-3 * np.cos(even + 0.4) + 1e-3 * np.sin(2 * even)
+    harmonics = random_harmonics(2)
+    result = periodic_vibration(swinging, sampled(harmonics, even), CHANNELS, sample_rate_hz=RATE_HZ)
+    np.testing.assert_allclose(result.harmonics, harmonics, atol=5e-5)
 
 
 def test_only_whole_periods_are_used_and_the_rest_is_reported() -> None:

@@ -1,6 +1,5 @@
 """Runs that go wrong half-way: killed, interrupted, out of disk, out of reach, unlocked; and what is kept of them."""
 
-import os
 import resource
 import signal
 import subprocess
@@ -118,6 +117,9 @@ def test_an_interrupted_run_ramps_down_closes_its_file_and_says_so(tmp_path, num
         assert [point["reason"] for point in recording.points if not point["accepted"]] == ["interrupted"]
         output_v = recording.parts[0].rows("output_v")
         guard = recording.parts[0].rows("guard")
+        events = [(event["what"], event["state"]) for event in recording.parts[0].events]
+    assert events[:2] == [("lock", "acquiring"), ("lock", "locked")]
+    assert events[-2:] == [("guard", "ramping"), ("guard", "off")]
     assert abs(output_v[-1]) < 1e-3
     assert np.count_nonzero(guard == 2) == pytest.approx(2500, abs=2)  # half a second of ramp
     assert not journal_path(output).exists()
@@ -159,7 +161,7 @@ def test_a_full_disk_ends_the_run_safely_and_keeps_what_was_recorded(tmp_path):
 def test_a_level_beyond_the_voltage_limit_is_refused_before_anything_moves(tmp_path):
     with pytest.raises(ConfigurationError, match=r"levels_v\[3\] = 9 V: the bench magnet-beam allows up to 5 V"):
         rig.run(plan_with(levels_v=(0.1, 0.2, 0.3, 9.0)), output=tmp_path / "run.h5")
-    assert os.listdir(tmp_path) == []
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_force_that_the_voltage_limit_does_not_reach_is_marked_and_the_rest_goes_on(tmp_path):

@@ -1,0 +1,67 @@
+"""Whoever follows a page of the documentation gets what it says: its commands, its examples, its output."""
+
+from pathlib import Path
+
+import pytest
+
+import rig
+from tests.docs.pages import ROOT, Reader, blocks, pages
+
+QUICK = """
+kind = "backbone"
+bench = "magnet-beam"
+levels_v = [0.4, 0.8]
+record_periods = 8
+
+[controller]
+low_pass_rad_s = 6.283
+k1 = 2.0
+k2 = 6.283
+centre_frequency_hz = 24.0
+frequency_window_hz = [22.0, 27.0]
+"""
+NEEDS = {"docs/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
+NOT_RUN = {
+    ("docs/user-guide.md", "a minute of wall clock"),
+    ("docs/writing-a-driver.md", "installs a package"),
+}
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("page", pages(), ids=name_of)
+def test_a_page_does_what_it_says(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    if name_of(page) in NEEDS:
+        Path("quick.toml").write_text(QUICK)
+        rig.run("quick.toml", output=NEEDS[name_of(page)]).close()
+    Reader(page).follow()
+
+
+def test_what_is_not_run_is_listed_here_with_its_reason():
+    assert {(name_of(page), block.not_run) for page in pages() for block in blocks(page) if block.not_run} == NOT_RUN
+
+
+def test_every_link_between_pages_leads_to_a_file():
+    import re
+
+    for page in [*pages(), ROOT / "CHANGELOG.md"]:
+        for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            if "://" not in target:
+                assert (page.parent / target).exists(), f"{name_of(page)}: {target}"
+
+
+def test_decisions_are_numbered_without_gaps_and_say_context_decision_consequences():
+    records = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    assert [path.name[:5] for path in records] == [f"{number:04d}-" for number in range(1, len(records) + 1)]
+    for path in records:
+        text = path.read_text(encoding="utf-8")
+        assert text.startswith(f"# {path.name[:4]}. ")
+        assert [line for line in text.splitlines() if line.startswith("## ")] == [
+            "## Context",
+            "## Decision",
+            "## Consequences",
+        ], path.name
