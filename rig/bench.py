@@ -6,9 +6,8 @@ from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from rig.configuration import Configured, read_toml, validated
+from rig.configuration import Configured, find_toml, read_toml, shipped_names, validated
 from rig.daq import Channel
-from rig.errors import ConfigurationError
 
 __all__ = ["Bench", "DriverChoice", "Limits", "SpecimenFacts", "load_bench", "shipped_benches"]
 
@@ -133,21 +132,9 @@ def _folder() -> Path:
 
 def shipped_benches() -> list[str]:
     """Names of the benches that come with the product."""
-    return sorted(path.stem for path in _folder().glob("*.toml"))
+    return shipped_names(_folder())
 
 
 def load_bench(name_or_path: str | Path) -> Bench:
     """A shipped bench by its name, or a bench from a TOML file."""
-    text = str(name_or_path)
-    path = Path(text)
-    if path.suffix != ".toml":
-        if text not in shipped_benches():
-            raise ConfigurationError(
-                f"bench = {text!r}: there is no such bench; allowed is {', '.join(shipped_benches())} or a .toml file"
-            )
-        path = _folder() / f"{text}.toml"
-    return validated(Bench, read_toml(path), text)
-
-
-BenchSource = Bench | str | Path
-"""A bench, the name of a shipped one, or a TOML file."""
+    return validated(Bench, read_toml(find_toml(name_or_path, _folder(), "bench")), str(name_or_path))

@@ -9,13 +9,31 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from rig.errors import ConfigurationError
 
-__all__ = ["Configured", "explain", "read_toml", "validated"]
+__all__ = ["Configured", "explain", "find_toml", "read_toml", "shipped_names", "validated"]
 
 
 class Configured(BaseModel):
     """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def shipped_names(folder: Path) -> list[str]:
+    """Names of the TOML files below a folder, without their ending."""
+    return sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.toml"))
+
+
+def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:
+    """The path of a shipped file of ``folder`` by its name, or the path itself where it ends on .toml."""
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        return path
+    names = shipped_names(folder)
+    if str(name_or_path) not in names:
+        raise ConfigurationError(
+            f"{what} = {str(name_or_path)!r}: there is no such {what}; allowed is {', '.join(names)} or a .toml file"
+        )
+    return folder / f"{name_or_path}.toml"
 
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rig.bench import Bench, load_bench
 from rig.campaigns.backbone import BackbonePlan
-from rig.configuration import read_toml, validated
+from rig.configuration import find_toml, read_toml, shipped_names, validated
 from rig.errors import ConfigurationError
 
 __all__ = ["bench_of", "load_plan", "shipped_plans"]
@@ -19,20 +19,13 @@ def _folder() -> Path:
 
 def shipped_plans() -> list[str]:
     """Names ``<bench>/<campaign>`` of the plans that come with the product."""
-    return sorted(path.relative_to(_folder()).with_suffix("").as_posix() for path in _folder().rglob("*.toml"))
+    return shipped_names(_folder())
 
 
 def load_plan(name_or_path: str | Path) -> BackbonePlan:
     """A shipped plan by its name, or a plan from a TOML file; `ConfigurationError` names what is wrong with it."""
     text = str(name_or_path)
-    path = Path(text)
-    if path.suffix != ".toml":
-        if text not in shipped_plans():
-            raise ConfigurationError(
-                f"plan = {text!r}: there is no such plan; allowed is {', '.join(shipped_plans())} or a .toml file"
-            )
-        path = _folder() / f"{text}.toml"
-    table = read_toml(path)
+    table = read_toml(find_toml(name_or_path, _folder(), "plan"))
     kind = table.get("kind")
     if kind not in KINDS:
         raise ConfigurationError(f"{text}: kind = {kind!r}: allowed is {', '.join(map(repr, KINDS))}")

@@ -1,11 +1,15 @@
 """Whoever follows a page of the documentation gets what it says: its commands, its examples, its output."""
 
+import re
+import sys
 from pathlib import Path
 
 import pytest
 
 import rig
-from tests.docs.pages import ROOT, Reader, blocks, pages
+from tests.docs.output import assert_shows
+from tests.docs.pages import ROOT, blocks, pages
+from tests.docs.reader import Reader
 
 QUICK = """
 kind = "backbone"
@@ -31,6 +35,15 @@ def name_of(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
+@pytest.fixture(autouse=True)
+def no_module_of_a_page_stays():
+    before = set(sys.modules)
+    yield
+    for name in set(sys.modules) - before:
+        if str(getattr(sys.modules[name], "__file__", None)).endswith("_driver.py"):
+            del sys.modules[name]
+
+
 @pytest.mark.parametrize("page", pages(), ids=name_of)
 def test_a_page_does_what_it_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -41,13 +54,25 @@ def test_a_page_does_what_it_says(page, tmp_path, monkeypatch):
     Reader(page).follow()
 
 
+PRINTED = "one 1.00\ntwo 2.00 words\nthree"
+
+
+@pytest.mark.parametrize("shown", ["one 1.01\ntwo … words", "…\nthree", "two 2.00 …", "one …\n…\nthree", PRINTED])
+def test_output_that_is_shown_and_printed_passes(shown):
+    assert_shows(shown, PRINTED, "here")
+
+
+@pytest.mark.parametrize("shown", ["one 1.05", "one 1.00\nthree", "two words …", "three\none 1.00", "four", "two 2.00"])
+def test_output_that_is_shown_and_not_printed_fails(shown):
+    with pytest.raises(AssertionError, match="is not what was printed"):
+        assert_shows(shown, PRINTED, "here")
+
+
 def test_what_is_not_run_is_listed_here_with_its_reason():
     assert {(name_of(page), block.not_run) for page in pages() for block in blocks(page) if block.not_run} == NOT_RUN
 
 
 def test_every_link_between_pages_leads_to_a_file():
-    import re
-
     for page in [*pages(), ROOT / "CHANGELOG.md"]:
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             if "://" not in target:
