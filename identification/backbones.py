@@ -82,7 +82,7 @@ class Backbone:
 
     @property
     def phase_error_deg(self) -> Float:
-        """float[n_points]: measured lag minus the lag asked for, degrees."""
+        """float[n_points]: lag asked for minus the measured one, degrees."""
         return np.array([point.phase_error_deg for point in self.points])
 
     def select(self, keep: Sequence[bool]) -> "Backbone":

@@ -146,5 +146,5 @@ class PeriodicVibration:
 
     @property
     def phase_error_deg(self) -> float:
-        """Measured lag minus the lag asked for, in (-180, 180]."""
-        return wrapped_deg(self.phase_lag_deg - self.phase_lag_target_deg)
+        """Lag asked for minus the measured one, in (-180, 180]; positive below resonance, where the loop has to go up."""
+        return wrapped_deg(self.phase_lag_target_deg - self.phase_lag_deg)

@@ -76,7 +76,12 @@ def run(
         bench = load_bench(bench)
     folder = TemporaryDirectory(prefix="vibrolock-") if output is None else None
     path = Path(output) if output is not None else Path(folder.name if folder else "") / "run.h5"
-    recording = carry_out(plan, bench, path, seed=seed, realtime=realtime, overwrite=overwrite, progress=progress)
+    try:
+        recording = carry_out(plan, bench, path, seed=seed, realtime=realtime, overwrite=overwrite, progress=progress)
+    except BaseException:
+        if folder is not None:
+            folder.cleanup()
+        raise
     return Run(recording, folder)
 
 

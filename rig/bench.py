@@ -6,8 +6,9 @@ from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from rig.configuration import Configured, find_toml, read_toml, shipped_names, validated
+from rig.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
 from rig.daq import Channel
+from rig.errors import ConfigurationError
 
 __all__ = ["Bench", "DriverChoice", "Limits", "SpecimenFacts", "load_bench", "shipped_benches"]
 
@@ -136,5 +137,15 @@ def shipped_benches() -> list[str]:
 
 
 def load_bench(name_or_path: str | Path) -> Bench:
-    """A shipped bench by its name, or a bench from a TOML file."""
-    return validated(Bench, read_toml(find_toml(name_or_path, _folder(), "bench")), str(name_or_path))
+    """A shipped bench by its name, or a bench from a TOML file.
+
+    ``base = "magnet-beam"`` in the file starts from a shipped bench; what else stands there changes it key by key.
+    """
+    table = read_toml(find_toml(name_or_path, _folder(), "bench"))
+    if "base" in table:
+        changes = {key: value for key, value in table.items() if key != "base"}
+        if table["base"] not in shipped_benches():
+            allowed = ", ".join(shipped_benches())
+            raise ConfigurationError(f"{name_or_path}: base = {table['base']!r}: allowed is {allowed}")
+        table = merged(read_toml(find_toml(table["base"], _folder(), "bench")), changes)
+    return validated(Bench, table, str(name_or_path))

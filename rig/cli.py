@@ -17,6 +17,7 @@ app = typer.Typer(
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
 
 
@@ -55,7 +56,7 @@ def run(
     daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
     realtime: Realtime = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")] = False,
+    overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Carry out a plan and record it."""
@@ -172,10 +173,11 @@ def _print_summary(summary: dict[str, Any]) -> None:
             for p in summary["points"]
         ],
     )
-    print(
-        f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz, {loop['periods']} periods, "
-        f"{loop['overruns']} overruns, {number(loop['realtime_factor'], '.0f')} times real time"
-    )
+    line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
+    if loop["realtime_factor"] is not None:
+        factor = f"{loop['realtime_factor']:.0f} times real time"
+        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {factor}"
+    print(line)
     for index, part in enumerate(summary["parts"]):
         print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}")
 
@@ -209,6 +211,7 @@ def identify(
     file: Annotated[Path, typer.Argument(help="Backbone recording or imported frequency responses.")],
     output: Output,
     model: Annotated[str, typer.Option(help="Kind of model: nonlinear-mode.")] = "nonlinear-mode",
+    overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Turn a recording into a model."""
@@ -219,12 +222,20 @@ def identify(
 
     if model != NONLINEAR_MODE:
         raise ConfigurationError(f"--model = {model!r}: allowed is {NONLINEAR_MODE}")
+    _keep_existing(output, overwrite)
     save_model(identify_nonlinear_mode(file), output)
     summary = summarise(output)
     if json:
         print_json(summary)
     else:
         _print_summary(summary)
+
+
+def _keep_existing(output: Path, overwrite: bool) -> None:
+    from rig.errors import RecordingError
+
+    if output.exists() and not overwrite:
+        raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")
 
 
 @app.command("plot")
@@ -244,6 +255,7 @@ def import_(
     mapping: Annotated[Path, typer.Option(help="TOML file that says what is where in it.")],
     output: Output,
     format_: Annotated[str, typer.Option("--format", help="Format of the file: mat.")] = "mat",
+    overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Bring in measurements from elsewhere."""
@@ -255,6 +267,7 @@ def import_(
 
     if format_ != "mat":
         raise ConfigurationError(f"--format = {format_!r}: allowed is mat")
+    _keep_existing(output, overwrite)
     save_frequency_responses(read_frequency_responses(file, mapping), output)
     summary = summarise(output)
     if json:

@@ -1,5 +1,6 @@
 """Benches and plans from TOML files: read, validated, and refused in one clear line."""
 
+import json
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
@@ -9,13 +10,22 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from rig.errors import ConfigurationError
 
-__all__ = ["Configured", "explain", "find_toml", "read_toml", "shipped_names", "validated"]
+__all__ = ["Configured", "explain", "find_toml", "merged", "read_toml", "shipped_names", "validated"]
 
 
 class Configured(BaseModel):
     """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """``base`` with ``changes``: tables key by key, anything else replaced whole."""
+    out = dict(base)
+    for key, value in changes.items():
+        old = base.get(key)
+        out[key] = merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return out
 
 
 def shipped_names(folder: Path) -> list[str]:
@@ -56,7 +66,10 @@ def read_toml(path: Path) -> dict[str, Any]:
 def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
     """A model from a table; every bad value is named with its path, itself and what is allowed."""
     try:
-        return model.model_validate(table)
+        if model.model_config.get("strict"):
+            return model.model_validate(table)
+        # By way of JSON, whose strict mode takes a list for a tuple and 1 for 1.0, but no text or truth for a number.
+        return model.model_validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
         raise ConfigurationError(f"{source}: {explain(error, model)}") from None
 

@@ -91,6 +91,10 @@ class RunProgress:
         )
         sys.stderr.flush()
 
+    def remark(self, text: str) -> None:
+        """Print what the driver has to say about the bench."""
+        self._print(f"note: {text}")
+
     def close(self) -> None:
         """Clear the status line."""
         if self._terminal:

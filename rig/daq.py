@@ -129,6 +129,11 @@ class DAQ(ABC):
         """What went wrong so far, counted: lost samples, clipped outputs and inputs, and the like."""
         return {}
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What looks odd about the bench to the driver, one line each; a run prints and records them."""
+        return ()
+
     @abstractmethod
     def _open(self) -> None:
         """Find and open the device, compare its channels with ours; output 0 V."""

@@ -9,7 +9,6 @@ __all__ = [
     "DaqTimeout",
     "RecordingError",
     "RigError",
-    "TripError",
 ]
 
 
@@ -23,10 +22,6 @@ class ConfigurationError(RigError):
 
 class RecordingError(RigError):
     """A recording cannot be written or read: full disk, foreign, damaged or later file, missing permission."""
-
-
-class TripError(RigError):
-    """Safety has tripped and latched, and what was asked for needs an armed rig."""
 
 
 class DaqError(RigError):

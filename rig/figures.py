@@ -201,7 +201,7 @@ def _draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> Non
         level.plot(seconds, _binned(np.abs(part.rows("command_v")), width).mean(axis=1), color=SECOND, lw=0.9)
         degrees = np.degrees(part.rows("phase_error_rad"))
         _band(error, seconds, degrees, width)
-        running = degrees[part.rows("segment") >= 0]
+        running = degrees[(part.rows("segment") >= 0) & np.isfinite(degrees)]
         largest = max(largest, float(np.quantile(np.abs(running), 0.995)) if running.size else 0.0)
         start += part.n_rows
     frequency.set(xlabel="time, s", ylabel="oscillator frequency, Hz")
@@ -220,5 +220,6 @@ def _binned(values: np.ndarray, width: int) -> np.ndarray:
 def _band(axis: "Axes", seconds: np.ndarray, values: np.ndarray, width: int) -> None:
     """Mean of each bin as a line, its range as a band: plain decimation would alias the ripple of the detector."""
     rows = _binned(values.astype(float), width)
+    rows = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, np.nan)  # gaps stay gaps
     axis.fill_between(seconds, rows.min(axis=1), rows.max(axis=1), color=MAIN, alpha=0.25, lw=0)
     axis.plot(seconds, rows.mean(axis=1), color=MAIN, lw=0.8)

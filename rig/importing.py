@@ -1,10 +1,10 @@
 """Reading measurements from elsewhere: MAT files with a mapping file that says what is where."""
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.errors import ConfigurationError, RigError
+from rig.configuration import read_toml, validated
+from rig.errors import RigError
 
 if TYPE_CHECKING:
     from identification.frequency_responses import FrequencyResponse
@@ -47,33 +47,9 @@ def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> 
 
 def read_mapping(path: str | Path) -> "FrequencyResponseMapping":
     """Read a mapping from TOML; raises `ConfigurationError` that names each wrong key and its value."""
-    from pydantic import ValidationError
-
     from identification.mapping import FrequencyResponseMapping
 
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"{path}: is no TOML ({error})") from None
-    try:
-        return FrequencyResponseMapping.model_validate(table)
-    except ValidationError as error:
-        wrong = "; ".join(f"{_dotted(item['loc'])}: {item['msg']}{_given(item)}" for item in error.errors())
-        raise ConfigurationError(f"{path}: {wrong}") from None
-
-
-def _dotted(location: tuple[int | str, ...]) -> str:
-    text = ""
-    for step in location:
-        text += f"[{step}]" if isinstance(step, int) else f"{text and '.'}{step}"
-    return text
-
-
-def _given(item: Any) -> str:
-    """Say what was given, where it is worth showing."""
-    return "" if item["type"] == "missing" or isinstance(item["input"], dict) else f" (is {item['input']!r})"
+    return validated(FrequencyResponseMapping, read_toml(Path(path)), str(path))
 
 
 def _read_mat(path: Path) -> dict[str, Any]:

@@ -60,7 +60,9 @@ class BackbonePlan(Configured):
     accepted_phase_error_deg: float = Field(3.0, gt=0, le=180)
     """Largest phase error of the recorded fundamental with which a point is accepted, deg."""
     on_failure: Literal["skip", "stop"] = "skip"
-    """What follows when a point does not settle, is disturbed, loses its lock or is out of reach."""
+    """What follows when a point does not settle, is disturbed or is out of reach: the next point, or a ramp-down."""
+    on_lost_lock: Literal["skip", "stop"] = "stop"
+    """What follows when a lock is lost at a held level: ``stop`` trips, ``skip`` seeks it again at the next level."""
 
     @model_validator(mode="after")
     def _levels_make_sense(self) -> Self:
@@ -116,7 +118,7 @@ class BackbonePlan(Configured):
         A point whose predecessor is done is approached from its predecessor's level, so that it is reached from the
         recorded direction.
         """
-        failure = OnFailure.SKIP if self.on_failure == "skip" else OnFailure.STOP
+        failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
         targets = self.targets()
         out: list[Segment] = []
         at: float | None = None
@@ -129,8 +131,8 @@ class BackbonePlan(Configured):
                 out.append(Segment(SegmentKind.HOLD, -1, before, self._hold_periods))
             number, level = target.number, target.level
             out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods))
-            out.append(Segment(SegmentKind.SETTLE, number, level, self.settle.longest_periods, failure))
-            out.append(Segment(SegmentKind.RECORD, number, level, self.record_periods + 1.0, failure))
+            out.append(Segment(SegmentKind.SETTLE, number, level, self.settle.longest_periods, failure, lost))
+            out.append(Segment(SegmentKind.RECORD, number, level, self.record_periods + 1.0, failure, lost))
             at = level
         return tuple(out)
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -20,6 +21,8 @@ WHY = {
     Outcome.UNREACHABLE: "out of reach: the output stood at its voltage limit",
     Outcome.INTERRUPTED: "interrupted",
 }
+
+POLARITY_DEG = 60.0  # a phase error that large is no matter of patience
 
 
 def measured_point(
@@ -40,6 +43,7 @@ def measured_point(
             harmonics=plan.harmonics,
             phase_lag_target_deg=plan.controller.phase_lag_deg + 180.0,
         )
+        vibration = without_skew(vibration, bench)
         mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
     except IdentificationError as error:
         return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
@@ -75,6 +79,14 @@ def measured_point(
     }
 
 
+def without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
+    """The vibration with every channel's harmonics turned forward by its skew: ``Y_h exp(i h Omega tau)``."""
+    omega = 2.0 * math.pi * vibration.frequency_hz
+    delay_s = np.array([channel.skew_samples for channel in bench.channels]) / bench.sample_rate_hz
+    turn = np.exp(1j * omega * np.outer(delay_s, np.arange(vibration.harmonics.shape[1])))
+    return replace(vibration, harmonics=vibration.harmonics * turn)
+
+
 def failed_point(plan: BackbonePlan, target: Target, outcome: np.void) -> dict[str, Any]:
     """The mark of a point that was not measured, with the reason; it holds no data."""
     code = Outcome(int(outcome["outcome"]))
@@ -82,6 +94,8 @@ def failed_point(plan: BackbonePlan, target: Target, outcome: np.void) -> dict[s
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle.longest_periods)
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
         why += f" (averaged phase error {error:.2f} deg, amplitude drift {100.0 * drift:.2f} %)"
+        if abs(error) > POLARITY_DEG:
+            why += "; is a sensor's polarity reversed, or the resonance outside the frequency window?"
     return {
         **_head(plan, target),
         "settled": False,

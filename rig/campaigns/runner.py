@@ -47,12 +47,18 @@ class Progress(Protocol):
     def advance(self, rows: np.ndarray, tick: Tick) -> None:
         """A chunk of telemetry has come in."""
 
+    def remark(self, text: str) -> None:
+        """The driver has something to say about the bench."""
+
 
 class _Silent:
     def point(self, point: dict[str, Any], number: int, total: int) -> None:
         pass
 
     def advance(self, rows: np.ndarray, tick: Tick) -> None:
+        pass
+
+    def remark(self, text: str) -> None:
         pass
 
 
@@ -78,7 +84,7 @@ def carry_out(
         raise RecordingError(f"{existing[0]}: exists already; choose another name, or --overwrite")
     if not output.parent.is_dir():
         raise RecordingError(f"{output.parent}: there is no such folder")
-    with make_daq(bench, seed) as daq:
+    with _armable(bench, seed) as daq:
         daq.start(bench.block)
         tick = _tick(plan, bench, daq, plan.segments())
         for path in existing:
@@ -122,7 +128,7 @@ def take_up(
             finalise(journal_path(output), output)
         return Recording(output)
     # A further part draws its own noise: the same seed again would repeat the first part's.
-    with make_daq(bench, seed + parts) as daq:
+    with _armable(bench, seed + parts) as daq:
         daq.start(bench.block)
         tick = _tick(plan, bench, daq, segments)
         with continue_recording(output) as journal:
@@ -147,9 +153,15 @@ def check(plan: BackbonePlan, bench: Bench) -> None:
         )
 
 
-def _tick(plan: BackbonePlan, bench: Bench, daq: DAQ, segments: tuple[Segment, ...]) -> Tick:
+def _armable(bench: Bench, seed: int) -> DAQ:
+    """The bench's driver, not yet open; refused where something physical would move."""
+    daq = make_daq(bench, seed)
     if not daq.capabilities.virtual:
         raise ConfigurationError(f"bench {bench.name}: only virtual rigs can be armed by this version")
+    return daq
+
+
+def _tick(plan: BackbonePlan, bench: Bench, daq: DAQ, segments: tuple[Segment, ...]) -> Tick:
     lead = bench.block + daq.latency_samples
     return Tick(bench, plan.controller, plan.amplitude_law, plan.settle, segments, lead)
 
@@ -182,6 +194,9 @@ class _Run:
     def go(self, first_sample: int) -> None:
         """Run to the end of the plan or of what can be done of it; raises only what could not be recorded."""
         self._write(self.journal.part, {"first_sample": first_sample, "points_done": self.finished})
+        for remark in self.daq.remarks:
+            self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
+            self.progress.remark(remark)
         with _stop_on_signals(self.tick):
             for rows in self.loop.run():
                 self._write(self.journal.rows, rows)
@@ -191,7 +206,7 @@ class _Run:
         self._mark_interrupted()
         self._write(self.journal.end, self._end())
         if self.write_error is not None:
-            raise self.write_error
+            raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
 
     def _write(self, method: Any, what: Any) -> None:
         """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""

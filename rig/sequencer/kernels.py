@@ -188,7 +188,7 @@ def advance(
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
         if failure != RUNNING:
             close_segment(progress, outcomes, settling, failure, cycle, sample)
-            if segment.on_failure == STOP:
+            if (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
                 progress.finished = 1
                 shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
             else:

@@ -49,7 +49,9 @@ class OnFailure(IntEnum):
 
 RAMP, SETTLE, RECORD, HOLD = (int(kind) for kind in SegmentKind)
 
-SEGMENT = np.dtype([("kind", "i8"), ("point", "i8"), ("level", "f8"), ("periods", "f8"), ("on_failure", "i8")])
+SEGMENT = np.dtype(
+    [("kind", "i8"), ("point", "i8"), ("level", "f8"), ("periods", "f8"), ("on_failure", "i8"), ("on_lost_lock", "i8")]
+)
 """One segment of a plan; ``level`` in V or N after the plan's amplitude law."""
 
 OUTCOME = np.dtype(

@@ -47,6 +47,7 @@ class Segment:
     level: float
     periods: float
     on_failure: OnFailure = OnFailure.SKIP
+    on_lost_lock: OnFailure = OnFailure.STOP
 
 
 def segment_table(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
@@ -54,7 +55,8 @@ def segment_table(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
     table = np.zeros(len(segments), SEGMENT)
     for row, segment in zip(table, segments, strict=True):
         row["kind"], row["point"], row["level"] = segment.kind, segment.point, segment.level
-        row["periods"], row["on_failure"] = segment.periods, segment.on_failure
+        row["periods"] = segment.periods
+        row["on_failure"], row["on_lost_lock"] = segment.on_failure, segment.on_lost_lock
     outcomes = np.zeros(len(segments), OUTCOME)
     outcomes["mean_error_rad"] = np.nan
     outcomes["drift"] = np.nan

@@ -191,9 +191,9 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
     loop.theta = advance_phase(loop.theta, loop.omega, law.dt_s)
     loop.sample = now + 1
 
-    row.phase_error_rad = loop.error
+    row.phase_error_rad = loop.error if present else math.nan
     row.flags = flags
-    row.segment = progress.segment if running else -1
+    row.segment = progress.segment if running and progress.segment < progress.segments else -1
     row.lock = t.lock[0].state
     row.guard = guard.mode
     return float(output)

@@ -66,7 +66,7 @@ ROW_COLUMNS: tuple[dict[str, str], ...] = (
     {
         "name": "phase_error_rad",
         "unit": "rad",
-        "description": "wanted minus measured phase lag, as the detector sees it",
+        "description": "wanted minus measured phase lag, as the detector sees it; NaN while searching",
     },
     {
         "name": "flags",

@@ -69,8 +69,7 @@ def test_the_sign_detector_locks_where_its_own_mean_vanishes_and_the_file_says_h
     for level, truth in zip(levels, sign_lock(ONE_SIDED, levels), strict=True):
         point = points[level]
         assert point["frequency_hz"] == pytest.approx(truth.frequency_hz, rel=5e-4)
-        # the file's phase error is of the displacement's lag, positive behind resonance
-        assert point["phase_error_deg"] == pytest.approx(truth.lag_deg + 90.0, abs=2.5)
+        assert point["phase_error_deg"] == pytest.approx(-90.0 - truth.lag_deg, abs=2.5)
         assert abs(point["phase_error_deg"]) > 5.0
 
 

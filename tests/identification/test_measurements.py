@@ -14,7 +14,7 @@ from tests.identification.rigs import CHANNELS, one_mode_point
 def test_the_phase_lag_is_that_of_the_displacement_whatever_is_measured(unit: str, lag_deg: float) -> None:
     point = one_mode_point(lag_deg, unit=unit)
     assert point.phase_lag_deg == pytest.approx(lag_deg, abs=1e-9)
-    assert point.phase_error_deg == pytest.approx(lag_deg - 90.0, abs=1e-9)
+    assert point.phase_error_deg == pytest.approx(90.0 - lag_deg, abs=1e-9)
     assert point.amplitude_m == pytest.approx(one_mode_point(lag_deg, unit="m").amplitude_m, rel=1e-12)
 
 

@@ -198,6 +198,8 @@ def test_a_mistake_is_answered_in_one_line_and_leaves_no_file(command, tmp_path,
         (("[0.4, 0.8]", "[0.4, 0.4]"), "given twice"),
         (("[0.4, 0.8]", "[0.4, nan]"), "levels_v[1]"),
         (("record_periods = 20", 'record_periods = "twenty"'), "record_periods = 'twenty'"),
+        (("record_periods = 20", "record_periods = true"), "record_periods = True"),
+        (("k1 = 2.0", 'k1 = "2"'), "controller.k1 = '2'"),
         (("record_periods = 20", "record_periods = 0"), "greater than or equal to 4"),
         (("k2 = 6.283185307179586", "k2 = -1"), "controller.k2 = -1"),
         (("k2 = 6.283185307179586", ""), "controller.k2: is missing"),
@@ -215,6 +217,35 @@ def test_a_bad_plan_is_refused_with_path_value_and_what_is_allowed(command, tmp_
     assert named in err
     assert len(err.strip().splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
+
+
+def test_an_existing_model_is_not_overwritten_unasked(command, recording, tmp_path):
+    (tmp_path / "model.h5").write_text("precious")
+    status, _, err = command(f"identify {recording} -o model.h5")
+    assert status == 1
+    assert "exists already" in err
+    assert (tmp_path / "model.h5").read_text() == "precious"
+    assert command(f"identify {recording} -o model.h5 --overwrite")[0] == 0
+
+
+def test_a_bench_of_ones_own_starts_from_a_shipped_one(command, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        'base = "magnet-beam"\nname = "mine"\n[limits]\nvoltage_v = 0.5\n[driver.options]\nnoise_scale = 0.0\n'
+    )
+    (tmp_path / "plan.toml").write_text(PLAN)
+    status, _, err = command("run plan.toml -o run.h5 --bench mine.toml")
+    assert status == 1
+    assert "levels_v[1] = 0.8 V: the bench mine allows up to 0.5 V" in err
+    (tmp_path / "bad.toml").write_text('base = "nosuch"\n')
+    assert "base = 'nosuch'" in command("run plan.toml -o run.h5 --bench bad.toml")[2]
+
+
+def test_facts_of_the_bench_that_are_not_those_of_its_virtual_rig_are_remarked(command, tmp_path):
+    (tmp_path / "odd.toml").write_text('base = "magnet-beam"\n[specimen]\ndrive_mode_shape = 0.7\n')
+    (tmp_path / "plan.toml").write_text(PLAN)
+    status, _, err = command("run plan.toml -o run.h5 --bench odd.toml")
+    assert status == 0
+    assert "drive_mode_shape = 0.7: the virtual specimen has 0.908466" in err
 
 
 def test_debug_shows_the_traceback(command, monkeypatch):

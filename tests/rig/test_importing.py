@@ -61,11 +61,11 @@ def test_a_missing_path_names_both_files_and_what_there_is(mat_path: Path, tmp_p
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('force = "N"', 'force = "lbf"', r"units\.force: .*'N', 'mN' or 'kN' \(is 'lbf'\)"),
-        ('unit = "rad"', 'unit = "rad"\nsign = 1', r"phase\.sign: .*not permitted"),
-        ('values = "peak"', "", r"units\.values: Field required"),
-        ("[5, 20,", "[-5, 20,", r"sets\[1\]\.level_values\[0\]: .*greater than 0 \(is -5\)"),
-        ("[units]", "[units", r"is no TOML"),
+        ('force = "N"', 'force = "lbf"', r"units\.force = 'lbf': allowed is 'N', 'mN' or 'kN'"),
+        ('unit = "rad"', 'unit = "rad"\nsign = 1', r"phase\.sign: unknown key"),
+        ('values = "peak"', "", r"units\.values: is missing"),
+        ("[5, 20,", "[-5, 20,", r"sets\[1\]\.level_values\[0\] = -5: allowed is greater than 0"),
+        ("[units]", "[units", r"is not TOML"),
     ],
 )
 def test_a_wrong_mapping_is_named_in_one_line(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -81,7 +81,7 @@ def test_a_wrong_mapping_is_named_in_one_line(tmp_path: Path, old: str, new: str
 def test_files_that_cannot_be_read_are_said_so(tmp_path: Path) -> None:
     with pytest.raises(ImportFailed, match=r"nowhere\.mat: there is no such file"):
         read_frequency_responses(tmp_path / "nowhere.mat", EXAMPLE)
-    with pytest.raises(ConfigurationError, match=r"nowhere\.toml: cannot be read \(No such file"):
+    with pytest.raises(ConfigurationError, match=r"nowhere\.toml: there is no such file"):
         read_mapping(tmp_path / "nowhere.toml")
 
 

@@ -203,6 +203,36 @@ def test_a_sensor_that_reads_only_noise_gives_no_point(tmp_path, monkeypatch, ch
         assert "frequency_hz" not in recording.points[0]
 
 
+def test_skew_between_channels_is_taken_out_of_loop_and_points_alike(tmp_path, monkeypatch, whole):
+    """The drive channel two samples late: declared, the points are those of a rig without skew."""
+    exchange, late = VirtualDAQ._exchange, []
+
+    def skewed(self, voltages, inputs):
+        exchange(self, voltages, inputs)
+        drive = np.concatenate([late[-1] if late else np.zeros(2), inputs[:, 1]])
+        late.append(drive[-2:].copy())
+        inputs[:, 1] = drive[:-2]
+
+    monkeypatch.setattr("rig.campaigns.runner.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr(VirtualDAQ, "_exchange", skewed)
+    channels = [channel.model_dump() for channel in bench_with().channels]
+    channels[1]["skew_samples"] = 2.0
+    bench = bench_with({"channels": channels, "block": 10})
+    with carry_out(plan_with(), bench, tmp_path / "run.h5", seed=1) as recording:
+        points = {point["number"]: point for point in recording.points}
+    _same_points(points, whole)
+
+
+def test_a_reversed_sensor_gives_no_point_and_a_hint(tmp_path):
+    channels = [channel.model_dump() for channel in bench_with().channels]
+    channels[1]["sensitivity_v_per_unit"] *= -1
+    settle = SettleRule(longest_periods=150).model_dump()
+    plan = plan_with(levels_v=(0.4,), settle=settle)
+    with carry_out(plan, bench_with({"channels": channels}), tmp_path / "run.h5") as recording:
+        assert not recording.complete
+        assert "polarity" in recording.points[0]["reason"]
+
+
 def test_a_plan_that_says_stop_ends_at_the_first_failed_point(tmp_path):
     law = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 29.0, "frequency_window_hz": (28.0, 30.0)}
     settle = SettleRule(longest_periods=80).model_dump()

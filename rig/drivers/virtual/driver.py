@@ -16,6 +16,7 @@ from simulators.virtual_rig import VirtualRig
 
 __all__ = ["VirtualDAQ"]
 
+FACT_TOLERANCE = 1e-3
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 
 
@@ -43,10 +44,13 @@ class VirtualDAQ(DAQ):
         queue = {key: options.pop(key) for key in list(options) if key in Queue.model_fields}
         self._queue_options = validated(Queue, queue, "driver.options")
         converter = {"sample_rate_hz": bench.sample_rate_hz, "dac_range_v": bench.output_range_v}
+        if "seed" in options:
+            raise ConfigurationError("driver.options.seed: is given to the run (--seed), not to the bench")
         options["converter"] = {**converter, **options.get("converter", {})}
         self.rig = validated(VirtualRig, options, "driver.options")
         self._compare_channels()
         self._seed = seed
+        self._specimen = bench.specimen
         self._queue = np.zeros(0)
         self._counts = np.zeros(len(Flag), np.int64)
         self._first = 0
@@ -61,6 +65,30 @@ class VirtualDAQ(DAQ):
                 f"driver.options.converter.sample_rate_hz = {self.rig.converter.sample_rate_hz:g}: "
                 f"allowed is the bench's {self.sample_rate_hz:g}"
             )
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Where the bench's facts differ from what the virtual rig is made of."""
+        out = []
+        for channel, sensor in zip(self.channels, self.rig.sensors, strict=True):
+            if channel.sensitivity_v_per_unit != sensor.sensitivity_v_per_unit:
+                out.append(
+                    f"channel {channel.name}: the bench says {channel.sensitivity_v_per_unit:g} V per {channel.unit}, "
+                    f"the virtual sensor has {sensor.sensitivity_v_per_unit:g}"
+                )
+        modes, facts = self.rig.linear_modes, self._specimen
+        mode = int(np.argmin(np.abs(modes.frequency_hz - facts.linear_frequency_hz)))
+        shape, frequency_hz = float(modes.drive_shape[mode]), float(modes.frequency_hz[mode])
+        if facts.drive_mode_shape is not None and abs(facts.drive_mode_shape / shape - 1.0) > FACT_TOLERANCE:
+            out.append(
+                f"specimen.drive_mode_shape = {facts.drive_mode_shape:g}: the virtual specimen has {shape:.6g}; "
+                "the damping goes with its square"
+            )
+        if abs(facts.linear_frequency_hz / frequency_hz - 1.0) > FACT_TOLERANCE:
+            out.append(
+                f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g}: the virtual specimen has {frequency_hz:.6g} Hz"
+            )
+        return tuple(out)
 
     @property
     def capabilities(self) -> Capabilities:

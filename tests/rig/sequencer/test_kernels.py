@@ -87,11 +87,11 @@ class Walk:
         return [Outcome(int(code)).name for code in self.outcomes["outcome"]]
 
 
-def _point(number, level, on_failure=OnFailure.SKIP):
+def _point(number, level, on_failure=OnFailure.SKIP, on_lost_lock=OnFailure.STOP):
     return (
         Segment(SegmentKind.RAMP, number, level, 10.0),
-        Segment(SegmentKind.SETTLE, number, level, 30.0, on_failure),
-        Segment(SegmentKind.RECORD, number, level, 20.0, on_failure),
+        Segment(SegmentKind.SETTLE, number, level, 30.0, on_failure, on_lost_lock),
+        Segment(SegmentKind.RECORD, number, level, 20.0, on_failure, on_lost_lock),
     )
 
 
@@ -125,16 +125,17 @@ def test_a_point_that_does_not_settle_stops_a_plan_that_says_so():
     assert EndReason(int(walk.guard["reason"][0])) is EndReason.PLAN_STOPPED
 
 
-def test_a_lost_lock_fails_the_point_and_is_sought_again_at_the_next_level():
-    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(12)
+def test_a_lost_lock_fails_the_point_and_is_sought_again_where_the_plan_says_so():
+    skip = OnFailure.SKIP
+    walk = Walk(*_point(0, 1.0, on_lost_lock=skip), *_point(1, 2.0)).go(12)
     walk.lock["state"] = LockState.LOST
     walk.go(1)
     assert walk.codes()[:3] == ["DONE", "LOST_LOCK", "SKIPPED"]
     assert LockState(int(walk.lock["state"][0])) is LockState.ACQUIRING
 
 
-def test_a_lost_lock_trips_a_plan_that_stops():
-    walk = Walk(*_point(0, 1.0, OnFailure.STOP)).go(12)
+def test_a_lost_lock_trips_unless_the_plan_says_otherwise():
+    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(12)
     walk.lock["state"] = LockState.LOST
     walk.go(1)
     assert EndReason(int(walk.guard["reason"][0])) is EndReason.LOST_LOCK

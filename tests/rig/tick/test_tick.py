@@ -93,5 +93,5 @@ def test_a_lead_below_one_sample_is_refused():
 
 def test_a_law_that_the_bench_cannot_sample_is_refused():
     law = preset("friction-beam").model_copy(update={"frequency_window_hz": (100.0, 1400.0)})
-    with pytest.raises(ConfigurationError, match="controller.frequency_window_hz"):
+    with pytest.raises(ConfigurationError, match=r"controller\.frequency_window_hz"):
         _tick(1.5, law=law)
