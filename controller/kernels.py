@@ -102,8 +102,10 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     if lock.state == SEARCHING:
         lock.state = ACQUIRING
     lock.close_periods = lock.close_periods + 1 if size < thresholds.locked_rad else 0
-    if size > thresholds.lost_rad:
-        lock.far_periods += 1 if held else 0
+    if size > thresholds.lost_rad and held:
+        lock.far_periods += 1
+    elif size > thresholds.lost_rad and lock.state == LOCKED:
+        lock.state = ACQUIRING
     else:
         lock.far_periods = 0
     if lock.close_periods >= thresholds.locked_periods:

@@ -35,6 +35,12 @@ class LockRule(BaseModel):
     lost_periods: int = Field(20, ge=1, le=1000)
     """Far periods in a row, at a held level, that lose a lock."""
 
+    @model_validator(mode="after")
+    def _ordered(self) -> "LockRule":
+        if self.lost_deg <= self.locked_deg:
+            raise ValueError(f"lost_deg = {self.lost_deg:g}: allowed is above locked_deg = {self.locked_deg:g}")
+        return self
+
     def build(self, smallest_force_n: float, smallest_response: float) -> np.ndarray:
         """Thresholds record; the smallest amplitudes (N and the response's unit) come from the bench's sensors."""
         out = np.zeros(1, THRESHOLDS)

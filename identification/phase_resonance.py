@@ -109,7 +109,11 @@ def nonlinear_mode(
 
 
 def _identify(number: int, point: PeriodicVibration, backbone: Backbone, shapes: ModeShapes | None) -> _PointMode:
-    """Modal properties of one point, from ``D = (phi_d F / q) exp(i psi) = w^2 - W^2 + 2 i W w z``."""
+    """Modal properties of one point, from ``D = (phi_d F / q) exp(i psi) = w^2 + s^2 + 2 s w z`` with ``s = i W + sigma``.
+
+    sigma is the rate at which the fundamental of the motion still drifted, relative to it: what a growing vibration
+    stores, and a decaying one returns, is no damping. To first order ``D = w^2 - W^2 + 2 i W (w z + sigma)``.
+    """
     name = f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)"
     if not point.settled:
         raise IdentificationError(f"{name}: is not settled; use backbone.settled() to leave such points out")
@@ -129,7 +133,10 @@ def _identify(number: int, point: PeriodicVibration, backbone: Backbone, shapes:
     omega = 2.0 * np.pi * point.frequency_hz
     lag = np.radians(point.phase_lag_deg)
     stiffness = point.amplitude_m * point.force_n / q**2
-    squared = omega**2 + stiffness * np.cos(lag)
+    sigma = _drift_rate(point)
+    # The slope of a line over -1/2 ... 1/2 has the variance of its mean times twelve.
+    sigma_std = 0.0 if point.drift is None else np.sqrt(12.0) * motion_std * point.frequency_hz / point.periods
+    squared = omega**2 + stiffness * np.cos(lag) + 2.0 * omega * sigma.imag
     if squared <= 0.0:
         raise IdentificationError(
             f"{name}: phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency, must be near 90 deg; "
@@ -140,18 +147,31 @@ def _identify(number: int, point: PeriodicVibration, backbone: Backbone, shapes:
     angle_std = float(np.hypot(force_std, motion_std))
     real_std = stiffness * np.hypot(np.cos(lag) * magnitude_std, np.sin(lag) * angle_std)
     imag_std = stiffness * np.hypot(np.sin(lag) * magnitude_std, np.cos(lag) * angle_std)
-    modal_std = real_std / (2.0 * modal)
-    damping = powers[0] / (omega**2 * modal * q**2)
+    modal_std = np.hypot(real_std / (2.0 * modal), sigma_std * omega / modal)
+    scale = omega**2 * modal * q**2
+    stored = sigma.real / modal
+    damping = powers[0] / scale - stored
     return _PointMode(
         modal_amplitude=q,
         modal_frequency_hz=modal / (2.0 * np.pi),
         modal_frequency_std_hz=float(modal_std / (2.0 * np.pi)),
         damping_ratio=damping,
-        damping_ratio_std=float(np.hypot(imag_std / (2.0 * omega * modal), damping * modal_std / modal)),
-        damping_ratio_total_power=float(np.sum(powers)) / (omega**2 * modal * q**2),
+        damping_ratio_std=float(
+            np.sqrt(
+                (imag_std / (2.0 * omega * modal)) ** 2 + (damping * modal_std / modal) ** 2 + (sigma_std / modal) ** 2
+            )
+        ),
+        damping_ratio_total_power=float(np.sum(powers)) / scale - stored,
         damping_ratio_uncorrected=powers[0] / (omega**3 * q**2),
         apparent_mass_kg=(q / point.amplitude_m) ** 2,
     )
+
+
+def _drift_rate(point: PeriodicVibration) -> complex:
+    """Relative rate of change (1/s) of the fundamental of the drive point's motion; 0 where the drift is not known."""
+    if point.drift is None:
+        return 0j
+    return complex(point.drift[find_role(point.channels, "drive")]) * point.frequency_hz / point.periods
 
 
 def _active_powers(point: PeriodicVibration) -> NDArray[np.float64]:
@@ -193,11 +213,11 @@ def _notes(backbone: Backbone, shapes: ModeShapes | None) -> tuple[str, ...]:
         notes.append(
             "the force draws power from the specimen (negative lag): check the polarity of force and drive channel"
         )
-    away = [wrapped_deg(point.phase_lag_deg - 90.0) for point in backbone.points]
+    away = [wrapped_deg(90.0 - point.phase_lag_deg) for point in backbone.points]
     worst = int(np.argmax(np.abs(away)))
     if abs(away[worst]) > _FAR_FROM_RESONANCE_DEG:
         notes.append(
-            f"up to {away[worst]:.1f} deg away from phase resonance (point {worst}): corrected for by the one-mode "
+            f"up to {away[worst]:.1f} deg away from phase resonance (point {worst + 1}): corrected for by the one-mode "
             "equation, which holds near resonance"
         )
     return tuple(notes)

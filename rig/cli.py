@@ -222,7 +222,7 @@ def identify(
 
     if model != NONLINEAR_MODE:
         raise ConfigurationError(f"--model = {model!r}: allowed is {NONLINEAR_MODE}")
-    _keep_existing(output, overwrite)
+    _keep_existing(file, output, overwrite)
     save_model(identify_nonlinear_mode(file), output)
     summary = summarise(output)
     if json:
@@ -231,9 +231,13 @@ def identify(
         _print_summary(summary)
 
 
-def _keep_existing(output: Path, overwrite: bool) -> None:
+def _keep_existing(source: Path, output: Path, overwrite: bool) -> None:
     from rig.errors import RecordingError
 
+    if output.is_dir():
+        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
+    if output.exists() and source.exists() and output.samefile(source):
+        raise RecordingError(f"{output}: is the file that is read; choose another name")
     if output.exists() and not overwrite:
         raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")
 
@@ -267,7 +271,7 @@ def import_(
 
     if format_ != "mat":
         raise ConfigurationError(f"--format = {format_!r}: allowed is mat")
-    _keep_existing(output, overwrite)
+    _keep_existing(file, output, overwrite)
     save_frequency_responses(read_frequency_responses(file, mapping), output)
     summary = summarise(output)
     if json:
@@ -293,7 +297,7 @@ def doctor(json: Json = False) -> None:
 
 
 def main() -> None:
-    """Entry point of the command: 0 on success, 1 on an error, 2 on wrong use, 130 when interrupted."""
+    """Entry point of the command: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if stopped elsewhere."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     try:

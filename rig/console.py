@@ -1,5 +1,6 @@
 """What a person sees on the terminal: progress of a run, tables, and quiet lines where there is no terminal."""
 
+import contextlib
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -52,7 +53,7 @@ class RunProgress:
     """Writes a line for each point, and on a terminal a status line below that follows the loop."""
 
     def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._finished = 0
 
     def point(self, point: dict[str, Any], number_done: int, total: int) -> None:
@@ -85,11 +86,10 @@ class RunProgress:
         last = rows[-1]
         seconds = tick.sample / tick.bench.sample_rate_hz
         state = LOCK_WORDS[int(last["lock"])]
-        sys.stderr.write(
+        self._status(
             f"\r\x1b[2K{seconds:8.1f} s  {float(last['frequency_hz']):9.4f} Hz  "
             f"{abs(complex(last['command_v'])):7.4f} V  {state}  {self._finished} points done"
         )
-        sys.stderr.flush()
 
     def remark(self, text: str) -> None:
         """Print what the driver has to say about the bench."""
@@ -98,9 +98,14 @@ class RunProgress:
     def close(self) -> None:
         """Clear the status line."""
         if self._terminal:
-            sys.stderr.write("\r\x1b[2K")
+            self._status("\r\x1b[2K")
+
+    def _status(self, text: str) -> None:
+        with contextlib.suppress(OSError):  # whoever read this has gone; the run goes on
+            sys.stderr.write(text)
             sys.stderr.flush()
 
     def _print(self, line: str) -> None:
         self.close()
-        print(line, file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):
+            print(line, file=sys.stderr, flush=True)

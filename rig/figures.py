@@ -92,8 +92,16 @@ def _properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = 
                 label="active power of all harmonics",
             )
         right.legend(fontsize=8)
+    else:
+        _say(right, "damping needs the specimen's drive_mode_shape")
     right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping ratio, %")
     _keep_small_changes_small(right)
+
+
+def _say(axis: "Axes", text: str) -> None:
+    """Why a panel is empty."""
+    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED)
+    axis.set(xticks=[], yticks=[])
 
 
 def _keep_small_changes_small(axis: "Axes") -> None:
@@ -174,12 +182,13 @@ def _draw_recording(page: "Figure", recording: Recording) -> None:
     if mode is not None:
         _properties(axes[0, 0], axes[0, 1], mode)
     else:
-        axes[0, 0].text(0.5, 0.5, "no accepted point", ha="center", transform=axes[0, 0].transAxes)
+        for axis in axes[0]:
+            _say(axis, "no accepted point")
     _draw_history(axes[1, 0], axes[1, 1], recording)
     points = {point["number"]: point for point in recording.points}.values()
     left_out = sum(not point["accepted"] for point in points)
     specimen = recording.configuration["bench"]["specimen"]["name"]
-    text = f"{specimen}: {recording.kind} test, {len(points)} points"
+    text = f"{specimen}: {recording.kind} test, {len(points)} point{'' if len(points) == 1 else 's'}"
     _title(page, text + (f", {left_out} not accepted" if left_out else ""))
 
 

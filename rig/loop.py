@@ -94,7 +94,7 @@ class Loop:
             tick_block(self.tick.arrays, np.empty((0, len(self.daq.channels))), readings, rows, np.empty(0))
 
     def _over(self) -> bool:
-        return self.failure is not None or int(self.tick.guard["mode"][0]) == GuardMode.OFF
+        return self.failure is not None or self.tick.over
 
     def _chunk_samples(self) -> int:
         seconds = PACED_CHUNK_S if self.paced or self.daq.capabilities.paced else CHUNK_S

@@ -6,6 +6,7 @@ from identification import Backbone
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.evaluate import backbone_of
+from rig.configuration import validated
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
@@ -19,8 +20,8 @@ def backbone(recording: Recording) -> Backbone:
     """
     if recording.kind != "backbone":
         raise RecordingError(f"the recording is a {recording.kind}, wanted is a backbone")
-    bench = Bench.model_validate(recording.configuration["bench"])
-    plan = BackbonePlan.model_validate(recording.configuration["plan"])
+    bench = validated(Bench, recording.configuration["bench"], "bench of the recording")
+    plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
     latest = {point["number"]: point for point in recording.points}
     return backbone_of(
         [latest[number] for number in sorted(latest)],

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.campaigns.backbone import BackbonePlan
+from rig.configuration import validated
 from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -22,6 +23,7 @@ POINT_KEYS = (
     "amplitude_m",
     "phase_error_deg",
     "phase_scatter_deg",
+    "frequency_scatter",
     "force_purity",
     "response_purity",
     "settled",
@@ -63,7 +65,9 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "software_version": recording.software_version,
         "seed": recording.seed,
         "complete": recording.complete,
-        "points_planned": len(BackbonePlan.model_validate(recording.configuration["plan"]).targets()),
+        "points_planned": len(
+            validated(BackbonePlan, recording.configuration["plan"], "plan of the recording").targets()
+        ),
         "points": [{key: latest[number].get(key) for key in POINT_KEYS} for number in sorted(latest)],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {

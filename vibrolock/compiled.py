@@ -7,13 +7,13 @@ numba's own cache does not notice when a kernel that is called from another file
 carries a hash of all kernel sources and record layouts of the distribution, and a changed source starts an empty folder.
 """
 
-import getpass
+import contextlib
 import hashlib
 import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
@@ -49,11 +49,10 @@ def _source_hash() -> str:
 def kernel_cache_folder() -> Path:
     """Folder that holds the machine code of exactly these kernel sources; made if need be.
 
-    ``NUMBA_CACHE_DIR``, where set, is the parent; else the user's cache folder; else a temporary one where neither
-    can be written.
+    Below ``NUMBA_CACHE_DIR``, ``XDG_CACHE_HOME`` or ``~/.cache``, the first that can be written; else a temporary folder of
+    this process alone, for machine code is loaded from it and nobody else may have put it there.
     """
-    base = Path(os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for parent in (base / "vibrolock", Path(tempfile.gettempdir()) / f"vibrolock-{getpass.getuser()}"):
+    for parent in _possible_parents():
         folder = parent / _source_hash()
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -63,6 +62,14 @@ def kernel_cache_folder() -> Path:
         _remove_unused(parent)
         return folder
     return Path(tempfile.mkdtemp(prefix="vibrolock-"))
+
+
+def _possible_parents() -> Iterator[Path]:
+    for variable in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        if os.environ.get(variable):
+            yield Path(os.environ[variable]) / "vibrolock"
+    with contextlib.suppress(RuntimeError):  # a user without a home
+        yield Path.home() / ".cache" / "vibrolock"
 
 
 def _remove_unused(parent: Path) -> None:

@@ -59,6 +59,9 @@ class BackbonePlan(Configured):
     """When a point counts as settled."""
     accepted_phase_error_deg: float = Field(3.0, gt=0, le=180)
     """Largest phase error of the recorded fundamental with which a point is accepted, deg."""
+    accepted_frequency_scatter: float = Field(1e-3, gt=0, le=1)
+    """Largest scatter of the frequency from period to period, relative, with which a point is accepted: a loop that hunts
+    has not settled, whatever its averages say."""
     on_failure: Literal["skip", "stop"] = "skip"
     """What follows when a point does not settle, is disturbed or is out of reach: the next point, or a ramp-down."""
     on_lost_lock: Literal["skip", "stop"] = "stop"

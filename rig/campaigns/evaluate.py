@@ -23,6 +23,7 @@ WHY = {
 }
 
 POLARITY_DEG = 60.0  # a phase error that large is no matter of patience
+FEW_BITS = 20.0  # below, quantisation may move the damping by a percent, without noise to dither it
 
 
 def measured_point(
@@ -34,6 +35,7 @@ def measured_point(
     """
     point = _head(plan, target)
     channels = _channels(bench)
+    rows = rows[_within(rows["theta_rad"], plan.record_periods)]
     try:
         vibration = periodic_vibration(
             rows["theta_rad"].astype(float),
@@ -45,25 +47,32 @@ def measured_point(
         )
         vibration = without_skew(vibration, bench)
         mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
-    except IdentificationError as error:
+    except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     error_deg = vibration.phase_error_deg
-    accepted = abs(error_deg) <= plan.accepted_phase_error_deg
+    hunting = _frequency_scatter(rows["theta_rad"])
+    reason = ""
+    if abs(error_deg) > plan.accepted_phase_error_deg:
+        reason = f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
+    elif hunting > plan.accepted_frequency_scatter:
+        reason = (
+            f"the loop hunts: the frequency scatters by {100.0 * hunting:.2f} % from period to period, "
+            f"accepted up to {100.0 * plan.accepted_frequency_scatter:g} %"
+        )
     damping = float(mode.damping_ratio[0])
     scatter = rows["phase_error_rad"].astype(float)
     return {
         **point,
         "settled": True,
-        "accepted": accepted,
-        "reason": ""
-        if accepted
-        else f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg",
+        "accepted": not reason,
+        "reason": reason,
         "force_n": vibration.force_n,
         "frequency_hz": vibration.frequency_hz,
         "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
         "damping_ratio": damping if math.isfinite(damping) else None,
         "amplitude_m": vibration.amplitude_m,
         "phase_error_deg": error_deg,
+        "frequency_scatter": hunting,
         "phase_scatter_deg": math.degrees(float(scatter.std())),
         "voltage_v": float(np.abs(rows["command_v"]).mean()),
         "force_purity": float(mode.force_purity[0]),
@@ -75,8 +84,35 @@ def measured_point(
         "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
         "residual_rms": vibration.residual_rms.tolist(),
         "drift": None if vibration.drift is None else _pairs(vibration.drift),
-        "warnings": list(vibration.warnings),
+        "warnings": [*vibration.warnings, *_coarse(vibration, bench)],
     }
+
+
+def _within(theta_rad: np.ndarray, periods: int) -> slice:
+    """The rows of the first so many periods, and one sample more."""
+    turned = np.unwrap(theta_rad.astype(float))
+    return slice(0, int(np.searchsorted(turned - turned[0], 2.0 * math.pi * periods)) + 1)
+
+
+def _frequency_scatter(theta_rad: np.ndarray) -> float:
+    """Standard deviation of the frequency of single periods, relative to its mean."""
+    turned = np.unwrap(theta_rad.astype(float))
+    turns = (turned - turned[0]) / (2.0 * math.pi)
+    ends = np.interp(np.arange(int(turns[-1]) + 1), turns, np.arange(turns.size))
+    lengths = np.diff(ends)
+    return float(lengths.std() / lengths.mean()) if lengths.size > 1 else 0.0
+
+
+def _coarse(vibration: PeriodicVibration, bench: Bench) -> list[str]:
+    """A remark for each of force and drive whose fundamental is only some bits of its converter high."""
+    out = []
+    for channel, harmonics in zip(bench.channels, vibration.harmonics, strict=True):
+        bits = abs(harmonics[1] * channel.sensitivity_v_per_unit) / channel.resolution_v
+        if channel.role in ("force", "drive") and bits < FEW_BITS:
+            out.append(
+                f"channel {channel.name}: an amplitude of {bits:.1f} bits; quantisation is not in the error bounds"
+            )
+    return out
 
 
 def without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
@@ -92,6 +128,8 @@ def failed_point(plan: BackbonePlan, target: Target, outcome: np.void) -> dict[s
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle.longest_periods)
+    if not math.isfinite(error) and code in (Outcome.NOT_SETTLED, Outcome.DISTURBED):
+        why += ": force or drive signal is too small for its phase to be read"
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
         why += f" (averaged phase error {error:.2f} deg, amplitude drift {100.0 * drift:.2f} %)"
         if abs(error) > POLARITY_DEG:

@@ -3,7 +3,7 @@
 import signal
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -18,12 +18,15 @@ from controller import LockState
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.evaluate import failed_point, measured_point
+from rig.configuration import validated
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, RecordingError
 from rig.loop import Loop
+from rig.recording.arrays import kind_of
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
+from rig.recording.locking import exclusive
 from rig.recording.reader import Recording
 from rig.recording.store import continue_recording, finalise
 from rig.safety.layout import EndReason, GuardMode
@@ -79,16 +82,10 @@ def carry_out(
     raises nothing: the recording's last part says how it ended.
     """
     check(plan, bench)
-    existing = [path for path in (output, journal_path(output)) if path.exists()]
-    if existing and not overwrite:
-        raise RecordingError(f"{existing[0]}: exists already; choose another name, or --overwrite")
-    if not output.parent.is_dir():
-        raise RecordingError(f"{output.parent}: there is no such folder")
+    make_way(output, overwrite)
     with _armable(bench, seed) as daq:
         daq.start(bench.block)
         tick = _tick(plan, bench, daq, plan.segments())
-        for path in existing:
-            path.unlink()
         header = Header(
             kind=plan.kind,
             configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
@@ -99,10 +96,43 @@ def carry_out(
             started=datetime.now(UTC).isoformat(timespec="seconds"),
             seed=seed,
         )
-        with JournalWriter.create(journal_path(output), header) as journal:
+        with _set_aside(output), JournalWriter.create(journal_path(output), header) as journal:
             _Run(plan, bench, daq, tick, journal, realtime, progress or _Silent()).go(first_sample=0)
     finalise(journal_path(output), output)
     return Recording(output)
+
+
+def make_way(output: Path, overwrite: bool) -> None:
+    """Refuse an output that cannot or should not be written: no folder, a folder, a file that exists."""
+    if not output.parent.is_dir():
+        raise RecordingError(f"{output.parent}: there is no such folder")
+    if output.is_dir():
+        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
+    for path in (output, journal_path(output)):
+        if path.exists() and not overwrite:
+            raise RecordingError(f"{path}: exists already; choose another name, or --overwrite")
+    if output.exists():
+        kind_of(output)  # only what is ours is overwritten
+
+
+@contextmanager
+def _set_aside(output: Path) -> Iterator[None]:
+    """Keep an earlier recording under another name until the new one has begun to be written, and put it back if it has not."""
+    journal = journal_path(output)
+    if journal.exists():
+        with exclusive(journal):  # refuses while another run is writing it
+            journal.unlink()
+    aside = output.with_name(output.name + ".before")
+    if output.exists():
+        output.replace(aside)
+    try:
+        yield
+    finally:
+        if aside.exists():
+            if journal.exists():
+                aside.unlink()
+            else:
+                aside.replace(output)
 
 
 def take_up(
@@ -116,8 +146,8 @@ def take_up(
     Points that had failed are tried again. A recording that is complete is returned as it is.
     """
     with Recording(output) as recording:
-        plan = BackbonePlan.model_validate(recording.configuration["plan"])
-        bench = Bench.model_validate(recording.configuration["bench"])
+        plan = validated(BackbonePlan, recording.configuration["plan"], f"{output}: plan")
+        bench = validated(Bench, recording.configuration["bench"], f"{output}: bench")
         done = frozenset(int(point["number"]) for point in recording.points if point["accepted"])
         first_sample = recording.n_rows
         seed = recording.seed or 0
@@ -147,6 +177,17 @@ def check(plan: BackbonePlan, bench: Bench) -> None:
                 f"{name}[{index}] = {level:g} {unit}: the bench {bench.name} allows up to {largest:g} {unit}"
             )
     window, allowed = plan.controller.frequency_window_hz, bench.limits.frequency_hz
+    linear = bench.specimen.linear_frequency_hz
+    if not window[0] < linear < window[1]:
+        raise ConfigurationError(
+            f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
+            f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
+        )
+    highest = int(bench.sample_rate_hz / window[1] / 2.0) - 2
+    if plan.harmonics > highest:
+        raise ConfigurationError(
+            f"harmonics = {plan.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s"
+        )
     if window[0] < allowed[0] or window[1] > allowed[1]:
         raise ConfigurationError(
             f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"
@@ -190,23 +231,36 @@ class _Run:
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept: deque[tuple[int, np.ndarray]] = deque()
         self.write_error: RecordingError | None = None
+        self.failure: Exception | None = None
 
     def go(self, first_sample: int) -> None:
         """Run to the end of the plan or of what can be done of it; raises only what could not be recorded."""
         self._write(self.journal.part, {"first_sample": first_sample, "points_done": self.finished})
         for remark in self.daq.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
-            self.progress.remark(remark)
+            self._attempt(self.progress.remark, remark)
         with _stop_on_signals(self.tick):
             for rows in self.loop.run():
                 self._write(self.journal.rows, rows)
-                self._note_changes(rows)
-                self._collect(rows)
-                self.progress.advance(rows, self.tick)
-        self._mark_interrupted()
+                self._attempt(self._note_changes, rows)
+                self._attempt(self._collect, rows)
+                self._attempt(self.progress.advance, rows, self.tick)
+        self._attempt(self._mark_interrupted)
         self._write(self.journal.end, self._end())
+        if self.failure is not None:
+            raise self.failure
         if self.write_error is not None:
             raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
+
+    def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
+        """Do what is not the loop; where it fails, the rig is ramped down first and the failure raised at the end."""
+        if self.failure is not None:
+            return
+        try:
+            step(*arguments)
+        except Exception as error:  # whatever it is: a driven rig is brought down before anything is said
+            self.failure = error
+            self.tick.request_stop()
 
     def _write(self, method: Any, what: Any) -> None:
         """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""
@@ -221,12 +275,15 @@ class _Run:
     def _note_changes(self, rows: np.ndarray) -> None:
         """Every change of lock state and guard becomes an event, with its sample."""
         first = self.tick.sample - rows.size
+        events = []
         for name, kind in (("lock", LockState), ("guard", GuardMode)):
             values = np.concatenate([[self.last[name]], rows[name]])
             for index in np.flatnonzero(np.diff(values.astype(int))):
                 state = kind(int(rows[name][index])).name.lower()
-                self._write(self.journal.event, {"sample": first + int(index), "what": name, "state": state})
+                events.append({"sample": first + int(index), "what": name, "state": state})
             self.last[name] = int(rows[name][-1])
+        for event in sorted(events, key=lambda event: event["sample"]):
+            self._write(self.journal.event, event)
 
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the point under way, and evaluate the points that are over."""
@@ -300,7 +357,7 @@ class _Run:
 
 @contextmanager
 def _stop_on_signals(tick: Tick) -> Iterator[None]:
-    """While the rig is driven, Ctrl-C and SIGTERM ask for a ramp-down instead of ending the process.
+    """While the rig is driven, Ctrl-C, SIGTERM, a closed terminal and SIGQUIT ask for a ramp-down, and end nothing.
 
     Without effect outside the main thread, where Python delivers no signals.
     """
@@ -311,7 +368,9 @@ def _stop_on_signals(tick: Tick) -> Iterator[None]:
     def ask(number: int, frame: FrameType | None) -> None:
         tick.request_stop()
 
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")  # the last two not on every system
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    before = {number: signal.signal(number, ask) for number in numbers}
     try:
         yield
     finally:

@@ -33,6 +33,13 @@ def shut_down(guard: Record, reason: int, channel: int, value: float, sample: in
     if drop:
         guard.amplitude_v = 0.0
         guard.mode = OFF
+        guard.dropped = 1
+
+
+@kernel
+def is_over(guard: Record, lead: int) -> bool:
+    """Whether nothing is left to do: dropped, or ramped down and the ramp's last sample through the device's queue."""
+    return bool(guard.mode == OFF and (guard.dropped == 1 or guard.off_samples > lead))
 
 
 @kernel
@@ -85,4 +92,6 @@ def permitted_amplitude(guard: Record, limits: Record, demanded_v: float, sample
             guard.amplitude_v = guard.ramp_from_v * 0.5 * (1.0 + math.cos(math.pi * done))
     else:
         guard.amplitude_v = 0.0
+    if guard.mode == OFF:
+        guard.off_samples += 1
     return float(guard.amplitude_v)

@@ -56,7 +56,7 @@ TEXT = {
     EndReason.OVERTRAVEL: "displacement amplitude far above its limit",
     EndReason.FREQUENCY_LIMIT: "frequency outside its limits",
     EndReason.SENSOR_OVERLOAD: "sensor at the end of its range",
-    EndReason.SENSOR_STUCK: "sensor dead or stuck (its reading does not change while the rig is driven)",
+    EndReason.SENSOR_STUCK: "sensor dead, stuck or below one bit (its reading does not change while the rig is driven)",
     EndReason.NON_FINITE_INPUT: "input is not a number",
     EndReason.NON_FINITE_OUTPUT: "the law's output is not a number",
     EndReason.LOST_LOCK: "phase lock lost",
@@ -108,6 +108,9 @@ GUARD = np.dtype(
         ("ramp_from_v", "f8"),
         ("amplitude_v", "f8"),
         ("stop_requested", "i8"),
+        ("dropped", "i8"),
+        ("off_samples", "i8"),
     ]
 )
-"""State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once: the first cause stays."""
+"""State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once: the first
+cause stays. ``off_samples`` counts since the output is off; ``dropped``: it was not ramped but dropped."""

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from rig.configuration import Configured
 from rig.sequencer.layout import LONGEST_AVERAGE, OUTCOME, SEGMENT, SETTLE_RULE, OnFailure, SegmentKind
@@ -27,6 +28,20 @@ class SettleRule(Configured):
     """Periods in a row that must keep the rule."""
     longest_periods: float = Field(600.0, gt=0, le=1e6)
     """Periods after which a point that has not settled is given up."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.longest_periods < self.shortest_periods:
+            raise ValueError(
+                f"longest_periods = {self.longest_periods:g}: allowed is from {self.shortest_periods}, "
+                "which two averages and the settled periods take at the least"
+            )
+        return self
+
+    @property
+    def shortest_periods(self) -> int:
+        """Whole periods until a point can have settled."""
+        return 2 * self.average_periods + self.settled_periods - 1
 
     def build(self) -> np.ndarray:
         """The record that the kernels read."""

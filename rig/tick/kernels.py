@@ -27,6 +27,8 @@ from rig.sequencer.layout import RAMP
 from rig.tick.layout import FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
 from vibrolock.compiled import Record, kernel
 
+HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
+
 
 @kernel
 def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: float) -> float:
@@ -91,10 +93,10 @@ def close_period(t: TickArrays, present: bool) -> None:
     law, loop = t.law[0], t.loop[0]
     n = loop.sum_samples
     if n > 0:
-        error = loop.sum_error / n
+        error = loop.sum_error / n if present else math.nan
         next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
         wanted = t.progress[0].level if law.amplitude_law == FORCE else 0.0
-        locked = t.lock[0].state == LOCKED
+        locked = t.lock[0].state == LOCKED and loop.held_back == 0
         judge_period(
             t.settling[0],
             t.rule[0],
@@ -178,6 +180,7 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
         demanded = demanded_amplitude(t, size_f)
         flags |= SATURATED if loop.saturated == 1 else 0
     amplitude = permitted_amplitude(guard, t.limits[0], demanded, now)
+    loop.held_back = 1 if abs(amplitude - demanded) > HELD_BACK * abs(demanded) else 0
     output = amplitude * math.cos(loop.theta)
     if not math.isfinite(output):
         shut_down(guard, NON_FINITE_OUTPUT, -1, output, now, True)

@@ -30,6 +30,7 @@ LOOP = np.dtype(
         ("sum_response", "f8"),
         ("sum_samples", "i8"),
         ("saturated", "i8"),
+        ("held_back", "i8"),
     ]
 )
 """State of oscillator and laws (one record)."""

@@ -9,6 +9,7 @@ from controller.layout import LOCK, AmplitudeLaw
 from controller.pll import PhaseLockedLoop
 from rig.bench import Bench
 from rig.errors import ConfigurationError
+from rig.safety.kernels import is_over
 from rig.safety.limits import guard_record, input_records, limits_record, watch_records
 from rig.sequencer.layout import PROGRESS, SETTLING
 from rig.sequencer.segments import Segment, SettleRule, segment_table
@@ -94,6 +95,11 @@ class Tick:
     def row_dtype(self) -> np.dtype[np.void]:
         """Dtype of the rows that `buffers` and `joined` deal in."""
         return recorded_row(len(self.bench.channels))
+
+    @property
+    def over(self) -> bool:
+        """Whether the output is off for good, and what was still under way in the device's queue has gone out."""
+        return is_over(self.arrays.guard[0], int(self.arrays.loop["lead_whole"][0]))
 
     def request_stop(self) -> None:
         """Ask for a ramp to 0 V at frozen frequency; the plan ends with it."""

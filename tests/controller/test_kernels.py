@@ -144,9 +144,16 @@ def test_the_lock_goes_from_searching_over_acquiring_to_locked():
 def test_a_lock_is_lost_after_far_periods_at_a_held_level_only():
     lock, thresholds = _lock()
     _periods(lock, thresholds, 10, 0.0)
-    assert _periods(lock, thresholds, 100, 50.0, held=False) is LockState.LOCKED
+    assert _periods(lock, thresholds, 100, 20.0, held=False) is LockState.LOCKED
     assert _periods(lock, thresholds, 19, 50.0) is LockState.LOCKED
     assert _periods(lock, thresholds, 1, 50.0) is LockState.LOST
+
+
+def test_a_lock_that_a_ramp_shakes_off_is_sought_again_and_not_a_loss():
+    lock, thresholds = _lock()
+    _periods(lock, thresholds, 10, 0.0)
+    assert _periods(lock, thresholds, 100, 50.0, held=False) is LockState.ACQUIRING
+    assert _periods(lock, thresholds, 10, 0.0) is LockState.LOCKED
 
 
 def test_a_large_error_before_the_first_lock_is_no_loss():

@@ -199,6 +199,11 @@ def test_a_mistake_is_answered_in_one_line_and_leaves_no_file(command, tmp_path,
         (("[0.4, 0.8]", "[0.4, nan]"), "levels_v[1]"),
         (("record_periods = 20", 'record_periods = "twenty"'), "record_periods = 'twenty'"),
         (("record_periods = 20", "record_periods = true"), "record_periods = True"),
+        (("[21.933, 26.807]", "[23.0, 24.2]"), "linear_frequency_hz = 24.37"),
+        (
+            ("record_periods = 20", "record_periods = 20\nharmonics = 50\nsettle.longest_periods = 30"),
+            "longest_periods = 30",
+        ),
         (("k1 = 2.0", 'k1 = "2"'), "controller.k1 = '2'"),
         (("record_periods = 20", "record_periods = 0"), "greater than or equal to 4"),
         (("k2 = 6.283185307179586", "k2 = -1"), "controller.k2 = -1"),
@@ -257,8 +262,7 @@ def test_debug_shows_the_traceback(command, monkeypatch):
 
 
 def test_a_run_with_a_failed_point_exits_with_one(command, tmp_path):
-    text = PLAN.replace("centre_frequency_hz = 24.0", "centre_frequency_hz = 29.0")
-    text = text.replace("[21.933, 26.807]", "[28.0, 30.0]") + "\n[settle]\nlongest_periods = 80\n"
+    text = PLAN + "\n[settle]\nlongest_periods = 39\nphase_deg = 0.001\n"
     (tmp_path / "plan.toml").write_text(text)
     status, out, err = command("run plan.toml -o run.h5")
     assert status == 1

@@ -102,7 +102,7 @@ def test_a_killed_run_keeps_its_rows_and_points_and_is_resumed_to_the_same_resul
     assert not journal_path(output).exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_ramps_down_closes_its_file_and_says_so(tmp_path, number):
     output = tmp_path / "run.h5"
     child = _child(output)
@@ -119,7 +119,7 @@ def test_an_interrupted_run_ramps_down_closes_its_file_and_says_so(tmp_path, num
         guard = recording.parts[0].rows("guard")
         events = [(event["what"], event["state"]) for event in recording.parts[0].events]
     assert events[:2] == [("lock", "acquiring"), ("lock", "locked")]
-    assert events[-2:] == [("guard", "ramping"), ("guard", "off")]
+    assert [event for event in events if event[0] == "guard"] == [("guard", "ramping"), ("guard", "off")]
     assert abs(output_v[-1]) < 1e-3
     assert np.count_nonzero(guard == 2) == pytest.approx(2500, abs=2)  # half a second of ramp
     assert not journal_path(output).exists()
@@ -177,10 +177,19 @@ def test_a_force_that_the_voltage_limit_does_not_reach_is_marked_and_the_rest_go
     assert "frequency_hz" not in second
 
 
+OFF_RESONANCE = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 29.0, "frequency_window_hz": (28.0, 30.0)}
+MISTAKEN = {"specimen": {"linear_frequency_hz": 29.0}}
+
+
+def test_a_window_that_does_not_hold_the_tested_mode_is_refused(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"linear_frequency_hz = 24\.37"):
+        carry_out(plan_with(controller=OFF_RESONANCE), bench_with(), tmp_path / "run.h5")
+
+
 def test_a_start_outside_the_pull_in_range_gives_no_point(tmp_path):
-    law = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 29.0, "frequency_window_hz": (28.0, 30.0)}
     settle = SettleRule(longest_periods=80).model_dump()
-    with carry_out(plan_with(controller=law, settle=settle), bench_with(), tmp_path / "run.h5") as recording:
+    plan = plan_with(controller=OFF_RESONANCE, settle=settle)
+    with carry_out(plan, bench_with(MISTAKEN), tmp_path / "run.h5") as recording:
         assert not recording.complete
         assert all(not point["settled"] and "frequency_hz" not in point for point in recording.points)
 
@@ -223,6 +232,79 @@ def test_skew_between_channels_is_taken_out_of_loop_and_points_alike(tmp_path, m
     _same_points(points, whole)
 
 
+@pytest.mark.parametrize("gains", [{"k1": 100.0, "k2": 600.0}, {"k1": 300.0, "k2": 600.0}])
+def test_a_loop_that_hunts_is_not_accepted(tmp_path, gains):
+    law = preset("magnet-beam").model_dump() | gains
+    with carry_out(plan_with(levels_v=(0.3,), controller=law), bench_with(), tmp_path / "run.h5") as recording:
+        assert not recording.complete
+        assert not recording.points[0]["accepted"]
+
+
+def test_an_output_that_has_not_reached_its_level_does_not_settle(tmp_path):
+    bench = bench_with({"limits": {"slew_v_per_s": 0.001}})
+    settle = SettleRule(longest_periods=100).model_dump()
+    with carry_out(plan_with(levels_v=(2.0,), settle=settle), bench, tmp_path / "run.h5") as recording:
+        assert not recording.points[0]["settled"]
+
+
+@pytest.mark.parametrize("options", [{}, {"queue_blocks": 4}, {"delay_samples": 1000}])
+@pytest.mark.parametrize("block", [1, 500])
+def test_the_ramp_reaches_the_converter_before_the_run_ends(tmp_path, block, options):
+    law = preset("magnet-beam").model_dump() | {"k1": 0.5, "k2": 0.5}
+    settle = SettleRule(longest_periods=60).model_dump()
+    plan = plan_with(levels_v=(1.0,), controller=law, settle=settle)
+    with carry_out(plan, bench_with({"block": block}, **options), tmp_path / "run.h5") as recording:
+        assert np.abs(recording.parts[0].rows("command_v")).max() > 0.9
+        assert recording.parts[0].rows("command_v")[-1] == 0.0
+        assert recording.parts[0].rows("output_v")[-1] == 0.0
+
+
+class _Fails:
+    def point(self, point, number, total):
+        raise KeyError("a bug")
+
+    def advance(self, rows, tick):
+        pass
+
+    def remark(self, text):
+        pass
+
+
+def test_a_failure_beside_the_loop_ramps_down_before_it_is_raised(tmp_path):
+    output = tmp_path / "run.h5"
+    with pytest.raises(KeyError, match="a bug"):
+        carry_out(plan_with(), bench_with(), output, progress=_Fails())
+    with Recording(output) as recording:
+        assert recording.parts[0].end["reason"] == "stop_requested"
+        assert recording.parts[0].rows("command_v")[-1] == 0.0
+        assert recording.points[0]["accepted"]
+    with rig.resume(output) as run:
+        assert run.complete
+
+
+def test_overwriting_keeps_the_old_file_until_the_new_one_is_begun_and_spares_what_is_not_ours(tmp_path, monkeypatch):
+    output = tmp_path / "run.h5"
+    rig.run(plan_with(levels_v=(0.4,)), output=output).close()
+    before = output.read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr("rig.campaigns.runner.JournalWriter.create", _cannot_create)
+        with pytest.raises(RecordingError, match="no room"):
+            rig.run(plan_with(levels_v=(0.4,)), output=output, overwrite=True)
+    assert output.read_bytes() == before
+    rig.run(plan_with(levels_v=(0.5,)), output=output, overwrite=True).close()
+    assert output.read_bytes() != before
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+    plan = tmp_path / "plan.toml"
+    plan.write_text("mine")
+    with pytest.raises(RecordingError, match="not a file of vibrolock"):
+        rig.run(plan_with(levels_v=(0.4,)), output=plan, overwrite=True)
+    assert plan.read_text() == "mine"
+
+
+def _cannot_create(*_):
+    raise RecordingError("no room")
+
+
 def test_a_reversed_sensor_gives_no_point_and_a_hint(tmp_path):
     channels = [channel.model_dump() for channel in bench_with().channels]
     channels[1]["sensitivity_v_per_unit"] *= -1
@@ -234,10 +316,9 @@ def test_a_reversed_sensor_gives_no_point_and_a_hint(tmp_path):
 
 
 def test_a_plan_that_says_stop_ends_at_the_first_failed_point(tmp_path):
-    law = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 29.0, "frequency_window_hz": (28.0, 30.0)}
     settle = SettleRule(longest_periods=80).model_dump()
-    plan = plan_with(controller=law, settle=settle, on_failure="stop")
-    with carry_out(plan, bench_with(), tmp_path / "run.h5") as recording:
+    plan = plan_with(controller=OFF_RESONANCE, settle=settle, on_failure="stop")
+    with carry_out(plan, bench_with(MISTAKEN), tmp_path / "run.h5") as recording:
         assert recording.parts[0].end["reason"] == "plan_stopped"
         assert len(recording.points) == 1
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rig.safety.layout import OFF
+from rig.safety.kernels import is_over
 from rig.tick.kernels import tick
 from rig.tick.layout import TickArrays
 from simulators.kernels import sample
@@ -64,6 +64,6 @@ def fused(
         slot = t.loop[0].sample % delay
         count_flags(sample(rig, state, queue[slot], volts), counts)
         queue[slot] = tick(t, volts, readings[index], rows[index])
-        if t.guard[0].mode == OFF:
+        if is_over(t.guard[0], t.loop[0].lead_whole):
             return index + 1
     return int(rows.size)
