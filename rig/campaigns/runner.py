@@ -275,7 +275,7 @@ class _Run:
     def _note_changes(self, rows: np.ndarray) -> None:
         """Every change of lock state and guard becomes an event, with its sample."""
         first = self.tick.sample - rows.size
-        events = []
+        events: list[dict[str, Any]] = []
         for name, kind in (("lock", LockState), ("guard", GuardMode)):
             values = np.concatenate([[self.last[name]], rows[name]])
             for index in np.flatnonzero(np.diff(values.astype(int))):
