@@ -6,8 +6,9 @@ from tempfile import TemporaryDirectory
 from identification import Backbone
 from rig.bench import Bench, load_bench
 from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.execution import Progress
 from rig.campaigns.plans import bench_of, load_plan
-from rig.campaigns.runner import Progress, carry_out, take_up
+from rig.campaigns.runner import carry_out, take_up
 from rig.errors import ConfigurationError
 from rig.measurements import backbone
 from rig.recording.reader import Recording

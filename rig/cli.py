@@ -91,6 +91,7 @@ def resume(
 def _carry(json: bool, start: Any) -> None:
     from rig.console import RunProgress, print_json
     from rig.summary import summarise_recording
+    from rig.tables import say_how_it_ended
 
     progress = RunProgress()
     try:
@@ -103,23 +104,9 @@ def _carry(json: bool, start: Any) -> None:
     if json:
         print_json(summary)
     else:
-        _say_how_it_ended(summary)
+        say_how_it_ended(summary)
     if not complete:
         raise typer.Exit(1)
-
-
-def _say_how_it_ended(summary: dict[str, Any]) -> None:
-    loop = summary["loop"]
-    accepted = sum(point["accepted"] for point in summary["points"])
-    factor = loop["realtime_factor"]
-    pace = f", {factor:.0f} times real time in the loop" if factor else ""
-    ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
-    print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
-    if not summary["complete"]:
-        print("what was accepted is kept; `rig resume` measures the rest")
-    for name, count in summary["counters"].items():
-        if count:
-            print(f"warning: {name.replace('_', ' ')}: {count} samples")
 
 
 @app.command()
@@ -129,81 +116,13 @@ def show(
     """What is in a file: points, quality, statistics of the loop."""
     from rig.console import print_json
     from rig.summary import summarise
+    from rig.tables import print_summary
 
     summary = summarise(file)
     if json:
         print_json(summary)
     else:
-        _print_summary(summary)
-
-
-def _print_summary(summary: dict[str, Any]) -> None:
-    from rig.console import number, print_table
-
-    if "responses" in summary:
-        print(f"{summary['kind']}: {len(summary['responses'])} levels")
-        print_table(
-            ("level", "samples", "from Hz", "to Hz"),
-            [
-                (r["label"], str(r["samples"]), number(r["lowest_hz"], ".2f"), number(r["highest_hz"], ".2f"))
-                for r in summary["responses"]
-            ],
-        )
-        return
-    print(f"{summary['kind']} of {summary['specimen'] or 'an unnamed specimen'}")
-    if "loop" not in summary:
-        _print_mode(summary)
-        return
-    loop = summary["loop"]
-    print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
-    print_table(
-        ("level", "", "force N", "frequency Hz", "damping %", "amplitude mm", "phase error deg", "settled", "quality"),
-        [
-            (
-                f"{p['level']:.4g}",
-                p["level_unit"],
-                number(p["force_n"], ".4f"),
-                number(p["frequency_hz"], ".4f"),
-                number(p["damping_ratio"], ".4f", 100.0),
-                number(p["amplitude_m"], ".4f", 1e3),
-                number(p["phase_error_deg"], ".2f"),
-                "yes" if p["settled"] else "no",
-                "ok" if p["accepted"] else p["reason"],
-            )
-            for p in summary["points"]
-        ],
-    )
-    line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
-    if loop["realtime_factor"] is not None:
-        factor = f"{loop['realtime_factor']:.0f} times real time"
-        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {factor}"
-    print(line)
-    for index, part in enumerate(summary["parts"]):
-        print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}")
-
-
-def _print_mode(summary: dict[str, Any]) -> None:
-    from rig.console import number, print_table
-
-    print_table(
-        ("force N", "amplitude mm", "modal frequency Hz", "+-", "damping %", "+-", "all harmonics %", "phase lag deg"),
-        [
-            (
-                number(p["force_n"], ".4f"),
-                number(p["amplitude_m"], ".5f", 1e3),
-                number(p["modal_frequency_hz"], ".4f"),
-                number(p["modal_frequency_std_hz"], ".4f", 1.96),
-                number(p["damping_ratio"], ".4f", 100.0),
-                number(p["damping_ratio_std"], ".4f", 196.0),
-                number(p["damping_ratio_total_power"], ".4f", 100.0),
-                number(p["phase_lag_deg"], ".2f"),
-            )
-            for p in summary["points"]
-        ],
-    )
-    print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
-    for note in summary["notes"]:
-        print(f"note: {note}")
+        print_summary(summary)
 
 
 @app.command()
@@ -219,6 +138,7 @@ def identify(
     from rig.errors import ConfigurationError
     from rig.models import NONLINEAR_MODE, identify_nonlinear_mode, save_model
     from rig.summary import summarise
+    from rig.tables import print_summary
 
     if model != NONLINEAR_MODE:
         raise ConfigurationError(f"--model = {model!r}: allowed is {NONLINEAR_MODE}")
@@ -228,7 +148,7 @@ def identify(
     if json:
         print_json(summary)
     else:
-        _print_summary(summary)
+        print_summary(summary)
 
 
 def _keep_existing(source: Path, output: Path, overwrite: bool) -> None:
@@ -268,6 +188,7 @@ def import_(
     from rig.importing import read_frequency_responses
     from rig.models import save_frequency_responses
     from rig.summary import summarise
+    from rig.tables import print_summary
 
     if format_ != "mat":
         raise ConfigurationError(f"--format = {format_!r}: allowed is mat")
@@ -277,7 +198,7 @@ def import_(
     if json:
         print_json(summary)
     else:
-        _print_summary(summary)
+        print_summary(summary)
 
 
 @app.command()

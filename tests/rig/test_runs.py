@@ -14,6 +14,7 @@ import pytest
 import rig
 from controller import preset
 from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.execution import Silent
 from rig.campaigns.runner import carry_out
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError, DaqDisconnected, RecordingError
@@ -202,7 +203,7 @@ def test_a_sensor_that_reads_only_noise_gives_no_point(tmp_path, monkeypatch, ch
         exchange(self, voltages, inputs)
         inputs[:, channel] = 1e-4 * noise.normal(size=len(inputs))
 
-    monkeypatch.setattr("rig.campaigns.runner.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", dead)
     settle = SettleRule(longest_periods=100).model_dump()
     bench = bench_with({"block": 10})
@@ -222,7 +223,7 @@ def test_skew_between_channels_is_taken_out_of_loop_and_points_alike(tmp_path, m
         late.append(drive[-2:].copy())
         inputs[:, 1] = drive[:-2]
 
-    monkeypatch.setattr("rig.campaigns.runner.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", skewed)
     channels = [channel.model_dump() for channel in bench_with().channels]
     channels[1]["skew_samples"] = 2.0
@@ -259,15 +260,9 @@ def test_the_ramp_reaches_the_converter_before_the_run_ends(tmp_path, block, opt
         assert recording.parts[0].rows("output_v")[-1] == 0.0
 
 
-class _Fails:
+class _Fails(Silent):
     def point(self, point, number, total):
         raise KeyError("a bug")
-
-    def advance(self, rows, tick):
-        pass
-
-    def remark(self, text):
-        pass
 
 
 def test_a_failure_beside_the_loop_ramps_down_before_it_is_raised(tmp_path):
@@ -344,7 +339,7 @@ def test_a_device_that_disappears_ends_the_run_and_keeps_its_rows(tmp_path, monk
             raise DaqDisconnected("virtual: unplugged; plug it in and resume")
         inputs[:] = 0.0
 
-    monkeypatch.setattr("rig.campaigns.runner.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", vanish)
     with carry_out(plan_with(), bench_with(), tmp_path / "run.h5") as recording:
         end = recording.parts[0].end

@@ -1,0 +1,226 @@
+"""Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
+
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from types import FrameType
+from typing import Any, Protocol
+
+import numpy as np
+
+from controller import LockState
+from rig.bench import Bench
+from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.evaluate import failed_point, measured_point
+from rig.daq import DAQ
+from rig.errors import RecordingError
+from rig.loop import Loop
+from rig.recording.journal import JournalWriter
+from rig.safety.layout import EndReason, GuardMode
+from rig.safety.limits import describe_end
+from rig.sequencer.layout import Outcome, SegmentKind
+from rig.tick.tick import Tick
+
+__all__ = ["Execution", "Progress", "Silent"]
+
+OVER = {Outcome.DONE, Outcome.NOT_SETTLED, Outcome.DISTURBED, Outcome.LOST_LOCK, Outcome.UNREACHABLE}
+
+
+class Progress(Protocol):
+    """Whoever wants to watch a run."""
+
+    def point(self, point: dict[str, Any], number: int, total: int) -> None:
+        """A point is done, measured or failed; ``number`` of ``total``."""
+
+    def advance(self, rows: np.ndarray, tick: Tick) -> None:
+        """A chunk of telemetry has come in."""
+
+    def remark(self, text: str) -> None:
+        """The driver has something to say about the bench."""
+
+
+class Silent:
+    """Watches and says nothing."""
+
+    def point(self, point: dict[str, Any], number: int, total: int) -> None:
+        """Nothing."""
+
+    def advance(self, rows: np.ndarray, tick: Tick) -> None:
+        """Nothing."""
+
+    def remark(self, text: str) -> None:
+        """Nothing."""
+
+
+class Execution:
+    """One part of a recording: the loop, what is written of it, and the points that come out."""
+
+    def __init__(
+        self,
+        plan: BackbonePlan,
+        bench: Bench,
+        daq: DAQ,
+        tick: Tick,
+        journal: JournalWriter,
+        realtime: bool,
+        progress: Progress,
+        done: frozenset[int] = frozenset(),
+    ) -> None:
+        self.plan, self.bench, self.daq, self.tick = plan, bench, daq, tick
+        self.journal, self.progress = journal, progress
+        self.loop = Loop(daq, tick, paced=realtime)
+        self.targets = plan.targets()
+        self.finished = len(done)
+        self.failed = 0
+        self.next_segment = 0
+        self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
+        self.kept: deque[tuple[int, np.ndarray]] = deque()
+        self.write_error: RecordingError | None = None
+        self.failure: Exception | None = None
+
+    def go(self, first_sample: int) -> None:
+        """Run to the end of the plan or of what can be done of it; raises only what could not be recorded."""
+        self._write(self.journal.part, {"first_sample": first_sample, "points_done": self.finished})
+        for remark in self.daq.remarks:
+            self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
+            self._attempt(self.progress.remark, remark)
+        with _stop_on_signals(self.tick):
+            for rows in self.loop.run():
+                self._write(self.journal.rows, rows)
+                self._attempt(self._note_changes, rows)
+                self._attempt(self._collect, rows)
+                self._attempt(self.progress.advance, rows, self.tick)
+        self._attempt(self._mark_interrupted)
+        self._write(self.journal.end, self._end())
+        if self.failure is not None:
+            raise self.failure
+        if self.write_error is not None:
+            raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
+
+    def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
+        """Do what is not the loop; where it fails, the rig is ramped down first and the failure raised at the end."""
+        if self.failure is not None:
+            return
+        try:
+            step(*arguments)
+        except Exception as error:  # whatever it is: a driven rig is brought down before anything is said
+            self.failure = error
+            self.tick.request_stop()
+
+    def _write(self, method: Any, what: Any) -> None:
+        """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""
+        if self.write_error is not None:
+            return
+        try:
+            method(what)
+        except RecordingError as error:
+            self.write_error = error
+            self.tick.request_stop()
+
+    def _note_changes(self, rows: np.ndarray) -> None:
+        """Every change of lock state and guard becomes an event, with its sample."""
+        first = self.tick.sample - rows.size
+        events: list[dict[str, Any]] = []
+        for name, kind in (("lock", LockState), ("guard", GuardMode)):
+            values = np.concatenate([[self.last[name]], rows[name]])
+            for index in np.flatnonzero(np.diff(values.astype(int))):
+                state = kind(int(rows[name][index])).name.lower()
+                events.append({"sample": first + int(index), "what": name, "state": state})
+            self.last[name] = int(rows[name][-1])
+        for event in sorted(events, key=lambda event: event["sample"]):
+            self._write(self.journal.event, event)
+
+    def _collect(self, rows: np.ndarray) -> None:
+        """Keep the rows of the point under way, and evaluate the points that are over."""
+        self.kept.append((self.tick.sample - rows.size, rows))
+        outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
+        while self.next_segment < segments.size:
+            entry, kind = outcomes[self.next_segment], int(segments[self.next_segment]["kind"])
+            code = Outcome(int(entry["outcome"]))
+            if code not in OVER and code is not Outcome.SKIPPED:
+                break
+            number = int(segments[self.next_segment]["point"])
+            if number >= 0 and code is not Outcome.SKIPPED:
+                if code is not Outcome.DONE:
+                    self._report(failed_point(self.plan, self.targets[number], entry))
+                elif kind == SegmentKind.RECORD:
+                    rows_of = self._rows(int(entry["first_sample"]), int(entry["end_sample"]))
+                    settling = outcomes[self.next_segment - 1]
+                    self._report(measured_point(self.bench, self.plan, self.targets[number], rows_of, settling))
+            self.next_segment += 1
+        self._drop_rows_before(self._first_needed())
+
+    def _first_needed(self) -> int:
+        if self.next_segment < self.tick.outcomes.size:
+            entry = self.tick.outcomes[self.next_segment]
+            records = int(self.tick.arrays.segments[self.next_segment]["kind"]) == SegmentKind.RECORD
+            if records and int(entry["outcome"]) == Outcome.RUNNING:
+                return int(entry["first_sample"])
+        return self.tick.sample
+
+    def _rows(self, first: int, end: int) -> np.ndarray:
+        return np.concatenate(
+            [rows[max(0, first - start) : max(0, end - start)] for start, rows in self.kept if start < end]
+        )
+
+    def _drop_rows_before(self, sample: int) -> None:
+        while self.kept and self.kept[0][0] + self.kept[0][1].size <= sample:
+            self.kept.popleft()
+
+    def _report(self, point: dict[str, Any]) -> None:
+        self._write(self.journal.point, point)
+        self.finished += 1
+        self.failed += 0 if point["accepted"] else 1
+        self.progress.point(point, self.finished, len(self.targets))
+
+    def _mark_interrupted(self) -> None:
+        for segment, entry in zip(self.tick.arrays.segments, self.tick.outcomes, strict=True):
+            if int(entry["outcome"]) == Outcome.INTERRUPTED and int(segment["point"]) >= 0:
+                self._report(failed_point(self.plan, self.targets[int(segment["point"])], entry))
+
+    def _end(self) -> dict[str, Any]:
+        guard = self.tick.guard
+        reason = EndReason(int(guard["reason"][0]))
+        text = describe_end(guard, self.bench)
+        if self.loop.failure is not None:
+            text = str(self.loop.failure)
+        statistics = self.loop.statistics
+        return {
+            "completed": reason is EndReason.COMPLETED and self.failed == 0,
+            "reason": reason.name.lower(),
+            "text": text,
+            "tripped": reason.is_trip,
+            "loop": {
+                **asdict(statistics),
+                "periods": int(self.tick.arrays.loop["cycles"][0]),
+                "realtime_factor": statistics.realtime_factor,
+                "end_to_end_factor": statistics.end_to_end_factor,
+            },
+            "counters": self.daq.counters,
+        }
+
+
+@contextmanager
+def _stop_on_signals(tick: Tick) -> Iterator[None]:
+    """While the rig is driven, Ctrl-C, SIGTERM, a closed terminal and SIGQUIT ask for a ramp-down, and end nothing.
+
+    Without effect outside the main thread, where Python delivers no signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        tick.request_stop()
+
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")  # the last two not on every system
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    before = {number: signal.signal(number, ask) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
