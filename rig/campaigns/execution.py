@@ -187,6 +187,8 @@ class Execution:
         text = describe_end(guard, self.bench)
         if self.loop.failure is not None:
             text = str(self.loop.failure)
+        elif self.failure is not None:
+            text = f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
         statistics = self.loop.statistics
         return {
             "completed": reason is EndReason.COMPLETED and self.failed == 0,
