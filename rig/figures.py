@@ -10,6 +10,7 @@ from rig.errors import RecordingError
 from rig.measurements import backbone
 from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
 from rig.recording.arrays import kind_of
+from rig.recording.parts import Part
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -209,9 +210,10 @@ def _draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> Non
         _band(frequency, seconds, part.rows("frequency_hz"), width)
         level.plot(seconds, _binned(np.abs(part.rows("command_v")), width).mean(axis=1), color=SECOND, lw=0.9)
         degrees = np.degrees(part.rows("phase_error_rad"))
-        _band(error, seconds, degrees, width)
+        _band(error, seconds, degrees, width, label="detector" if start == 0 else None)
         running = degrees[(part.rows("segment") >= 0) & np.isfinite(degrees)]
         largest = max(largest, float(np.quantile(np.abs(running), 0.995)) if running.size else 0.0)
+        largest = max(largest, _mark_points(error, part, start, rate))
         start += part.n_rows
     frequency.set(xlabel="time, s", ylabel="oscillator frequency, Hz")
     frequency.yaxis.label.set_color(MAIN)
@@ -219,6 +221,19 @@ def _draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> Non
     level.grid(False)
     level.spines["right"].set_visible(True)
     error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-1.3 * largest, 1.3 * largest))
+    if error.get_legend_handles_labels()[0]:
+        error.legend(fontsize=8, loc="upper right")
+
+
+def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
+    """Mark the phase error of every recorded fundamental of a part; returns the largest, deg."""
+    points = [point for point in part.points if "phase_error_deg" in point]
+    if not points:
+        return 0.0
+    seconds = [(start + 0.5 * (point["first_sample"] + point["end_sample"])) / rate for point in points]
+    degrees = [point["phase_error_deg"] for point in points]
+    axis.plot(seconds, degrees, "D", ms=4, color=SECOND, label="recorded fundamental" if start == 0 else None)
+    return float(np.max(np.abs(degrees)))
 
 
 def _binned(values: np.ndarray, width: int) -> np.ndarray:
@@ -226,9 +241,9 @@ def _binned(values: np.ndarray, width: int) -> np.ndarray:
     return np.asarray(values[: values.size // width * width].reshape(-1, width))
 
 
-def _band(axis: "Axes", seconds: np.ndarray, values: np.ndarray, width: int) -> None:
+def _band(axis: "Axes", seconds: np.ndarray, values: np.ndarray, width: int, label: str | None = None) -> None:
     """Mean of each bin as a line, its range as a band: plain decimation would alias the ripple of the detector."""
     rows = _binned(values.astype(float), width)
     rows = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, np.nan)  # gaps stay gaps
     axis.fill_between(seconds, rows.min(axis=1), rows.max(axis=1), color=MAIN, alpha=0.25, lw=0)
-    axis.plot(seconds, rows.mean(axis=1), color=MAIN, lw=0.8)
+    axis.plot(seconds, rows.mean(axis=1), color=MAIN, lw=0.8, label=label)

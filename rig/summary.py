@@ -32,6 +32,8 @@ POINT_KEYS = (
     "periods",
     "settle_periods",
     "warnings",
+    "first_sample",
+    "end_sample",
 )
 
 

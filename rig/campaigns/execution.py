@@ -147,9 +147,12 @@ class Execution:
                 if code is not Outcome.DONE:
                     self._report(failed_point(self.plan, self.targets[number], entry))
                 elif kind == SegmentKind.RECORD:
-                    rows_of = self._rows(int(entry["first_sample"]), int(entry["end_sample"]))
+                    first, end = int(entry["first_sample"]), int(entry["end_sample"])
                     settling = outcomes[self.next_segment - 1]
-                    self._report(measured_point(self.bench, self.plan, self.targets[number], rows_of, settling))
+                    point = measured_point(
+                        self.bench, self.plan, self.targets[number], self._rows(first, end), settling
+                    )
+                    self._report({**point, "first_sample": first, "end_sample": end})
             self.next_segment += 1
         self._drop_rows_before(self._first_needed())
 
