@@ -47,6 +47,12 @@ def demodulate(estimate: complex, value: float, cos_theta: float, sin_theta: flo
 
 
 @kernel
+def size(value: complex) -> float:
+    """Modulus of a complex amplitude; a plain root: the library's overflow-proof one costs a tenth of the sample."""
+    return math.sqrt(value.real * value.real + value.imag * value.imag)
+
+
+@kernel
 def sign_product(force: float, acceleration: float) -> float:
     """Sign detector: sign(force) sign(displacement-like signal), the acceleration's sign reversed standing for displacement.
 

@@ -16,6 +16,7 @@ from controller.kernels import (
     phase_lag,
     proportional_integral,
     sign_product,
+    size,
     track,
     wrap,
 )
@@ -70,7 +71,7 @@ def estimate_inputs(
         if index == loop.drive_channel:
             drive = value
         if channel.watch_displacement == 1:
-            amplitude_m = abs(watch.estimate) / (loop.omega * loop.omega)
+            amplitude_m = size(watch.estimate) / (loop.omega * loop.omega)
             watch_motion(guard, limits, amplitude_m, index, loop.omega, loop.sample)
     loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), law.demodulator_gain)
     return flags
@@ -143,7 +144,7 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
 
     flags = estimate_inputs(t, volts, readings, math.cos(theta_in), math.sin(theta_in))
     force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
-    size_f, size_a = abs(force), abs(drive)
+    size_f, size_a = size(force), size(drive)
     present = size_f >= t.thresholds[0].smallest_force_n and size_a >= t.thresholds[0].smallest_response
     loop.error = phase_error(t, force, drive) if present else 0.0
 
