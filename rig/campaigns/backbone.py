@@ -62,6 +62,9 @@ class BackbonePlan(Configured):
     accepted_frequency_scatter: float = Field(1e-3, gt=0, le=1)
     """Largest scatter of the frequency from period to period, relative, with which a point is accepted: a loop that hunts
     has not settled, whatever its averages say."""
+    accepted_drift: float = Field(0.05, gt=0, le=1)
+    """Largest change of the fundamental of force or drive over a record, relative, in amplitude and phase together, with
+    which a point is accepted: the detector's filter hides what happens late in a record."""
     on_failure: Literal["skip", "stop"] = "skip"
     """What follows when a point does not settle, is disturbed or is out of reach: the next point, or a ramp-down."""
     on_lost_lock: Literal["skip", "stop"] = "stop"

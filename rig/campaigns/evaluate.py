@@ -45,22 +45,15 @@ def measured_point(
             harmonics=plan.harmonics,
             phase_lag_target_deg=plan.controller.phase_lag_deg + 180.0,
         )
-        vibration = without_skew(vibration, bench)
+        vibration = _without_skew(vibration, bench)
         mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     error_deg = vibration.phase_error_deg
     hunting = _frequency_scatter(rows["theta_rad"])
-    reason = ""
-    if abs(error_deg) > plan.accepted_phase_error_deg:
-        reason = f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
-    elif hunting > plan.accepted_frequency_scatter:
-        reason = (
-            f"the loop hunts: the frequency scatters by {100.0 * hunting:.2f} % from period to period, "
-            f"accepted up to {100.0 * plan.accepted_frequency_scatter:g} %"
-        )
+    reason = _objection(plan, bench, vibration, hunting)
     damping = float(mode.damping_ratio[0])
-    scatter = rows["phase_error_rad"].astype(float)
+    scatter = rows["phase_error_rad"][np.isfinite(rows["phase_error_rad"])].astype(float)
     return {
         **point,
         "settled": True,
@@ -86,6 +79,25 @@ def measured_point(
         "drift": None if vibration.drift is None else _pairs(vibration.drift),
         "warnings": [*vibration.warnings, *_coarse(vibration, bench)],
     }
+
+
+def _objection(plan: BackbonePlan, bench: Bench, vibration: PeriodicVibration, hunting: float) -> str:
+    """Why a recorded point is not accepted; empty where it is."""
+    error_deg = vibration.phase_error_deg
+    if abs(error_deg) > plan.accepted_phase_error_deg:
+        return f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
+    if hunting > plan.accepted_frequency_scatter:
+        return (
+            f"the loop hunts: the frequency scatters by {100.0 * hunting:.2f} % from period to period, "
+            f"accepted up to {100.0 * plan.accepted_frequency_scatter:g} %"
+        )
+    for channel, drift in zip(bench.channels, () if vibration.drift is None else np.abs(vibration.drift), strict=False):
+        if channel.role in ("force", "drive") and drift > plan.accepted_drift:
+            return (
+                f"channel {channel.name} changed by {100.0 * drift:.1f} % over the record, "
+                f"accepted up to {100.0 * plan.accepted_drift:g} %"
+            )
+    return ""
 
 
 def _within(theta_rad: np.ndarray, periods: int) -> slice:
@@ -115,7 +127,7 @@ def _coarse(vibration: PeriodicVibration, bench: Bench) -> list[str]:
     return out
 
 
-def without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
+def _without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
     """The vibration with every channel's harmonics turned forward by its skew: ``Y_h exp(i h Omega tau)``."""
     omega = 2.0 * math.pi * vibration.frequency_hz
     delay_s = np.array([channel.skew_samples for channel in bench.channels]) / bench.sample_rate_hz

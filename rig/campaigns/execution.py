@@ -74,7 +74,7 @@ class Execution:
         self.loop = Loop(daq, tick, paced=realtime)
         self.targets = plan.targets()
         self.finished = len(done)
-        self.failed = 0
+        self.accepted = len(done)
         self.next_segment = 0
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept: deque[tuple[int, np.ndarray]] = deque()
@@ -176,7 +176,7 @@ class Execution:
     def _report(self, point: dict[str, Any]) -> None:
         self._write(self.journal.point, point)
         self.finished += 1
-        self.failed += 0 if point["accepted"] else 1
+        self.accepted += 1 if point["accepted"] else 0
         self.progress.point(point, self.finished, len(self.targets))
 
     def _mark_interrupted(self) -> None:
@@ -194,7 +194,7 @@ class Execution:
             text = f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
         statistics = self.loop.statistics
         return {
-            "completed": reason is EndReason.COMPLETED and self.failed == 0,
+            "completed": reason is EndReason.COMPLETED and self.accepted == len(self.targets) and self.failure is None,
             "reason": reason.name.lower(),
             "text": text,
             "tripped": reason.is_trip,

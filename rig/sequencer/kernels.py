@@ -72,7 +72,9 @@ def judge_period(
         miss = mean_of(settling.forces, last, n) / wanted_force - 1.0
         drift = miss if abs(miss) > abs(drift) else drift
     settling.drift = drift
-    off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
+    off = math.inf  # where a phase could not be read, too
+    if math.isfinite(settling.mean_error_rad):
+        off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
     settling.good_periods = settling.good_periods + 1 if locked and off <= 1.0 else 0
     settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
     unreached = saturated and abs(drift) > 2.0 * rule.amplitude
@@ -195,4 +197,5 @@ def advance(
                 skip_point(progress, segments, outcomes, sample)
             return
     if segment.kind != SETTLE and elapsed >= segment.periods:
-        close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
+        close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE, cycle, sample)

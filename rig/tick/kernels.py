@@ -43,9 +43,7 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 
 
 @kernel
-def estimate_inputs(
-    t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_theta: Record, sin_theta: Record
-) -> int:
+def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
     """Check, convert and demodulate every input channel; returns the telemetry flags of the inputs."""
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
     driven = guard.mode == ARMED and loop.held == 1

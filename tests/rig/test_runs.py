@@ -277,6 +277,41 @@ def test_a_failure_beside_the_loop_ramps_down_before_it_is_raised(tmp_path):
         assert run.complete
 
 
+class _FailsAtTheEnd(Silent):
+    def point(self, point, number, total):
+        if number == total:
+            raise KeyError("a bug")
+
+
+def test_a_failure_at_the_last_point_leaves_no_run_that_calls_itself_complete(tmp_path):
+    output = tmp_path / "run.h5"
+    with pytest.raises(KeyError, match="a bug"):
+        carry_out(plan_with(levels_v=(0.4,)), bench_with(), output, progress=_FailsAtTheEnd())
+    with Recording(output) as recording:
+        assert not recording.complete
+
+
+@pytest.mark.parametrize("before_the_end", [300, 1500])  # the last 205 samples are not evaluated
+def test_a_sensor_that_dies_shortly_before_the_end_of_a_record_spoils_the_point(tmp_path, monkeypatch, before_the_end):
+    plan = plan_with(levels_v=(0.4,))
+    with carry_out(plan, bench_with({"block": 10}), tmp_path / "whole.h5", seed=1) as recording:
+        end = recording.points[0]["end_sample"]
+    exchange, noise, count = VirtualDAQ._exchange, np.random.default_rng(1), 0
+
+    def dying(self, voltages, inputs):
+        nonlocal count
+        exchange(self, voltages, inputs)
+        count += len(inputs)
+        if count > end - before_the_end:
+            inputs[:, 0] = 1e-4 * noise.normal(size=len(inputs))
+
+    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr(VirtualDAQ, "_exchange", dying)
+    with carry_out(plan, bench_with({"block": 10}), tmp_path / "run.h5", seed=1) as recording:
+        assert not recording.complete
+        assert not recording.points[0]["accepted"]
+
+
 def test_overwriting_keeps_the_old_file_until_the_new_one_is_begun_and_spares_what_is_not_ours(tmp_path, monkeypatch):
     output = tmp_path / "run.h5"
     rig.run(plan_with(levels_v=(0.4,)), output=output).close()
