@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simulators.exciter import Exciter, Stinger
+from simulators.friction import JenkinsSite
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
@@ -15,7 +16,7 @@ from simulators.plant.assembly import LinearPlant, assemble
 from simulators.plant.compilation import at_rest, rig_arrays
 from simulators.sensing.parts import Converter, Sensor
 from simulators.shipped import merged, specimen_table
-from simulators.sites import JenkinsSite, Magnet
+from simulators.sites import Magnet
 from simulators.structure import ModalStructure, Structure
 
 __all__ = ["VirtualRig"]

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.exciter import Exciter, Stinger
-from simulators.sites import JenkinsSite, Magnet
+from simulators.friction import JenkinsSite
+from simulators.sites import Magnet
 from simulators.structure import BeamStructure, ModalStructure
 
 __all__ = ["LinearPlant", "assemble"]

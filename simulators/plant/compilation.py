@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.friction import JenkinsSite
 from simulators.layout import (
     CHANNEL,
     CONVERTER,
@@ -18,7 +19,7 @@ from simulators.layout import (
 from simulators.plant.assembly import LinearPlant
 from simulators.plant.discretise import pad, round_up, step_columns
 from simulators.sensing.parts import Converter, Sensor
-from simulators.sites import JenkinsSite, Magnet
+from simulators.sites import Magnet
 
 __all__ = ["at_rest", "rig_arrays"]
 
