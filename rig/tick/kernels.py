@@ -23,6 +23,7 @@ from controller.kernels import (
 from controller.layout import FORCE, LOCKED, SIGN
 from rig.safety.kernels import (
     NON_FINITE_OUTPUT,
+    SENSOR_OVERLOAD,
     permitted_amplitude,
     shut_down,
     watch_frequency,
@@ -76,9 +77,9 @@ def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_
             force = value
         if index == loop.drive_channel:
             drive = value
-        # A reading beyond its limit has tripped already, a stuck one will: integrated, the fault would pass for travel.
-        plausible = abs(readings[index]) <= channel.limit and watch.same_samples < STUCK_SAMPLES
-        if channel.watch_displacement == 1 and plausible:
+        # A reading beyond its limit, and a sensor that trips as faulty: integrated, the fault would pass for travel.
+        faulty = watch.same_samples >= STUCK_SAMPLES or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD)
+        if channel.watch_displacement == 1 and abs(readings[index]) <= channel.limit and not faulty:
             watch_motion(guard, limits, watch, value, index, loop.sample)
     loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), law.demodulator_gain)
     return flags
