@@ -3,14 +3,14 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from identification import Backbone
+from identification import Backbone, FrequencyResponse
 from rig.bench import Bench, load_bench
 from rig.campaigns.execution import Progress
 from rig.campaigns.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.runner import carry_out, take_up
 from rig.errors import ConfigurationError
-from rig.measurements import backbone
+from rig.measurements import backbone, frequency_responses
 from rig.recording.reader import Recording
 
 __all__ = ["Run", "resume", "run"]
@@ -31,6 +31,10 @@ class Run:
     def backbone(self) -> Backbone:
         """The accepted points as a backbone."""
         return backbone(self.recording)
+
+    def frequency_responses(self) -> tuple[FrequencyResponse, ...]:
+        """The accepted points of a stepped-sine test, one frequency response per level."""
+        return frequency_responses(self.recording)
 
     def close(self) -> None:
         """Let go of the file; a temporary one is removed."""

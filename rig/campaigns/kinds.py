@@ -7,6 +7,8 @@ from typing import Any
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import BACKBONE_COLUMNS, measure_backbone_point
 from rig.campaigns.plan import Column, Plan
+from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS, measure_stepped_sine_point
 
 __all__ = ["KINDS", "Campaign"]
 
@@ -25,4 +27,5 @@ class Campaign:
 
 KINDS = {
     "backbone": Campaign(BackbonePlan, measure_backbone_point, BACKBONE_COLUMNS),
+    "stepped-sine": Campaign(SteppedSinePlan, measure_stepped_sine_point, STEPPED_SINE_COLUMNS),
 }

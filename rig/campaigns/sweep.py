@@ -16,8 +16,8 @@ __all__ = ["SweepPlan"]
 class SweepPlan(OpenLoopPlan):
     """Uncontrolled sweeps, one per level: the force is whatever shaker and structure make of the voltage.
 
-    From rest the level is reached at the first frequency by a half-cosine ramp and held for ``hold_periods``; then the frequency
-    moves, linearly or logarithmically in time. Every row is recorded.
+    From rest the level is reached at the first frequency by a half-cosine ramp and held for ``hold_periods``; then the
+    frequency moves, linearly or logarithmically in time. Every row is recorded.
     """
 
     kind: Literal["sweep"] = "sweep"
