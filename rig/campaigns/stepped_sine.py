@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from rig.bench import Bench
-from rig.campaigns.plan import OpenLoopPlan, Target
+from rig.campaigns.plan import Target, TonePlan
 from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
 from rig.sequencer.segments import Excitation, Segment, SettleRule
@@ -14,7 +14,7 @@ from rig.sequencer.segments import Excitation, Segment, SettleRule
 __all__ = ["SteppedSinePlan"]
 
 
-class SteppedSinePlan(OpenLoopPlan):
+class SteppedSinePlan(TonePlan):
     """Vibrations at given voltages and frequencies; a single frequency makes it a sine test.
 
     Every point is approached by a half-cosine ramp of frequency and level, settled by the amplitudes of force and response in
@@ -82,7 +82,7 @@ class SteppedSinePlan(OpenLoopPlan):
             for number, (level, frequency_hz) in enumerate((v, f) for v in self.levels_v for f in frequencies)
         )
 
-    def segments(self, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done``; a new level begins from rest at its first frequency."""
         failure = OnFailure[self.on_failure.upper()]
         out: list[Segment] = []

@@ -6,14 +6,14 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from rig.bench import Bench
-from rig.campaigns.plan import OpenLoopPlan, Target
+from rig.campaigns.plan import Target, TonePlan
 from rig.sequencer.layout import SegmentKind
 from rig.sequencer.segments import Excitation, Segment
 
 __all__ = ["SweepPlan"]
 
 
-class SweepPlan(OpenLoopPlan):
+class SweepPlan(TonePlan):
     """Uncontrolled sweeps, one per level: the force is whatever shaker and structure make of the voltage.
 
     From rest the level is reached at the first frequency by a half-cosine ramp and held for ``hold_periods``; then the
@@ -65,7 +65,7 @@ class SweepPlan(OpenLoopPlan):
             for number, level in enumerate(self.levels_v)
         )
 
-    def segments(self, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that make all sweeps but those ``done`` already; each begins from rest."""
         start, stop = Excitation(self.start_hz), Excitation(self.stop_hz)
         out: list[Segment] = []
