@@ -3,16 +3,21 @@
 from pathlib import Path
 from typing import Any
 
-from identification import Backbone, FrequencyResponse
+import numpy as np
+
+from identification import Backbone, FrequencyResponse, IdentificationError, PeriodicSpectra, Transient
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import backbone_of
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import spectra_of
 from rig.campaigns.stepped_sine_points import frequency_responses_of
+from rig.campaigns.sweep_points import transient_of
 from rig.configuration import validated
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
-__all__ = ["backbone", "frequency_responses", "load_backbone"]
+__all__ = ["backbone", "frequency_responses", "load_backbone", "point_rows", "spectra", "sweeps"]
 
 
 def backbone(recording: Recording) -> Backbone:
@@ -24,7 +29,7 @@ def backbone(recording: Recording) -> Backbone:
     bench = _bench(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
     return backbone_of(
-        _latest_points(recording),
+        _by_number(recording).values(),
         recording.channels,
         bench.specimen.name,
         bench.specimen.drive_mode_shape,
@@ -38,7 +43,45 @@ def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
     _expect(recording, "stepped-sine")
-    return frequency_responses_of(_latest_points(recording), recording.channels, _bench(recording).specimen.name)
+    return frequency_responses_of(_by_number(recording).values(), recording.channels, _bench(recording).specimen.name)
+
+
+def sweeps(recording: Recording) -> dict[int, Transient]:
+    """Fundamentals over time of every accepted sweep, by the number of its point; the output is channel ``voltage``.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any sweep.
+    """
+    _expect(recording, "sweep")
+    bench = _bench(recording)
+    return {number: transient_of(bench, point_rows(recording, number)) for number in _accepted(recording)}
+
+
+def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
+    """Spectra of every accepted realisation, by level (V RMS); the output is channel ``voltage``.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
+    """
+    _expect(recording, "multisine")
+    bench = _bench(recording)
+    plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
+    levels: dict[float, dict[int, np.ndarray]] = {}
+    for number, point in _accepted(recording).items():
+        levels.setdefault(point["level"], {})[point["realisation"]] = point_rows(recording, number)
+    return {level: spectra_of(bench, plan, records) for level, records in levels.items()}
+
+
+def point_rows(recording: Recording, number: int) -> np.ndarray:
+    """All recorded rows of a point: structured array, inputs in SI units (`rig.tick.layout.recorded_row`).
+
+    Raises `RecordingError` where there is no such point or nothing was recorded of it.
+    """
+    for part in reversed(recording.parts):
+        for point in part.points:
+            if point["number"] == number and "end_sample" in point:
+                return part.read(point["first_sample"], point["end_sample"])
+    raise RecordingError(
+        f"point {number}: nothing was recorded of it; points {sorted(_by_number(recording))} are known"
+    )
 
 
 def load_backbone(path: Path) -> Backbone:
@@ -56,7 +99,14 @@ def _bench(recording: Recording) -> Bench:
     return validated(Bench, recording.configuration["bench"], "bench of the recording")
 
 
-def _latest_points(recording: Recording) -> list[dict[str, Any]]:
-    """The last result of each point, by number."""
+def _by_number(recording: Recording) -> dict[int, dict[str, Any]]:
+    """The last result of each point."""
     latest = {point["number"]: point for point in recording.points}
-    return [latest[number] for number in sorted(latest)]
+    return {number: latest[number] for number in sorted(latest)}
+
+
+def _accepted(recording: Recording) -> dict[int, dict[str, Any]]:
+    accepted = {number: point for number, point in _by_number(recording).items() if point["accepted"]}
+    if not accepted:
+        raise IdentificationError("points: none of the recording was accepted")
+    return accepted

@@ -1,6 +1,7 @@
 """From the recorded rows of a multisine's realisation to its result, and from recordings to spectra in memory."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from rig.campaigns.plan import Column, Target
 __all__ = ["MULTISINE_COLUMNS", "VOLTAGE", "measure_multisine_point", "spectra_of"]
 
 MULTISINE_COLUMNS = (
-    Column("realisation", "realisation", "", "d"),
+    Column("realisation", "realisation", "", ".0f"),
     Column("force_rms_n", "force", "N RMS", ".4f", plain=True),
     Column("drive_rms_m_s2", "drive", "m/s^2 RMS", ".4f", plain=True),
     Column("voltage_peak_v", "peak", "V", ".3f"),
@@ -31,7 +32,7 @@ def measure_multisine_point(
     """The result of a recorded realisation, with its own quality."""
     point = head(plan, target)
     try:
-        spectra = spectra_of(bench, plan, [rows])
+        spectra = spectra_of(bench, plan, {target.realisation or 0: rows})
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     roles = {channel.role: channel.name for channel in bench.channels}
@@ -57,20 +58,26 @@ def measure_multisine_point(
     }
 
 
-def spectra_of(bench: Bench, plan: MultisinePlan, records: list[np.ndarray]) -> PeriodicSpectra:
-    """Spectra of recorded rows, one array per realisation; every period is turned to begin where the signal does."""
+def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
+    """Spectra of recorded rows, by the number of the realisation; every period is turned to begin where the signal does."""
     design = plan.design(bench.sample_rate_hz)
     size = design.period_samples
     turned = []
-    for rows in records:
+    for index, rows in records.items():
         if rows.size < plan.periods * size:
             raise IdentificationError(f"record: has {rows.size} samples, needs {plan.periods * size}")
-        played = round(float(rows["theta_rad"][0]) * size / (2.0 * math.pi)) % size
         rows = rows[: plan.periods * size]
+        begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
         signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
         periods = signals.reshape(signals.shape[0], plan.periods, size)
-        turned.append(np.roll(periods, played, axis=2).reshape(signals.shape))
+        turned.append(np.roll(periods, begun, axis=2).reshape(signals.shape))
     return periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
+
+
+def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:
+    """By how many samples the one period of ``output`` lies behind the beginning of the ``period`` it plays."""
+    match = np.fft.irfft(np.conj(np.fft.rfft(output)) * np.fft.rfft(period), period.size)
+    return int(np.argmax(match))
 
 
 def _change(spectra: PeriodicSpectra, name: str) -> float:

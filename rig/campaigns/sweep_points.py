@@ -32,7 +32,7 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     return {
         **point,
-        "settled": False,
+        "settled": None,
         "accepted": True,
         "reason": "",
         **asdict(drop_out),
