@@ -96,10 +96,10 @@ def test_a_linear_sweep_has_the_phase_of_a_chirp(start_hz, stop_hz):
     assert t[-1] == pytest.approx(1.0, abs=2e-3)
     way = 5.0 if stop_hz > start_hz else -5.0
     before = int(np.argmax(rows["frequency_hz"] != np.float32(start_hz)))  # what was sent out before still shows first
-    t = np.maximum(t - (before - 0.5) / 5000.0, 0.0)  # and the first held frequency is that of its interval's middle
+    t = t - (before + 0.5) / 5000.0  # a row has the phase of the middle of the interval before its instant
     lead = theta[before]
     np.testing.assert_allclose(
-        theta[before:] - lead, 2.0 * np.pi * (start_hz * (t - t[before]) + 0.5 * way * t**2)[before:], atol=2e-3
+        theta[before:] - lead, 2.0 * np.pi * (start_hz * (t - t[before]) + 0.5 * way * t**2)[before:], atol=1e-4
     )
     held = rows["theta_rad"] + np.pi * rows["frequency_hz"] / 5000.0  # the recorded phase is that of the hold's middle
     np.testing.assert_allclose(rows["output_v"], 0.2 * np.cos(held.astype(float)), atol=1e-6)
