@@ -31,14 +31,14 @@ class Lanes(types.Type):
     """Type of the eight numbers inside a kernel."""
 
 
-_untyped: Any = Lanes
-_lanes = _untyped(name="Lanes")
+_lanes = Lanes(name="Lanes")
 
 
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, of: Any) -> None:
-        super().__init__(manager, of, _VECTOR)
+        base: Any = super()
+        base.__init__(manager, of, _VECTOR)
 
 
 def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
