@@ -42,7 +42,7 @@ class SiteKind(IntEnum):
 MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER = (int(kind) for kind in SiteKind)
 N_PARAMETER = 8
 
-PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("substeps", "i8")])
+PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_joint", "i8"), ("substeps", "i8")])
 """Sizes (one record)."""
 
 SITE = np.dtype(
@@ -82,12 +82,12 @@ CONVERTER = np.dtype([("adc_step_v", "f8"), ("adc_range_v", "f8"), ("dac_step_v"
 class RigArrays(NamedTuple):
     """The rig as its kernels see it; never written to during a run.
 
-    ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_jenkins]``;
-    its rows are ``[x, site coordinates]``. ``correct`` [n_site, n_row]: what a change of each site force over the
-    sub-step adds. ``elements`` [2, n_jenkins, n_element]: stiffness and slip force of every Jenkins element; ``stuck``
-    [n_jenkins]: sum of the stiffnesses of a site. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
-    vector. ``noise_keys`` [n_pair]: one key per pair of channels. Inputs, rows, elements and the columns of ``sense``
-    are padded with zeros to multiples of four, so that the compiled loops run over whole vectors.
+    ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_joint]``; its
+    rows are ``[joint coordinates, local coordinates, x]``. ``correct`` [n_site, n_row]: what a change of each site
+    force over the sub-step adds. ``elements`` [2, n_element, n_joint]: stiffness and slip force of every Jenkins element;
+    ``stuck`` [n_joint]: sum of the stiffnesses of a joint. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
+    vector. ``noise_keys`` [n_pair]: one key per pair of channels. Inputs, rows, joints and the columns of ``sense`` are
+    padded with zeros to whole vectors of the compiled loops.
     """
 
     plant: NDArray[Any]
@@ -105,8 +105,8 @@ class RigArrays(NamedTuple):
 class RigState(NamedTuple):
     """Everything a run depends on, and the scratch space of its kernels.
 
-    ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_jenkins]`` at the present instant. ``deflection``
-    [n_jenkins] and ``friction`` [n_jenkins, n_element]: committed state of the Jenkins elements. ``filters``
+    ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_joint]`` at the present instant. ``deflection``
+    [n_joint] and ``friction`` [n_element, n_joint]: committed state of the Jenkins elements. ``filters``
     [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
     which its noise is drawn. The others carry nothing from one sample to the next.
     """
@@ -118,4 +118,6 @@ class RigState(NamedTuple):
     counter: NDArray[np.int64]
     rows: NDArray[np.float64]
     forces: NDArray[np.float64]
+    joints: NDArray[np.float64]
+    changes: NDArray[np.float64]
     outputs: NDArray[np.float64]
