@@ -5,8 +5,8 @@ from tempfile import TemporaryDirectory
 
 from identification import Backbone
 from rig.bench import Bench, load_bench
-from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.execution import Progress
+from rig.campaigns.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.runner import carry_out, take_up
 from rig.errors import ConfigurationError
@@ -49,7 +49,7 @@ class Run:
 
 
 def run(
-    plan: BackbonePlan | str | Path,
+    plan: Plan | str | Path,
     *,
     bench: Bench | str | Path | None = None,
     output: str | Path | None = None,
@@ -69,8 +69,8 @@ def run(
     """
     if not 0 <= seed < 2**63:
         raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
-    source = "" if isinstance(plan, BackbonePlan) else plan
-    plan = plan if isinstance(plan, BackbonePlan) else load_plan(plan)
+    source = "" if isinstance(plan, Plan) else plan
+    plan = plan if isinstance(plan, Plan) else load_plan(plan)
     if bench is None:
         bench = bench_of(plan, source)
     elif not isinstance(bench, Bench):

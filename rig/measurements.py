@@ -5,7 +5,7 @@ from pathlib import Path
 from identification import Backbone
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.evaluate import backbone_of
+from rig.campaigns.backbone_points import backbone_of
 from rig.configuration import validated
 from rig.errors import RecordingError
 from rig.recording.reader import Recording

@@ -6,7 +6,6 @@ from controller import preset
 from rig.bench import shipped_benches
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.plans import bench_of, load_plan, shipped_plans
-from rig.campaigns.runner import check
 from rig.sequencer.layout import SegmentKind
 
 
@@ -53,7 +52,7 @@ def test_a_finished_plan_has_no_segments_left():
 def test_a_shipped_plan_fits_its_bench_and_holds_the_gains_of_the_paper(name):
     plan = load_plan(name)
     bench = bench_of(plan, name)
-    check(plan, bench)
+    plan.check(bench)
     assert name.split("/")[0] == bench.name
     assert bench.name in shipped_benches()
     paper = preset("magnet-beam", "backbone", "A" if "sign" in name else "B")
