@@ -15,6 +15,7 @@ from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
 from simulators.plant.assembly import LinearPlant, assemble
 from simulators.plant.compilation import at_rest, rig_arrays
+from simulators.sensing.filters import channel_delays, filter_delay
 from simulators.sensing.parts import Converter, Sensor
 from simulators.shipped import merged, specimen_table
 from simulators.structure import ModalStructure, Structure
@@ -74,6 +75,7 @@ class VirtualRig(Part):
         if not np.any(self.structure.shape(self.stinger.at)):
             raise ValueError(f"stinger.at = {self.stinger.at!r}: allowed is a point that moves")
         self._check_joints()
+        self._check_low_passes()
         return self
 
     def _check_points(self) -> None:
@@ -104,6 +106,13 @@ class VirtualRig(Part):
         if lowest < -1e-9 * np.max(np.abs(self.plant.modal_stiffness)):
             total = sum(joint.stuck_stiffness for joint in self.friction)
             raise ValueError(f"friction: stiffness {total:.6g} in all, allowed is less than the structure has there")
+
+    def _check_low_passes(self) -> None:
+        half_hz = 0.5 * self.converter.internal_rate_hz
+        for i, sensor in enumerate(self.sensors):
+            if sensor.low_pass_hz >= half_hz:
+                message = f"allowed is below {half_hz:g}, half the internal rate"
+                raise ValueError(f"sensors[{i}].low_pass_hz = {sensor.low_pass_hz:g}: {message}")
 
     def build(self, seed: int | None = None) -> tuple[RigArrays, RigState]:
         """Arrays for the kernels, and a state at rest; ``seed`` of the noise in place of the rig's own."""
@@ -138,6 +147,16 @@ class VirtualRig(Part):
     def sensitivities_v_per_unit(self) -> NDArray[np.float64]:
         """Volts per newton or per m/s^2 of each channel [n_channel]."""
         return np.array([sensor.sensitivity_v_per_unit for sensor in self.sensors])
+
+    @property
+    def filter_delay_samples(self) -> float:
+        """Delay of every channel by the filters of the converter, in samples at low frequency; the hold not included."""
+        return filter_delay(self.converter)
+
+    @property
+    def channel_delays_samples(self) -> NDArray[np.float64]:
+        """Delay of each channel by its own low-pass and skew [n_channel], in samples at low frequency."""
+        return channel_delays(self.sensors, self.converter)
 
     @cached_property
     def plant(self) -> LinearPlant:

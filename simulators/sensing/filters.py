@@ -8,7 +8,16 @@ from scipy.signal import butter
 
 from simulators.sensing.parts import TAPS, Converter, Sensor
 
-__all__ = ["channel_sections", "dc_delay", "lagrange_taps", "output_sections", "ring_size", "skew_taps"]
+__all__ = [
+    "channel_delays",
+    "channel_sections",
+    "dc_delay",
+    "filter_delay",
+    "lagrange_taps",
+    "output_sections",
+    "ring_size",
+    "skew_taps",
+]
 
 Matrix = NDArray[np.float64]
 _IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
@@ -54,6 +63,25 @@ def dc_delay(sections: Matrix) -> NDArray[np.float64]:
     delays = (b_1 + 2.0 * b_2) / (b_0 + b_1 + b_2) - (a_1 + 2.0 * a_2) / (1.0 + a_1 + a_2)
     delay: NDArray[np.float64] = delays.sum(axis=0)
     return delay
+
+
+def channel_delays(sensors: Sequence[Sensor], converter: Converter) -> NDArray[np.float64]:
+    """What each channel is late behind an ideal one [n_channel], in samples at low frequency: its low-pass and its skew."""
+    all_filters, shared = dc_delay(channel_sections(sensors, converter)), _anti_alias_delay(converter)
+    skews = np.array([sensor.skew_samples for sensor in sensors])
+    own: NDArray[np.float64] = (all_filters - shared) / converter.oversampling + skews
+    return own
+
+
+def filter_delay(converter: Converter) -> float:
+    """What anti-alias and reconstruction filter delay every channel by, in samples at low frequency."""
+    internal = _anti_alias_delay(converter) + float(dc_delay(output_sections(converter))[0])
+    return internal / converter.oversampling
+
+
+def _anti_alias_delay(converter: Converter) -> float:
+    sections = low_pass_sections(converter.anti_alias_order, converter.anti_alias_hz, converter.internal_rate_hz)
+    return float(dc_delay(sections[..., np.newaxis])[0])
 
 
 def lagrange_taps(delay: float) -> tuple[int, Matrix]:

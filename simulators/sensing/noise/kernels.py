@@ -54,7 +54,7 @@ def unit(bits: np.uint64) -> float:
 
 
 @kernel
-def rejected(bits: np.uint64, layer: int, x: float) -> tuple[float, np.uint64, bool]:
+def rejected(bits: np.uint64, layer: np.int64, x: float) -> tuple[float, np.uint64, bool]:
     """What becomes of a number beyond the part of its layer that lies wholly under the density.
 
     Returns the number, the last bits used, and whether it is to be taken: in the tail by Marsaglia's exponential method,
@@ -73,17 +73,17 @@ def rejected(bits: np.uint64, layer: int, x: float) -> tuple[float, np.uint64, b
 
 
 @kernel
-def normal_beyond(bits: np.uint64, layer: int, x: float) -> float:
+def normal_beyond(bits: np.uint64, layer: np.int64, x: float) -> float:
     """The number that comes of a first one which `rejected` has to judge."""
     while True:
         x, bits, taken = rejected(bits, layer, x)
         if taken:
-            return x
+            return float(x)
         bits = mix(bits + _GOLDEN)
         layer = np.int64(bits & _LAYER)
         x = float(np.int64(bits) >> 11) * 2.0**-52 * EDGES[layer]
         if abs(x) < EDGES[layer + 1]:
-            return x
+            return float(x)
 
 
 @kernel
@@ -93,5 +93,5 @@ def normal(key: np.uint64, sample: int) -> float:
     layer = np.int64(bits & _LAYER)
     x = float(np.int64(bits) >> 11) * 2.0**-52 * EDGES[layer]
     if abs(x) < EDGES[layer + 1]:
-        return x
+        return float(x)
     return normal_beyond(bits, layer, x)
