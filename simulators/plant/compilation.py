@@ -124,7 +124,7 @@ def _channel(
     hold = float(np.exp(-x))
     held_1 = -float(np.expm1(-x))
     new = 1.0 - held_1 / x if x > 0.0 else 0.0
-    noise_v = noise_scale * math.hypot(sensor.noise_rms * sensor.sensitivity_v_per_unit, converter.adc_noise_v)
+    noise_v = math.hypot(noise_scale * sensor.noise_rms * sensor.sensitivity_v_per_unit, converter.adc_noise_v)
     return (hold, held_1 - new, new, noise_v, sensor.sensitivity_v_per_unit, sensor.range_v, delay)
 
 

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def test_variants_are_taken_as_workers_come_free_and_not_all_at_once() -> None:
     results = ensemble(counted(), square, n_jobs=1)
     assert next(results) == ("0", 0.0)
     assert len(taken) < 100
-    results.close()  # type: ignore[attr-defined]
+    results.close()
     assert len(taken) < 100
 
 
@@ -85,10 +86,9 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGINT for a group of processes")
-def test_interrupt_ends_it_and_leaves_no_worker(tmp_path: object) -> None:
-    script = f"{tmp_path}/sleeper.py"
-    with open(script, "w") as file:  # noqa: PTH123
-        file.write(SLEEPER)
+def test_interrupt_ends_it_and_leaves_no_worker(tmp_path: Path) -> None:
+    script = tmp_path / "sleeper.py"
+    script.write_text(SLEEPER)
     with subprocess.Popen(
         [sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:

@@ -102,8 +102,8 @@ def test_joints_and_magnets_scatter_by_what_was_asked_for() -> None:
     factors = {
         "joint_stiffness": [rig.friction[0].stiffness[2] / joint.stiffness[2] for rig in drawn],
         "joint_slip": [rig.friction[0].slip[2] / joint.slip[2] for rig in drawn],
-        "magnet_strength": [rig.elements[0].strength_n_m4 / magnet.strength_n_m4 for rig in drawn],  # type: ignore[union-attr]
-        "magnet_gap": [rig.elements[0].gap_m / magnet.gap_m for rig in drawn],  # type: ignore[union-attr]
+        "magnet_strength": [rig.elements[0].strength_n_m4 / magnet.strength_n_m4 for rig in drawn],
+        "magnet_gap": [rig.elements[0].gap_m / magnet.gap_m for rig in drawn],
     }
     for name, values in factors.items():
         assert np.std(np.log(values)) == pytest.approx(EVERYTHING[name], rel=5 / np.sqrt(600))

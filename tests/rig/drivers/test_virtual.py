@@ -19,7 +19,7 @@ def slow_bench(**converter: Any) -> Bench:
 
 def skewed_bench(declared: float, real: float) -> Bench:
     """The drive channel late by ``real`` samples, and what the bench knows of it."""
-    plain = make_daq(bench_with()).rig  # type: ignore[attr-defined]
+    plain = make_daq(bench_with()).rig
     sensors = [sensor.model_dump() for sensor in plain.sensors]
     sensors[1]["skew_samples"] = real
     channels = [channel.model_dump() for channel in bench_with().channels]
