@@ -31,7 +31,10 @@ def imposed_joint() -> tuple[RigArrays, RigState]:
         sense=np.zeros((8, 8)),
         channels=np.zeros(1, CHANNEL),
         converter=np.zeros(1, CONVERTER),
-        noise_keys=np.zeros(1, np.uint64),
+        noise_keys=np.zeros(2, np.uint64),
+        sections=np.zeros((0, 5, 1)),
+        reconstruction=np.zeros((0, 5, 1)),
+        taps=np.zeros((1, 1)),
     )
     return rig, at_rest(rig)
 
