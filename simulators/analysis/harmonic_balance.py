@@ -24,7 +24,7 @@ from simulators.virtual_rig import VirtualRig
 
 __all__ = ["constant_force_response", "forced_response", "phase_resonance_backbone"]
 
-HARMONICS = 7
+HARMONICS = 15
 SAMPLES = 512
 RESONANCE_DEG = -90.0
 _FROM_BELOW_TO_ABOVE = (-175.0, -5.0)
