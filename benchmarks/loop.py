@@ -62,12 +62,12 @@ def exchanged(bench: Bench, block: int) -> Callable[[], float]:
     calls = SAMPLES // 4 // block
     readings, rows = tick.buffers(block)
     voltages = np.zeros(block)
-    tick_block(tick.arrays, daq.exchange(voltages), readings, rows, voltages)
+    tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
 
     def once() -> float:
         start = time.perf_counter()
         for _ in range(calls):
-            tick_block(tick.arrays, daq.exchange(voltages), readings, rows, voltages)
+            tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
         return 1e6 * (time.perf_counter() - start) / (calls * block)
 
     return once

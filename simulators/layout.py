@@ -34,18 +34,34 @@ class SiteKind(IntEnum):
 
     MAGNET_ONE_SIDED = 0
     MAGNET_SYMMETRIC = 1
+    CUBIC = 2
+    CLEARANCE = 3
+    USER = 4
 
 
-MAGNET_ONE_SIDED, MAGNET_SYMMETRIC = (int(kind) for kind in SiteKind)
+MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER = (int(kind) for kind in SiteKind)
+N_PARAMETER = 8
 
 PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("substeps", "i8")])
 """Sizes (one record)."""
 
 SITE = np.dtype(
-    [("kind", "i8"), ("strength", "f8"), ("gap", "f8"), ("limit", "f8"), ("stiffness", "f8"), ("offset", "f8")]
+    [
+        ("kind", "i8"),
+        ("limit", "f8"),
+        ("stiffness", "f8"),
+        ("strength", "f8"),
+        ("quadratic", "f8"),
+        ("gap", "f8"),
+        ("other_gap", "f8"),
+        ("offset", "f8"),
+        ("address", "i8"),
+        ("parameters", "f8", (N_PARAMETER,)),
+    ]
 )
-"""A local site: strength K0 (N m^4), gap d0 (m), limit of validity (m), linear stiffness that the linear part already
-holds (N/m), force at rest that is taken off (N)."""
+"""A local site: limit of validity (m), linear stiffness that the linear part already holds (N/m); strength K0 (N m^4), k3
+(N/m^3) or k (N/m), quadratic stiffness k2 (N/m^2), gaps (m), force at rest that is taken off (N); address of a user's
+function, good in the process that made the table, and the numbers that it is given."""
 
 CHANNEL = np.dtype(
     [

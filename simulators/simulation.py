@@ -27,7 +27,7 @@ class TimeSeries:
     force_n: NDArray[np.float64]
     """True stinger force."""
     displacement_m: dict[str, NDArray[np.float64]]
-    """True displacement of every named point that a sensor, a magnet or the stinger sits on."""
+    """True displacement of every named point that a sensor, an element or the stinger sits on."""
     flags: NDArray[np.int64]
     """`Flag` bits of each sample."""
 
@@ -73,6 +73,6 @@ class Simulation:
 def _points(rig: VirtualRig) -> Sequence[str]:
     return [
         rig.stinger.at,
-        *(magnet.at for magnet in rig.magnets),
+        *(point for element in rig.elements for point in (element.at, element.to) if point is not None),
         *(sensor.at for sensor in rig.sensors if sensor.at is not None),
     ]

@@ -1,4 +1,4 @@
-"""A virtual rig: structure, magnets, joints, exciter, stinger, sensors and converters, from a table to compiled arrays."""
+"""A virtual rig: structure, elements, joints, exciter, stinger, sensors and converters, from a table to compiled arrays."""
 
 from functools import cached_property
 from typing import Annotated, Any
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from simulators.elements import Element
 from simulators.exciter import Exciter, Stinger
 from simulators.friction import JenkinsSite
 from simulators.layout import RigArrays, RigState
@@ -16,7 +17,6 @@ from simulators.plant.assembly import LinearPlant, assemble
 from simulators.plant.compilation import at_rest, rig_arrays
 from simulators.sensing.parts import Converter, Sensor
 from simulators.shipped import merged, specimen_table
-from simulators.sites import Magnet
 from simulators.structure import ModalStructure, Structure
 
 __all__ = ["VirtualRig"]
@@ -36,8 +36,8 @@ class VirtualRig(Part):
     """Which of the numbers are published, calibrated, chosen, unverified; carried along, not used."""
     structure: Structure
     """The vibrating structure."""
-    magnets: Several[Magnet] = ()
-    """Magnets facing the structure."""
+    elements: Several[Element] = ()
+    """Local nonlinear elements without memory: magnets, springs, stops, functions of the user's own."""
     friction: Several[JenkinsSite] = ()
     """Friction joints."""
     exciter: Exciter
@@ -78,7 +78,8 @@ class VirtualRig(Part):
 
     def _check_points(self) -> None:
         points = self.structure.points
-        used = {f"magnets[{i}].at": magnet.at for i, magnet in enumerate(self.magnets)}
+        used = {f"elements[{i}].at": element.at for i, element in enumerate(self.elements)}
+        used |= {f"elements[{i}].to": element.to for i, element in enumerate(self.elements) if element.to is not None}
         used |= {f"friction[{i}].at": joint.at for i, joint in enumerate(self.friction)}
         used |= {"stinger.at": self.stinger.at}
         used |= {f"sensors[{i}].at": sensor.at for i, sensor in enumerate(self.sensors) if sensor.at is not None}
@@ -96,7 +97,7 @@ class VirtualRig(Part):
             if joint.relative_to_mode_1 and self.structure.shape(joint.at, joint.quantity)[0] == 0.0:
                 raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
         slipping = self.plant.modal_stiffness.copy()
-        for joint, row in zip(self.friction, self.plant.site_rows[len(self.magnets) :], strict=True):
+        for joint, row in zip(self.friction, self.plant.site_rows[len(self.elements) :], strict=True):
             coordinate = row[: self.plant.n_mode]
             slipping -= joint.stuck_stiffness * np.outer(coordinate, coordinate)
         lowest = np.linalg.eigvalsh(slipping)[0]
@@ -108,7 +109,7 @@ class VirtualRig(Part):
         """Arrays for the kernels, and a state at rest; ``seed`` of the noise in place of the rig's own."""
         rig = rig_arrays(
             self.plant,
-            self.magnets,
+            self.elements,
             self.friction,
             [self.output_row(sensor) for sensor in self.sensors],
             self.sensors,
@@ -141,11 +142,11 @@ class VirtualRig(Part):
     @cached_property
     def plant(self) -> LinearPlant:
         """Linear part of the coupled plant."""
-        return assemble(self.structure, self.magnets, self.friction, self.exciter, self.stinger)
+        return assemble(self.structure, self.elements, self.friction, self.exciter, self.stinger)
 
     @cached_property
     def linear_modes(self) -> LinearModes:
-        """Modes of the structure alone with the linear stiffness of its magnets, all joints stuck."""
+        """Modes of the structure alone with the linear stiffness of its elements, all joints stuck."""
         return structure_modes(self.plant)
 
     @cached_property

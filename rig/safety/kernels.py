@@ -64,12 +64,20 @@ def watch_input(
 
 
 @kernel
-def watch_motion(guard: Record, limits: Record, amplitude_m: float, index: int, omega: float, sample: int) -> None:
-    """Check a displacement amplitude (m) and the frequency (rad/s)."""
-    if amplitude_m > OVERTRAVEL_FACTOR * limits.displacement_m:
-        shut_down(guard, OVERTRAVEL, index, amplitude_m, sample, True)
-    elif amplitude_m > limits.displacement_m:
-        shut_down(guard, DISPLACEMENT_LIMIT, index, amplitude_m, sample, False)
+def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: float, index: int, sample: int) -> None:
+    """Integrate an acceleration (m/s^2) twice, with a leak that forgets its mean, and check the displacement (m)."""
+    watch.velocity += limits.integrator_gain * acceleration - limits.integrator_leak * watch.velocity
+    watch.displacement += limits.integrator_gain * watch.velocity - limits.integrator_leak * watch.displacement
+    travel_m = abs(watch.displacement)
+    if travel_m > OVERTRAVEL_FACTOR * limits.displacement_m:
+        shut_down(guard, OVERTRAVEL, index, travel_m, sample, True)
+    elif travel_m > limits.displacement_m:
+        shut_down(guard, DISPLACEMENT_LIMIT, index, travel_m, sample, False)
+
+
+@kernel
+def watch_frequency(guard: Record, limits: Record, omega: float, sample: int) -> None:
+    """Check the frequency (rad/s) of what is put out."""
     if guard.mode == ARMED and (omega < limits.lowest_rad_s or omega > limits.highest_rad_s):
         shut_down(guard, FREQUENCY_LIMIT, -1, omega / (2.0 * math.pi), sample, False)
 

@@ -76,6 +76,8 @@ LIMITS = np.dtype(
         ("overload_samples", "i8"),
         ("stuck_samples", "i8"),
         ("ramp_down_samples", "i8"),
+        ("integrator_gain", "f8"),
+        ("integrator_leak", "f8"),
     ]
 )
 """Limits of a bench in samples and SI units (one record)."""
@@ -93,7 +95,15 @@ INPUT = np.dtype(
 """What the tick needs to know of an input channel (one record a channel)."""
 
 INPUT_WATCH = np.dtype(
-    [("mean", "f8"), ("estimate", "c16"), ("last_v", "f8"), ("same_samples", "i8"), ("overload_samples", "i8")]
+    [
+        ("mean", "f8"),
+        ("estimate", "c16"),
+        ("velocity", "f8"),
+        ("displacement", "f8"),
+        ("last_v", "f8"),
+        ("same_samples", "i8"),
+        ("overload_samples", "i8"),
+    ]
 )
 """Running state of an input channel (one record a channel)."""
 

@@ -1,7 +1,7 @@
 """Assembly of the coupled plant: linear part, site coordinates, outputs.
 
 State ``x = [q, q', x_a, v_a, i]``: modal coordinates of the structure, armature, coil current; n = 2 n_mode + 3. Inputs:
-the voltage u and the nonlinear site forces f. The linear stiffness of magnets is part of the linear plant: left in the
+the voltage u and the nonlinear site forces f. The linear stiffness of local elements is part of the linear plant: left in the
 site force it would cost 8 % of the force and 0.18 percentage points of damping at a step of 0.2 ms.
 """
 
@@ -11,19 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.elements import Element
 from simulators.exciter import Exciter, Stinger
 from simulators.friction import JenkinsSite
-from simulators.sites import Magnet
 from simulators.structure import BeamStructure, ModalStructure
 
-__all__ = ["LinearPlant", "assemble"]
+__all__ = ["LinearPlant", "assemble", "element_shape"]
 
 Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
-    """The coupled plant ``x' = A x + b_u u + B_f f`` with site coordinates ``C_s x``; sites are magnets, then joints."""
+    """The coupled plant ``x' = A x + b_u u + B_f f`` with site coordinates ``C_s x``; sites are elements, then joints."""
 
     dynamics: Matrix
     """A [n, n]."""
@@ -32,9 +32,9 @@ class LinearPlant:
     site_columns: Matrix
     """B_f [n, n_site]."""
     site_rows: Matrix
-    """C_s [n_site, n]; deflection of a magnet (m), coordinate of a joint."""
+    """C_s [n_site, n]; deflection (m) or velocity (m/s) of an element, coordinate of a joint."""
     modal_stiffness: Matrix
-    """Stiffness of the structure in its modal coordinates [n_mode, n_mode], linear magnet stiffness included (s^-2)."""
+    """Stiffness of the structure in its modal coordinates [n_mode, n_mode], that of the elements included (s^-2)."""
     modal_damping: Matrix
     """Damping ``2 zeta_i w_i`` [n_mode] (1/s)."""
     stinger_row: Matrix
@@ -68,7 +68,7 @@ class LinearPlant:
 
 def assemble(
     structure: BeamStructure | ModalStructure,
-    magnets: Sequence[Magnet],
+    elements: Sequence[Element],
     joints: Sequence[JenkinsSite],
     exciter: Exciter,
     stinger: Stinger,
@@ -77,20 +77,22 @@ def assemble(
     omega = structure.omega_rad_s
     signs = np.where(structure.shape(stinger.at) < 0.0, -1.0, 1.0)
     drive = signs * structure.shape(stinger.at)
-    coordinates = [signs * structure.shape(magnet.at) for magnet in magnets]
+    coordinates = [signs * element_shape(structure, element) for element in elements]
     stiffness = np.diag(omega**2)
-    for magnet, row in zip(magnets, coordinates, strict=True):
-        stiffness += magnet.stiffness_n_m * np.outer(row, row)
+    for element, row in zip(elements, coordinates, strict=True):
+        stiffness += element.stiffness_n_m * np.outer(row, row)
     for joint in joints:
         row = signs * structure.shape(joint.at, joint.quantity)
         coordinates.append(row / row[0] if joint.relative_to_mode_1 else row)
     damping = 2.0 * np.array(structure.damping_ratio) * omega
     m = omega.size
     site_rows = np.zeros((len(coordinates), 2 * m + 3))
-    for site, row in enumerate(coordinates):
-        site_rows[site, :m] = row
     site_columns = np.zeros((2 * m + 3, len(coordinates)))
-    site_columns[m : 2 * m] = site_rows[:, :m].T
+    for site, row in enumerate(coordinates):
+        moves_with = elements[site].moves_with if site < len(elements) else "deflection"
+        first = m if moves_with == "velocity" else 0
+        site_rows[site, first : first + m] = row
+        site_columns[m : 2 * m, site] = row
     voltage = np.zeros(2 * m + 3)
     voltage[-1] = 1.0 / exciter.inductance_h
     stinger_row = np.concatenate(
@@ -111,6 +113,12 @@ def assemble(
         drive_shape=drive,
         signs=signs,
     )
+
+
+def element_shape(structure: BeamStructure | ModalStructure, element: Element) -> Matrix:
+    """Coordinate of an element over the modes [n_mode] (kg^-1/2), as the structure gives them."""
+    shape = structure.shape(element.at)
+    return shape if element.to is None else shape - structure.shape(element.to)
 
 
 def _dynamics(stiffness: Matrix, damping: Matrix, drive: Matrix, exciter: Exciter, force: Matrix) -> Matrix:

@@ -1,34 +1,27 @@
 """The arrays of a virtual rig from its parts."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.elements import Clearance, Cubic, Element, Magnet
 from simulators.friction import JenkinsSite
-from simulators.layout import (
-    CHANNEL,
-    CONVERTER,
-    MAGNET_ONE_SIDED,
-    MAGNET_SYMMETRIC,
-    PLANT,
-    SITE,
-    RigArrays,
-    RigState,
-)
+from simulators.functions import loaded
+from simulators.layout import CHANNEL, CONVERTER, PLANT, SITE, RigArrays, RigState, SiteKind
 from simulators.plant.assembly import LinearPlant
 from simulators.plant.discretise import pad, round_up, step_columns
 from simulators.sensing.parts import Converter, Sensor
-from simulators.sites import Magnet
 
-__all__ = ["at_rest", "rig_arrays"]
+__all__ = ["at_rest", "local_sites", "rig_arrays"]
 
 Matrix = NDArray[np.float64]
 
 
 def rig_arrays(
     plant: LinearPlant,
-    magnets: Sequence[Magnet],
+    elements: Sequence[Element],
     joints: Sequence[JenkinsSite],
     outputs: Sequence[Matrix],
     sensors: Sequence[Sensor],
@@ -39,21 +32,21 @@ def rig_arrays(
 ) -> RigArrays:
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
     predictor, corrector = step_columns(plant, 1.0 / (converter.sample_rate_hz * converter.substeps))
-    n_element = round_up(max((len(joint.stiffness) for joint in joints), default=0))
-    elements = np.zeros((2, len(joints), n_element))
+    n_jenkins_element = round_up(max((len(joint.stiffness) for joint in joints), default=0))
+    jenkins = np.zeros((2, len(joints), n_jenkins_element))
     for s, joint in enumerate(joints):
         n = len(joint.stiffness)
-        elements[0, s, :n] = joint.stiffness
-        elements[1, s, :n] = np.multiply(joint.stiffness, joint.slip)
+        jenkins[0, s, :n] = joint.stiffness
+        jenkins[1, s, :n] = np.multiply(joint.stiffness, joint.slip)
     n_pair = (len(sensors) + 1) // 2
-    sizes = (plant.dynamics.shape[0], len(magnets), converter.substeps)
+    sizes = (plant.dynamics.shape[0], len(elements), converter.substeps)
     return RigArrays(
         plant=np.array([sizes], PLANT),
         step=pad(predictor),
         correct=pad(corrector, rows=False),
-        sites=np.array([_site(magnet) for magnet in magnets], SITE),
-        elements=elements,
-        stuck=elements[0].sum(axis=1),
+        sites=local_sites(elements),
+        elements=jenkins,
+        stuck=jenkins[0].sum(axis=1),
         sense=pad(np.array(outputs).T),
         channels=np.array([_channel(sensor, converter, noise_scale) for sensor in sensors], CHANNEL),
         converter=np.array(
@@ -78,11 +71,41 @@ def at_rest(rig: RigArrays) -> RigState:
     )
 
 
-def _site(magnet: Magnet) -> tuple[int, float, float, float, float, float]:
-    one_sided = magnet.kind == "one_sided"
-    kind = MAGNET_ONE_SIDED if one_sided else MAGNET_SYMMETRIC
-    at_rest_n = magnet.strength_n_m4 / magnet.gap_m**4 if one_sided else 0.0
-    return (kind, magnet.strength_n_m4, magnet.gap_m, magnet.limit_m, magnet.stiffness_n_m, at_rest_n)
+def local_sites(elements: Sequence[Element]) -> NDArray[Any]:
+    """Table of the elements for the kernels, one `simulators.layout.SITE` record each."""
+    table = np.zeros(len(elements), SITE)
+    table["limit"] = np.inf
+    for row, element in zip(table, elements, strict=True):
+        for name, value in _site(element).items():
+            row[name] = value
+    return table
+
+
+def _site(element: Element) -> dict[str, Any]:
+    if isinstance(element, Magnet):
+        return {
+            "kind": SiteKind.MAGNET_ONE_SIDED if element.one_sided else SiteKind.MAGNET_SYMMETRIC,
+            "limit": element.limit_m,
+            "stiffness": element.stiffness_n_m,
+            "strength": element.strength_n_m4,
+            "gap": element.gap_m,
+            "offset": element.strength_n_m4 / element.gap_m**4 if element.one_sided else 0.0,
+        }
+    if isinstance(element, Cubic):
+        return {"kind": SiteKind.CUBIC, "strength": element.stiffness_n_m3, "quadratic": element.quadratic_n_m2}
+    if isinstance(element, Clearance):
+        return {
+            "kind": SiteKind.CLEARANCE,
+            "strength": element.contact_stiffness_n_m,
+            "gap": element.gap_m,
+            "other_gap": np.inf if element.other_gap_m is None else element.other_gap_m,
+        }
+    return {
+        "kind": SiteKind.USER,
+        "stiffness": element.stiffness_n_m,
+        "address": loaded(element.function).address,
+        "parameters": element.padded_parameters,
+    }
 
 
 def _channel(

@@ -9,13 +9,33 @@ The predictor takes f_1 = f_0, the corrector f_1 from the predicted site coordin
 from the corrected ones and kept. Friction forces of the predictor are provisional: Jenkins elements are committed once.
 """
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
+from numba.core import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from simulators.layout import MAGNET_ONE_SIDED, MAGNET_RANGE, RigArrays, RigState
+from simulators.layout import CLEARANCE, CUBIC, MAGNET_ONE_SIDED, MAGNET_RANGE, MAGNET_SYMMETRIC, RigArrays, RigState
 from vibrolock.compiled import Record, kernel
+
+ir: Any = import_module("llvmlite.ir")  # it has no types
+
+
+def _call_at(typing: Any, address: Any, z: Any, parameters: Any) -> Any:
+    """``double (*)(double, const double *)`` at an address, called without any Python, for the user's own functions."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        double = ir.DoubleType()
+        prototype = ir.FunctionType(double, [double, double.as_pointer()])
+        function = builder.inttoptr(arguments[0], prototype.as_pointer())
+        return builder.call(function, [arguments[1], builder.inttoptr(arguments[2], double.as_pointer())])
+
+    return types.float64(types.int64, types.float64, types.uintp), generate
+
+
+call_at: Any = intrinsic(_call_at)
 
 
 @kernel
@@ -34,11 +54,11 @@ def combine(columns: NDArray[np.float64], weights: NDArray[np.float64], out: NDA
 
 
 @kernel
-def local_force(site: Record, z: float) -> float:
-    """Force (N) of one site without memory at deflection ``z`` (m), minus its linear part.
+def magnet_force(site: Record, z: float) -> float:
+    """Force (N) of a magnet at deflection ``z`` (m).
 
-    Magnets (Scheel et al.): ``-K0/(d0-z)^4 + K0/d0^4`` one-sided, ``-K0/(d0-z)^4 + K0/(d0+z)^4`` symmetric. Beyond the
-    limit of validity the force goes on along its tangent, so that it stays finite; the sample is flagged.
+    Scheel et al.: ``-K0/(d0-z)^4 + K0/d0^4`` one-sided, ``-K0/(d0-z)^4 + K0/(d0+z)^4`` symmetric. Beyond the limit of
+    validity the force goes on along its tangent, so that it stays finite; the sample is flagged.
     """
     held = min(max(z, -site.limit), site.limit)
     near = 1.0 / (site.gap - held)
@@ -52,6 +72,23 @@ def local_force(site: Record, z: float) -> float:
         slope -= 4.0 * site.strength * far_4 * far
     if held != z:
         force += slope * (z - held)
+    return float(force)
+
+
+@kernel
+def local_force(site: Record, z: float) -> float:
+    """Force (N) of one site without memory at coordinate ``z`` (m or m/s), minus its linear part.
+
+    The laws are those of `simulators.elements`.
+    """
+    if site.kind <= MAGNET_SYMMETRIC:
+        force = magnet_force(site, z)
+    elif site.kind == CUBIC:
+        force = -(site.quadratic + site.strength * z) * z * z
+    elif site.kind == CLEARANCE:
+        force = -site.strength * (max(z - site.gap, 0.0) + min(z + site.other_gap, 0.0))
+    else:
+        force = call_at(site.address, z, site.parameters.ctypes.data)
     return float(force + site.stiffness * z)
 
 

@@ -23,11 +23,11 @@ class EquationsOfMotion:
     """Right-hand side of the frictionless rig, term by term from the configuration, the whole magnet force included."""
 
     def __init__(self, rig: VirtualRig) -> None:
-        self.exciter, self.stinger, self.magnets = rig.exciter, rig.stinger, rig.magnets
+        self.exciter, self.stinger, self.elements = rig.exciter, rig.stinger, rig.elements
         self.omega = rig.structure.omega_rad_s
         self.zeta = np.array(rig.structure.damping_ratio)
         self.drive = rig.shape(rig.stinger.at)
-        self.rows = [rig.shape(magnet.at) for magnet in rig.magnets]
+        self.rows = [rig.shape(element.at) for element in rig.elements]
 
     def stinger_force_n(self, x: np.ndarray) -> float:
         m = self.omega.size
@@ -35,8 +35,8 @@ class EquationsOfMotion:
         return float(self.stinger.stiffness_n_m * stretch + self.stinger.damping_n_s_m * rate)
 
     def magnet_force_n(self, k: int, z: float) -> float:
-        strength, gap = self.magnets[k].strength_n_m4, self.magnets[k].gap_m
-        if self.magnets[k].kind == "one_sided":
+        strength, gap = self.elements[k].strength_n_m4, self.elements[k].gap_m
+        if self.elements[k].one_sided:
             return -strength / (gap - z) ** 4 + strength / gap**4
         return -strength / (gap - z) ** 4 + strength / (gap + z) ** 4
 

@@ -15,7 +15,7 @@ def table(**changes: Any) -> dict[str, Any]:
 
 
 JOINT = {"at": "clamp", "quantity": "curvature", "relative_to_mode_1": True}
-MAGNET = {"kind": "one_sided", "at": "magnet", "strength_n_m4": 1e-8, "gap_m": 0.011}
+MAGNET = {"kind": "magnet-one-sided", "at": "magnet", "strength_n_m4": 1e-8, "gap_m": 0.011}
 MODAL = {"kind": "modal", "frequency_hz": [20.0, 30.0], "damping_ratio": [0.01, 0.01]}
 
 BAD: list[tuple[dict[str, Any], str]] = [
@@ -53,11 +53,11 @@ BAD: list[tuple[dict[str, Any], str]] = [
         table(friction=[JOINT | {"stiffness": [1.0], "slip": [1e-3], "quantity": "deflection"}]),
         "a coordinate that mode 1 moves",
     ),
-    (table(magnets=[MAGNET | {"gap_m": 0.0}]), "greater than 0"),
-    (table(magnets=[MAGNET | {"at": "tipp"}]), r"magnets\[0\].at = 'tipp': allowed is one of"),
+    (table(elements=[MAGNET | {"gap_m": 0.0}]), "greater than 0"),
+    (table(elements=[MAGNET | {"at": "tipp"}]), r"elements\[0\].at = 'tipp': allowed is one of"),
     (table() | {"structure": MODAL | {"shapes": {"drive": [1.0]}}}, "shapes.drive: has 1 values, allowed is 2"),
     (
-        table(magnets=[], sensors=table()["sensors"][:1])
+        table(elements=[], sensors=table()["sensors"][:1])
         | {"structure": MODAL | {"shapes": {"drive": [1.0, 1.0], "clamp": [1.0, 1.0]}}},
         "quantity = 'curvature'",
     ),

@@ -22,9 +22,9 @@ def conservative(specimen: str, substeps: int) -> VirtualRig:
 
 def magnet_energy_j(rig: VirtualRig, z: float) -> float:
     """Integral of the restoring force from rest, in closed form."""
-    strength, gap = rig.magnets[0].strength_n_m4, rig.magnets[0].gap_m
+    strength, gap = rig.elements[0].strength_n_m4, rig.elements[0].gap_m
     near, rest = strength / (3 * (gap - z) ** 3), strength / (3 * gap**3)
-    if rig.magnets[0].kind == "one_sided":
+    if rig.elements[0].one_sided:
         return near - rest - strength * z / gap**4
     return near + strength / (3 * (gap + z) ** 3) - 2 * rest
 
@@ -50,7 +50,7 @@ def drift(specimen: str, substeps: int) -> float:
         run = simulation.run(np.zeros(5))
         largest = max(largest, float(np.max(np.abs(run.displacement_m["magnet"]))))
         energies.append(energy_j(rig, state.inputs[:11]))
-    assert 0.3 < largest / rig.magnets[0].gap_m < 0.7
+    assert 0.3 < largest / rig.elements[0].gap_m < 0.7
     return float(np.max(np.abs(np.array(energies) / energies[0] - 1.0)))
 
 

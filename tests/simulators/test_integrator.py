@@ -27,7 +27,7 @@ def errors(request: pytest.FixtureRequest) -> tuple[str, dict[int, float], float
     equations = EquationsOfMotion(ideal(specimen, friction=()))
     states = equations.solve(voltages, DT_S)
     force_n = np.array([equations.stinger_force_n(x) for x in states])
-    largest = np.max(np.abs(states[:, :4] @ equations.rows[0])) / equations.magnets[0].gap_m
+    largest = np.max(np.abs(states[:, :4] @ equations.rows[0])) / equations.elements[0].gap_m
     result = {}
     for substeps in (1, 2, 4, 8):
         run = Simulation(ideal(specimen, friction=(), converter={"substeps": substeps})).run(voltages)
@@ -63,10 +63,10 @@ def test_phi_matrices_are_the_integrals_they_stand_for() -> None:
 
 def test_linear_part_is_exact_whatever_the_step() -> None:
     # With hardly any magnet the rig is linear, and a sample with one sub-step is as good as one with eight.
-    weak = [{"kind": "one_sided", "at": "magnet", "strength_n_m4": 1e-30, "gap_m": 0.011}]
+    weak = [{"kind": "magnet-one-sided", "at": "magnet", "strength_n_m4": 1e-30, "gap_m": 0.011}]
     voltages = square_wave("magnet-beam")
     runs = [
-        Simulation(ideal(friction=(), magnets=weak, converter={"substeps": substeps})).run(voltages)
+        Simulation(ideal(friction=(), elements=weak, converter={"substeps": substeps})).run(voltages)
         for substeps in (1, 8)
     ]
     assert runs[0].force_n == pytest.approx(runs[1].force_n, abs=1e-9 * np.max(np.abs(runs[1].force_n)))

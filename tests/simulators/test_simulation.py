@@ -26,7 +26,7 @@ def linear_frf(rig: VirtualRig, frequency_hz: float) -> tuple[complex, complex]:
     w = 2 * np.pi * frequency_hz
     phi, e, s = rig.shape("drive"), rig.exciter, rig.stinger
     stiffness = np.diag(rig.structure.omega_rad_s**2).astype(complex)
-    stiffness += rig.magnets[0].stiffness_n_m * np.outer(rig.shape("magnet"), rig.shape("magnet"))
+    stiffness += rig.elements[0].stiffness_n_m * np.outer(rig.shape("magnet"), rig.shape("magnet"))
     damping = np.diag(2 * np.array(rig.structure.damping_ratio) * rig.structure.omega_rad_s)
     receptance = phi @ np.linalg.solve(stiffness + 1j * w * damping - w**2 * np.eye(4), phi)
     rod = s.stiffness_n_m + 1j * w * s.damping_n_s_m

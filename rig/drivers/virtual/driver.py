@@ -130,7 +130,7 @@ class VirtualDAQ(DAQ):
         self._first = 0
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        exchange_block(self._arrays, self._state, self._queue, self._first, voltages, inputs, self._counts)
+        exchange_block(self._arrays, self._state, self._queue, self._first, voltages, inputs, self.flags, self._counts)
         self._first += voltages.size
 
     def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:

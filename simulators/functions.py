@@ -1,0 +1,63 @@
+"""Compiled functions of the user's own, by name or as objects: where they are found, checked and kept."""
+
+import ctypes
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+from numba.core.ccallback import CFunc
+
+__all__ = ["Loaded", "loaded", "named"]
+
+_ARGUMENTS = (ctypes.c_double, ctypes.POINTER(ctypes.c_double))
+_PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, *_ARGUMENTS)
+_FUNCTION_POINTER: Any = _PROTOTYPE.__base__ or object  # what every C function object derives from
+_ALLOWED = "allowed is a numba cfunc or C function float64(float64, CPointer(float64))"
+
+_kept: dict[int, Any] = {}
+"""Objects behind the addresses that were given out: machine code must not be freed while a rig may call it."""
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A function in memory; its address holds in this process only."""
+
+    address: int
+
+    def __call__(self, z: float, parameters: tuple[float, ...]) -> float:
+        """Force for one deflection or velocity."""
+        return float(_PROTOTYPE(self.address)(z, (ctypes.c_double * len(parameters))(*parameters)))
+
+
+def named(function: Any) -> str:
+    """``module:name`` of a function object; a name is returned as it is."""
+    if isinstance(function, str):
+        return function
+    made_from = getattr(function, "__wrapped__", function)
+    name = getattr(made_from, "__qualname__", None) or getattr(made_from, "__name__", None) or repr(made_from)
+    return f"{getattr(made_from, '__module__', None) or type(made_from).__module__}:{name}"
+
+
+def loaded(function: Any) -> Loaded:
+    """The function behind a name or an object; `ValueError` where there is none or it has another signature."""
+    what = f"function = {named(function)!r}"
+    found = _imported(function) if isinstance(function, str) else function
+    pointer: Any = found.ctypes if isinstance(found, CFunc) else found
+    if not isinstance(pointer, _FUNCTION_POINTER):
+        raise ValueError(f"{what}: is a {type(found).__name__}, {_ALLOWED}")
+    if pointer.restype is not ctypes.c_double or tuple(pointer.argtypes or ()) != _ARGUMENTS:
+        shown = ", ".join(one.__name__ for one in pointer.argtypes or ())
+        raise ValueError(f"{what}: is {getattr(pointer.restype, '__name__', None)}({shown}), {_ALLOWED}")
+    address = int(ctypes.cast(pointer, ctypes.c_void_p).value or 0)
+    _kept[address] = found
+    return Loaded(address)
+
+
+def _imported(name: str) -> Any:
+    module, colon, attribute = name.partition(":")
+    if not (colon and module and attribute):
+        raise ValueError(f"function = {name!r}: allowed is 'module:name'")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # the user's module may fail in any way
+        raise ValueError(f"function = {name!r}: {error}; allowed is a function that can be imported") from None
