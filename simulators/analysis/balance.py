@@ -67,7 +67,7 @@ class Solution:
         change = np.zeros(self.unknowns.size)
         change[-1] = level
         change[-2] = value if self.conditions.at == "lag" else value / self.conditions.value
-        return np.linalg.solve(self.jacobian, change)
+        return np.asarray(np.linalg.solve(self.jacobian, change), dtype=np.float64)
 
 
 class Balance:

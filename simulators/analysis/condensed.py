@@ -47,4 +47,4 @@ class CondensedRig:
         """Harmonics of the state [n_order, n] from those of site forces and voltage [n_site + 1, n_order]."""
         orders = np.arange(inputs.shape[1])
         forced = self.columns @ inputs
-        return np.einsum("hij,jh->hi", self.resolvent(omega_rad_s, orders), forced)
+        return np.asarray(np.einsum("hij,jh->hi", self.resolvent(omega_rad_s, orders), forced))

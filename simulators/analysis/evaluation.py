@@ -32,12 +32,8 @@ class Evaluation:
             ]
         )
 
-    def __call__(
-        self, solutions: Sequence[Solution], stable: NDArray[np.bool_] | None = None
-    ) -> PeriodicResponses | None:
-        """One point per solution, in their order; None without any."""
-        if not solutions:
-            return None
+    def __call__(self, solutions: Sequence[Solution], stable: NDArray[np.bool_] | None = None) -> PeriodicResponses:
+        """One point per solution (at least one), in their order."""
         omega, voltage = np.array([solution.unknowns[-2:] for solution in solutions]).T
         coordinates, forces, outputs, neglected, beyond = zip(*(self._point(one) for one in solutions), strict=True)
         harmonics = np.transpose(np.array(outputs), (1, 0, 2))

@@ -69,7 +69,7 @@ def phase_resonance_backbone(
     lag = float(lags_rad("phase_lag_deg", [phase_lag_deg])[0])
     study = _Study.of(rig, near_hz, harmonics, samples)
     goals = [Conditions(held, float(level), "lag", lag) for level in values]
-    return study.responses(study.path(goals))
+    return study.evaluation(study.path(goals))
 
 
 def constant_force_response(
@@ -121,7 +121,6 @@ def constant_force_response(
     found = study.evaluation(solutions, stable=slopes > 0.0)
     if failure or failed_below:
         raise NotConvergedError("; ".join(str(one) for one in (failed_below, failure) if one), found)
-    assert found is not None
     return found
 
 
@@ -161,7 +160,7 @@ def forced_response(
     voltage = float(positive("voltage_v", [voltage_v])[0])
     omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
     study = _Study.of(rig, near_hz, harmonics, samples)
-    return study.responses(study.path([Conditions("voltage", voltage, "frequency", float(w)) for w in omega]))
+    return study.evaluation(study.path([Conditions("voltage", voltage, "frequency", float(w)) for w in omega]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +182,7 @@ class _Study:
         """One vibration per goal; `NotConvergedError` with those found before."""
         solutions, failure = self.tried(goals)
         if failure is not None:
-            raise NotConvergedError(str(failure), self.evaluation(solutions)) from failure
+            raise NotConvergedError(str(failure), self.evaluation(solutions) if solutions else None) from failure
         return solutions
 
     def tried(
@@ -207,8 +206,3 @@ class _Study:
                 if goal.at == "lag":
                     raise
         return from_rest(self.balance, goal, goal.value if goal.at == "frequency" else self.resonance_rad_s)
-
-    def responses(self, solutions: Sequence[Solution]) -> PeriodicResponses:
-        found = self.evaluation(solutions)
-        assert found is not None
-        return found
