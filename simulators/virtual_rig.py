@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
@@ -38,7 +38,7 @@ class VirtualRig(Part):
     """The vibrating structure."""
     magnets: Several[Magnet] = ()
     """Magnets facing the structure."""
-    friction: Several[JenkinsSite] = ()
+    friction: Several[FrictionSite] = ()
     """Friction joints."""
     exciter: Exciter
     """The shaker and its amplifier."""

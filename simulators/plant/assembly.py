@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.sites import Magnet
-from simulators.structure import BeamStructure, ModalStructure
+from simulators.structure import Structure
 
 __all__ = ["LinearPlant", "assemble"]
 
@@ -67,9 +67,9 @@ class LinearPlant:
 
 
 def assemble(
-    structure: BeamStructure | ModalStructure,
+    structure: Structure,
     magnets: Sequence[Magnet],
-    joints: Sequence[JenkinsSite],
+    joints: Sequence[FrictionSite],
     exciter: Exciter,
     stinger: Stinger,
 ) -> LinearPlant:

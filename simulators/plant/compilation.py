@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.layout import (
     CHANNEL,
     CONVERTER,
@@ -29,7 +29,7 @@ Matrix = NDArray[np.float64]
 def rig_arrays(
     plant: LinearPlant,
     magnets: Sequence[Magnet],
-    joints: Sequence[JenkinsSite],
+    joints: Sequence[FrictionSite],
     outputs: Sequence[Matrix],
     sensors: Sequence[Sensor],
     converter: Converter,
