@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.elements import Clearance, Cubic, Element, Magnet
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.functions import loaded
 from simulators.layout import CHANNEL, CONVERTER, PLANT, SITE, RigArrays, RigState, SiteKind
 from simulators.plant.assembly import LinearPlant
@@ -24,7 +24,7 @@ Matrix = NDArray[np.float64]
 def rig_arrays(
     plant: LinearPlant,
     elements: Sequence[Element],
-    joints: Sequence[JenkinsSite],
+    joints: Sequence[FrictionSite],
     outputs: Sequence[Matrix],
     sensors: Sequence[Sensor],
     converter: Converter,
@@ -55,7 +55,7 @@ def rig_arrays(
     )
 
 
-def jenkins_elements(joints: Sequence[JenkinsSite]) -> Matrix:
+def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:
     """Stiffness and slip force of every element [2, n_element, n_joint], padded with elements without stiffness."""
     n_element = max((len(joint.stiffness) for joint in joints), default=0)
     table = aligned((2, n_element, round_up(len(joints))))
