@@ -53,7 +53,8 @@ def beam(
 
 
 def omega_rad_s(beta_l: tuple[float, ...]) -> np.ndarray:
-    return np.array(beta_l) ** 2 / LENGTH_M**2 * np.sqrt(STIFFNESS / MASS)
+    omega: np.ndarray = np.array(beta_l) ** 2 / LENGTH_M**2 * np.sqrt(STIFFNESS / MASS)
+    return omega
 
 
 @pytest.mark.parametrize("boundary", sorted(CLOSED_FORM))
