@@ -36,7 +36,7 @@ def test_bad_values_are_named(analysis: Callable[..., Any], arguments: dict[str,
 
 def test_a_level_out_of_reach_is_named_and_the_points_before_it_are_kept() -> None:
     softening = one_mode(elements=[{"kind": "cubic", "at": "drive", "stiffness_n_m3": -3e8}])
-    with pytest.raises(NotConvergedError, match="force .* N, lag -90 deg") as caught:
+    with pytest.raises(NotConvergedError, match=r"force .* N, lag -90 deg") as caught:
         phase_resonance_backbone(softening, forces_n=[0.1, 0.5, 1000.0])
     assert caught.value.found is not None
     np.testing.assert_allclose(caught.value.found.force_n, [0.1, 0.5], rtol=1e-8)
@@ -51,9 +51,9 @@ def test_what_a_run_would_flag_is_flagged() -> None:
     assert found.voltage_v[1] > 1.0 > found.voltage_v[0]
     drive = np.abs(found.sensor_harmonics["drive"])
     assert np.max(drive[1]) > 20.0 > drive[0].sum()
-    assert Flag(found.flags[0]) == Flag(0)
-    assert Flag(found.flags[1]) == Flag.DAC_CLIPPED | Flag.SENSOR_CLIPPED
-    assert Flag.MAGNET_RANGE in Flag(found.flags[2])
+    assert Flag(int(found.flags[0])) == Flag(0)
+    assert Flag(int(found.flags[1])) == Flag.DAC_CLIPPED | Flag.SENSOR_CLIPPED
+    assert Flag.MAGNET_RANGE in Flag(int(found.flags[2]))
     assert np.abs(found.point_harmonics_m["magnet"][2]).sum() > 0.7 * 0.011
 
 
