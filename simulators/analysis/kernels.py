@@ -5,8 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.plant.kernels import clip, local_forces
+from simulators.plant.kernels import local_forces
 from vibrolock.compiled import kernel
+
+
+@kernel
+def clip(value: float, limit: float) -> float:
+    """``value`` within plus and minus ``limit``."""
+    return min(max(value, -limit), limit)
 
 
 @kernel
