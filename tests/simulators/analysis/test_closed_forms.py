@@ -54,7 +54,7 @@ def test_a_users_drag_damps_as_equivalent_linearisation_says() -> None:
 
 
 def test_a_single_element_in_full_slip_loses_what_its_parallelogram_holds() -> None:
-    joint = {"at": "drive", "stiffness": [2000.0], "slip": [2e-5]}
+    joint = {"kind": "jenkins", "at": "drive", "stiffness": [2000.0], "slip": [2e-5]}
     rig = one_mode(friction=[joint])
     found = phase_resonance_backbone(rig, forces_n=[0.5, 1.0], harmonics=31, samples=2048)
     for k in (0, 1):

@@ -138,3 +138,11 @@ def test_the_rig_settles_at_ten_levels_where_harmonic_balance_says(specimen: str
         assert modal / (2 * np.pi) == pytest.approx(found.modal_frequency_hz[k], rel=1e-5)
         assert damping == pytest.approx(found.damping_ratio[k], rel=2e-3)
         assert abs(drive) == pytest.approx(found.amplitude_m[k], rel=1e-3)
+
+
+def test_a_few_lags_far_from_resonance_need_nothing_in_between() -> None:
+    rig = VirtualRig.shipped("magnet-beam")
+    few = constant_force_response(rig, 0.55, [-175.0, -170.0])
+    whole = constant_force_response(rig, 0.55, [-175.0, -170.0, -90.0, -10.0])
+    np.testing.assert_allclose(few.frequency_hz, whole.frequency_hz[:2], rtol=1e-8)
+    np.testing.assert_allclose(few.amplitude_m, whole.amplitude_m[:2], rtol=1e-7)
