@@ -3,7 +3,8 @@
 The rig is driven by the pure voltage ``u = U cos(theta)`` in continuous time. Its linear part is solved exactly per
 harmonic, the nonlinear sites by alternating frequency-time (Cameron & Griffin 1989) with ``samples`` per period;
 friction carries its memory over two periods from the virgin state, the second of which counts. Where a site leaves the
-range in which its law holds, the point is flagged.
+range in which its law holds, the point is flagged. Of a rig that scatters it is the nominal specimen that is analysed;
+``rig.realised(seed)`` is that of one run.
 
 Lags are those of the drive point's acceleration behind the stinger force, fundamentals: -90 deg is phase resonance.
 """

@@ -1,5 +1,6 @@
 """From one periodic vibration to the next: prediction along the tangent, halved where Newton does not arrive."""
 
+import math
 from dataclasses import replace
 
 from simulators.analysis.balance import Balance, Conditions, Solution
@@ -9,13 +10,19 @@ __all__ = ["follow", "from_rest"]
 
 _NEARLY_LINEAR = 1e-3
 """The first level is approached from this share of it, starting with the vibration of the linear rig."""
+_RESONANCE_RAD = -0.5 * math.pi
 _DEEPEST = 8
 
 
 def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solution:
-    """The vibration at ``goal`` that a level raised from zero leads to; its lag or frequency is held meanwhile."""
+    """The vibration at ``goal`` that a level raised from zero leads to; its lag or frequency is held meanwhile.
+
+    It starts at ``omega_rad_s``: the frequency of the goal, or that of resonance, from which the lag is then turned.
+    """
     low = replace(goal, level=_NEARLY_LINEAR * goal.level)
-    return follow(balance, balance.solve(balance.linear_start(low, omega_rad_s), low), goal)
+    start = replace(low, value=_RESONANCE_RAD) if goal.at == "lag" else low
+    here = balance.solve(balance.linear_start(start, omega_rad_s), start)
+    return follow(balance, follow(balance, here, low), goal)
 
 
 def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -> Solution:
