@@ -1,6 +1,7 @@
 """Slower copies of recordings: low-pass and decimation by a rational factor."""
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +55,7 @@ def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray
     if ratio == 1:
         return np.array(array)
     up, down = ratio.numerator, ratio.denominator
-    low_pass = firwin(2 * EDGE_SAMPLES * down + 1, _CORNER / down, window=("kaiser", _KAISER_BETA))
+    # The stubs of scipy know of no array here.
+    low_pass: Any = firwin(2 * EDGE_SAMPLES * down + 1, _CORNER / down, window=("kaiser", _KAISER_BETA))
     slower: NDArray[np.float64] = resample_poly(array, up, down, axis=-1, window=low_pass)
     return slower
