@@ -29,6 +29,7 @@ Float = NDArray[np.float64]
 
 _MAX_BATCHES = 20
 _MIN_BATCHES = 4
+_SAMPLES_TO_SPARE = 3  # that many more are needed to be sure of the last period
 
 
 def periodic_vibration(
@@ -120,7 +121,7 @@ def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float,
         )
     count = int(np.searchsorted(theta - theta[0], 2.0 * np.pi * periods - 0.5 * step))
     warnings = []
-    if theta.size - count > 1:
+    if theta.size - count > _SAMPLES_TO_SPARE:
         warnings.append(f"{theta.size - count} samples beyond {periods} whole periods are left out")
     if periods < _MIN_BATCHES:
         warnings.append(

@@ -49,7 +49,7 @@ def print_summary(summary: dict[str, Any]) -> None:
                 f"{p['level']:.4g}",
                 p["level_unit"],
                 *(number(p[column.key], column.pattern, column.scale) for column in columns),
-                "yes" if p["settled"] else "no",
+                {True: "yes", False: "no", None: "-"}[p["settled"]],
                 "ok" if p["accepted"] else p["reason"],
             )
             for p in summary["points"]

@@ -42,7 +42,7 @@ class SiteKind(IntEnum):
 MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER = (int(kind) for kind in SiteKind)
 N_PARAMETER = 8
 
-PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("substeps", "i8")])
+PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_joint", "i8"), ("substeps", "i8")])
 """Sizes (one record)."""
 
 SITE = np.dtype(
@@ -94,12 +94,11 @@ CONVERTER = np.dtype(
 class RigArrays(NamedTuple):
     """The rig as its kernels see it; never written to during a run.
 
-    ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_jenkins]``;
-    its rows are ``[x, site coordinates]``. ``correct`` [n_site, n_row]: what a change of each site force over the
-    sub-step adds. ``elements`` [2, n_jenkins, n_element]: stiffness and slip force of every Jenkins element; ``stuck``
-    [n_jenkins]: sum of the stiffnesses of a site. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
-    vector. Inputs, rows, elements and the columns of ``sense`` are padded with zeros to multiples of four, so that the
-    compiled loops run over whole vectors.
+    ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_joint]``; its
+    rows are ``[joint coordinates, local coordinates, x]``. ``correct`` [n_site, n_row]: what a change of each site
+    force over the sub-step adds. ``elements`` [2, n_element, n_joint]: stiffness and slip force of every Jenkins element;
+    ``stuck`` [n_joint]: sum of the stiffnesses of a joint. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
+    vector. Inputs, rows, joints and the columns of ``sense`` are padded with zeros to whole vectors of the compiled loops.
 
     ``noise_keys`` [1 + n_channel]: of the output, then of each channel. ``sections`` [n_section, 5, n_channel] and
     ``reconstruction`` [n_section, 5, 1]: filters of sensors and output as second-order sections, b_0 b_1 b_2 a_1 a_2, at
@@ -125,8 +124,8 @@ class RigArrays(NamedTuple):
 class RigState(NamedTuple):
     """Everything a run depends on, and the scratch space of its kernels.
 
-    ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_jenkins]`` at the present instant. ``deflection``
-    [n_jenkins] and ``friction`` [n_jenkins, n_element]: committed state of the Jenkins elements. ``filters``
+    ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_joint]`` at the present instant. ``deflection``
+    [n_joint] and ``friction`` [n_element, n_joint]: committed state of the Jenkins elements. ``filters``
     [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
     which its noise is drawn. ``memory`` [n_section, 2, n_channel] and ``output_memory`` [n_section, 2, 1]: of the filters.
     ``history`` [n_ring, n_channel]: ring of conditioned volts at internal instants, its length a power of two, or 0 where
@@ -144,4 +143,6 @@ class RigState(NamedTuple):
     output_v: NDArray[np.float64]
     rows: NDArray[np.float64]
     forces: NDArray[np.float64]
+    joints: NDArray[np.float64]
+    changes: NDArray[np.float64]
     outputs: NDArray[np.float64]

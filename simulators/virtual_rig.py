@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from simulators.elements import Element, Magnet
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
@@ -40,7 +40,7 @@ class VirtualRig(Part):
     """The vibrating structure."""
     elements: Several[Element] = ()
     """Local nonlinear elements without memory: magnets, springs, stops, functions of the user's own."""
-    friction: Several[JenkinsSite] = ()
+    friction: Several[FrictionSite] = ()
     """Friction joints."""
     exciter: Exciter
     """The shaker and its amplifier."""

@@ -5,18 +5,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.plant.discretise import pad
+from simulators.plant.discretise import aligned, pad
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["Rk4Arrays", "Rk4State", "build"]
 
 
 class Rk4Arrays(NamedTuple):
-    """The continuous plant: ``derivative`` [n_input, n_row] maps ``[x, u, f]`` to the rates of ``[x, site coordinates]``."""
+    """The continuous plant: ``derivative`` [n_input, n_row] maps ``[x, u, f]`` to the rates of the rows of a rig."""
 
     step_s: NDArray[np.float64]
     substeps: NDArray[np.int64]
-    n_state: NDArray[np.int64]
+    plant: NDArray[Any]
     derivative: NDArray[np.float64]
     sites: NDArray[Any]
     elements: NDArray[np.float64]
@@ -25,16 +25,17 @@ class Rk4Arrays(NamedTuple):
 
 
 class Rk4State(NamedTuple):
-    """``inputs``: ``[x, u, f]``; ``start``: ``[x, site coordinates]``; Jenkins state as in the rig; the rest is scratch."""
+    """``inputs``: ``[x, u, f]``; ``start``: rows as in the rig, as is the Jenkins state; the rest is scratch."""
 
     inputs: NDArray[np.float64]
     start: NDArray[np.float64]
     deflection: NDArray[np.float64]
     friction: NDArray[np.float64]
-    stage: NDArray[np.float64]
+    rows: NDArray[np.float64]
     slope: NDArray[np.float64]
     total: NDArray[np.float64]
     forces: NDArray[np.float64]
+    joints: NDArray[np.float64]
     outputs: NDArray[np.float64]
 
 
@@ -43,26 +44,28 @@ def build(rig: VirtualRig, substeps: int = 8) -> tuple[Rk4Arrays, Rk4State]:
     arrays, state = rig.build()
     plant = rig.plant
     columns = np.column_stack([plant.dynamics, plant.voltage_column, plant.site_columns])
-    derivative = pad(np.vstack([columns, plant.site_rows @ columns]).T)
+    rows = np.roll(plant.site_rows, len(rig.friction), axis=0)
+    derivative = pad(np.vstack([rows @ columns, columns]).T)
     reference = Rk4Arrays(
         step_s=np.array([1.0 / (rig.converter.sample_rate_hz * substeps)]),
         substeps=np.array([substeps]),
-        n_state=np.array([plant.dynamics.shape[0]]),
+        plant=arrays.plant,
         derivative=derivative,
         sites=arrays.sites,
         elements=arrays.elements,
         stuck=arrays.stuck,
         sense=arrays.sense,
     )
-    start, stage, slope, total = np.zeros((4, derivative.shape[1]))
+    start, stage, slope, total = (aligned(derivative.shape[1]) for _ in range(4))
     return reference, Rk4State(
-        np.zeros(derivative.shape[0]),
-        start,
-        state.deflection,
-        state.friction,
-        stage,
-        slope,
-        total,
-        state.forces,
-        state.outputs,
+        inputs=state.inputs,
+        start=start,
+        deflection=state.deflection,
+        friction=state.friction,
+        rows=stage,
+        slope=slope,
+        total=total,
+        forces=state.forces,
+        joints=state.joints,
+        outputs=state.outputs,
     )

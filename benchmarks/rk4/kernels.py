@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.rk4.arrays import Rk4Arrays, Rk4State
-from simulators.plant.kernels import clip, combine, local_forces
+from simulators.plant.kernels import combine, joint_forces, local_forces
 from vibrolock.compiled import kernel
 
 
@@ -18,12 +18,10 @@ def sample(rig: Rk4Arrays, state: Rk4State, voltage: float, out: NDArray[np.floa
     combine(rig.sense, state.inputs, state.outputs)
     for c in range(out.size):
         out[c] = state.outputs[c]
-    derivative, sites, elements, stuck = rig.derivative, rig.sites, rig.elements, rig.stuck
-    inputs, start, stage, slope, total = state.inputs, state.start, state.stage, state.slope, state.total
-    forces, friction, deflection = state.forces, state.friction, state.deflection
-    n, h = rig.n_state[0], rig.step_s[0]
-    n_local = sites.size
-    _, n_jenkins, n_element = elements.shape
+    inputs, start, stage, slope, total = state.inputs, state.start, state.rows, state.slope, state.total
+    n, n_local, n_joint = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_joint
+    n_site = n_local + n_joint
+    h = rig.step_s[0]
     inputs[n] = voltage
     for _ in range(rig.substeps[0]):
         for i in range(start.size):
@@ -31,26 +29,17 @@ def sample(rig: Rk4Arrays, state: Rk4State, voltage: float, out: NDArray[np.floa
             total[i] = 0.0
         # Four stages, and a fifth look at the sites to commit what they came to.
         for k in range(5):
-            local_forces(sites, stage, n, forces)
-            for s in range(n_jenkins):
-                z = stage[n + n_local + s]
-                dz = z - deflection[s]
-                force = stuck[s] * z
-                for e in range(n_element):
-                    held = clip(friction[s, e] + elements[0, s, e] * dz, elements[1, s, e])
-                    if k == 4:
-                        friction[s, e] = held
-                    force -= held
-                forces[n_local + s] = force
-                if k == 4:
-                    deflection[s] = z
-            for s in range(n_local + n_jenkins):
-                inputs[n + 1 + s] = forces[s]
+            joint_forces(rig, state, k == 4)
+            local_forces(rig.sites, stage, n_joint, state.forces)
+            for s in range(n_local):
+                inputs[n + 1 + s] = state.forces[s]
+            for s in range(n_joint):
+                inputs[n + 1 + n_local + s] = state.joints[s]
             for i in range(n):
-                inputs[i] = stage[i]
+                inputs[i] = stage[n_site + i]
             if k == 4:
                 break
-            combine(derivative, inputs, slope)
+            combine(rig.derivative, inputs, slope)
             weight = h / 6.0 if k == 0 or k == 3 else h / 3.0
             ahead = h if k == 2 else 0.5 * h
             for i in range(start.size):

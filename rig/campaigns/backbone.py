@@ -113,7 +113,7 @@ class BackbonePlan(Plan):
             )
         )
 
-    def segments(self, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done`` already.
 
         A point whose predecessor is done is approached from its predecessor's level, so that it is reached from the

@@ -6,7 +6,13 @@ from typing import Any
 
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import BACKBONE_COLUMNS, measure_backbone_point
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import MULTISINE_COLUMNS, measure_multisine_point
 from rig.campaigns.plan import Column, Plan
+from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS, measure_stepped_sine_point
+from rig.campaigns.sweep import SweepPlan
+from rig.campaigns.sweep_points import SWEEP_COLUMNS, measure_sweep
 
 __all__ = ["KINDS", "Campaign"]
 
@@ -25,4 +31,7 @@ class Campaign:
 
 KINDS = {
     "backbone": Campaign(BackbonePlan, measure_backbone_point, BACKBONE_COLUMNS),
+    "stepped-sine": Campaign(SteppedSinePlan, measure_stepped_sine_point, STEPPED_SINE_COLUMNS),
+    "sweep": Campaign(SweepPlan, measure_sweep, SWEEP_COLUMNS),
+    "multisine": Campaign(MultisinePlan, measure_multisine_point, MULTISINE_COLUMNS),
 }

@@ -12,7 +12,7 @@ from rig.configuration import Configured
 from rig.errors import ConfigurationError
 from rig.sequencer.segments import Segment, SettleRule
 
-__all__ = ["Column", "OpenLoopPlan", "Plan", "Target"]
+__all__ = ["Column", "OpenLoopPlan", "Plan", "Target", "TonePlan"]
 
 
 class Target(Configured):
@@ -81,7 +81,7 @@ class Plan(Configured):
         """All points in the order of measurement."""
 
     @abstractmethod
-    def segments(self, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done`` already."""
 
     def waveforms(self, sample_rate_hz: float) -> np.ndarray | None:
@@ -96,8 +96,6 @@ class Plan(Configured):
 class OpenLoopPlan(Plan):
     """Base of the plans without feedback: voltage and frequency are the plan's."""
 
-    levels_v: tuple[float, ...] = Field(min_length=1)
-    """Amplitudes of the output voltage, V peak; every level is gone through in turn."""
     demodulation: OpenLoop = OpenLoop()
     """How force and response are demodulated beside the excitation, to see them settle."""
 
@@ -106,15 +104,6 @@ class OpenLoopPlan(Plan):
         """No feedback."""
         return self.demodulation
 
-    def check_levels(self, bench: Bench) -> None:
-        """Refuse a level that is not positive or beyond the bench's limit."""
-        for index, level in enumerate(self.levels_v):
-            if not 0.0 < level <= bench.limits.voltage_v:
-                raise ConfigurationError(
-                    f"levels_v[{index}] = {level:g} V: the bench {bench.name} allows above 0 and up to "
-                    f"{bench.limits.voltage_v:g} V"
-                )
-
     def check_frequencies(self, bench: Bench, **frequencies_hz: float) -> None:
         """Refuse a frequency outside the bench's limits."""
         lowest, highest = bench.limits.frequency_hz
@@ -122,4 +111,20 @@ class OpenLoopPlan(Plan):
             if not lowest <= frequency_hz <= highest:
                 raise ConfigurationError(
                     f"{name} = {frequency_hz:g} Hz: the bench {bench.name} allows {lowest:g} to {highest:g} Hz"
+                )
+
+
+class TonePlan(OpenLoopPlan):
+    """Base of the plans that put out one frequency at a time."""
+
+    levels_v: tuple[float, ...] = Field(min_length=1)
+    """Amplitudes of the output voltage, V peak; every level is gone through in turn."""
+
+    def check_levels(self, bench: Bench) -> None:
+        """Refuse a level that is not positive or beyond the bench's limit."""
+        for index, level in enumerate(self.levels_v):
+            if not 0.0 < level <= bench.limits.voltage_v:
+                raise ConfigurationError(
+                    f"levels_v[{index}] = {level:g} V: the bench {bench.name} allows above 0 and up to "
+                    f"{bench.limits.voltage_v:g} V"
                 )

@@ -44,7 +44,7 @@ def carry_out(
     make_way(output, overwrite)
     with _armable(bench, seed) as daq:
         daq.start(bench.block)
-        tick = _tick(plan, bench, daq, plan.segments())
+        tick = _tick(plan, bench, daq, plan.segments(bench.sample_rate_hz))
         header = Header(
             kind=plan.kind,
             configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
@@ -78,7 +78,7 @@ def take_up(
         first_sample = recording.n_rows
         seed = recording.seed or 0
         parts = len(recording.parts)
-    segments = plan.segments(done)
+    segments = plan.segments(bench.sample_rate_hz, done)
     if not segments:
         if journal_path(output).exists():
             finalise(journal_path(output), output)

@@ -55,6 +55,7 @@ def watch_input(
         shut_down(guard, SENSOR_OVERLOAD, index, volts * channel.unit_per_volt, sample, False)
     watch.same_samples = watch.same_samples + 1 if driven and volts == watch.last_v else 0
     watch.last_v = volts
+    watch.alert = 1 if watch.same_samples > 0 or watch.overload_samples > 0 else 0
     if watch.same_samples >= limits.stuck_samples:
         shut_down(guard, SENSOR_STUCK, index, volts * channel.unit_per_volt, sample, False)
     if guard.mode == ARMED and abs(volts * channel.unit_per_volt) > channel.limit:
@@ -66,9 +67,12 @@ def watch_input(
 @kernel
 def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: float, index: int, sample: int) -> None:
     """Integrate an acceleration (m/s^2) twice, with a leak that forgets its mean, and check the displacement (m)."""
-    watch.velocity += limits.integrator_gain * acceleration - limits.integrator_leak * watch.velocity
-    watch.displacement += limits.integrator_gain * watch.velocity - limits.integrator_leak * watch.displacement
-    travel_m = abs(watch.displacement)
+    gain, keep = limits.integrator_gain, 1.0 - limits.integrator_leak
+    velocity = keep * watch.velocity + gain * acceleration
+    displacement = keep * watch.displacement + gain * velocity
+    watch.velocity = velocity
+    watch.displacement = displacement
+    travel_m = abs(displacement)
     if travel_m > OVERTRAVEL_FACTOR * limits.displacement_m:
         shut_down(guard, OVERTRAVEL, index, travel_m, sample, True)
     elif travel_m > limits.displacement_m:

@@ -86,6 +86,7 @@ INPUT = np.dtype(
     [
         ("unit_per_volt", "f8"),
         ("overload_v", "f8"),
+        ("alarm_v", "f8"),
         ("limit", "f8"),
         ("role", "i8"),
         ("skew_samples", "f8"),
@@ -103,6 +104,7 @@ INPUT_WATCH = np.dtype(
         ("last_v", "f8"),
         ("same_samples", "i8"),
         ("overload_samples", "i8"),
+        ("alert", "i8"),
     ]
 )
 """Running state of an input channel (one record a channel)."""

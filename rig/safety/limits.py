@@ -42,6 +42,7 @@ def input_records(bench: Bench) -> np.ndarray:
             if accelerates
             else math.inf
         )
+        record["alarm_v"] = min(record["overload_v"], record["limit"] * abs(channel.sensitivity_v_per_unit))
         record["role"] = channel.role_code
         record["skew_samples"] = channel.skew_samples
         record["watch_displacement"] = accelerates

@@ -52,36 +52,55 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 
 
 @kernel
+def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tuple[bool, bool]:
+    """A reading that is not plainly in order: watch it; returns whether it may be used, and whether it is a motion.
+
+    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel.
+    """
+    guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
+    channel, watch = t.inputs[index], t.watches[index]
+    usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
+    faulty = watch.same_samples >= STUCK_SAMPLES or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD)
+    return usable, not faulty and abs(volts * channel.unit_per_volt) <= channel.limit
+
+
+@kernel
 def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
     """Check, convert and demodulate every input channel; returns the telemetry flags of the inputs."""
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
-    driven = guard.mode == ARMED and loop.held == 1
+    armed = guard.mode == ARMED
+    driven = armed and loop.held == 1
+    mean_gain, gain, first = law.mean_gain, law.demodulator_gain, loop.sample == 0
     flags = 0
     force = 0.0
     drive = 0.0
     for index in range(t.inputs.size):
         channel, watch = t.inputs[index], t.watches[index]
-        usable = watch_input(guard, limits, channel, watch, index, volts[index], loop.sample, driven)
-        value = volts[index] * channel.unit_per_volt
+        volt = volts[index]
+        value = volt * channel.unit_per_volt
         readings[index] = value
-        if not usable:
-            continue
-        if watch.overload_samples > 0:
-            flags |= SENSOR_AT_RANGE
-        if loop.sample == 0:
-            watch.mean = value
-        watch.mean = track(watch.mean, value, law.mean_gain)
-        value -= watch.mean
-        watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, law.demodulator_gain)
+        moves = True
+        in_order = armed and abs(volt) < channel.alarm_v and volt != watch.last_v and watch.alert == 0
+        if in_order:
+            watch.last_v = volt
+        else:
+            usable, moves = examine_input(t, index, volt, driven)
+            if not usable:
+                continue
+            if watch.overload_samples > 0:
+                flags |= SENSOR_AT_RANGE
+        mean = value if first else track(watch.mean, value, mean_gain)
+        watch.mean = mean
+        value -= mean
+        watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, gain)
         if index == loop.force_channel:
             force = value
         if index == loop.drive_channel:
             drive = value
-        # A reading beyond its limit, and a sensor that trips as faulty: integrated, the fault would pass for travel.
-        faulty = watch.same_samples >= STUCK_SAMPLES or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD)
-        if channel.watch_displacement == 1 and abs(readings[index]) <= channel.limit and not faulty:
+        if channel.watch_displacement == 1 and moves:
             watch_motion(guard, limits, watch, value, index, loop.sample)
-    loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), law.demodulator_gain)
+    if law.detector == SIGN:
+        loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), gain)
     return flags
 
 

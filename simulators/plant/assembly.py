@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from simulators.elements import Element
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import JenkinsSite
-from simulators.structure import BeamStructure, ModalStructure
+from simulators.friction import FrictionSite
+from simulators.structure import Structure
 
 __all__ = ["LinearPlant", "assemble", "element_shape"]
 
@@ -67,9 +67,9 @@ class LinearPlant:
 
 
 def assemble(
-    structure: BeamStructure | ModalStructure,
+    structure: Structure,
     elements: Sequence[Element],
-    joints: Sequence[JenkinsSite],
+    joints: Sequence[FrictionSite],
     exciter: Exciter,
     stinger: Stinger,
 ) -> LinearPlant:
@@ -115,7 +115,7 @@ def assemble(
     )
 
 
-def element_shape(structure: BeamStructure | ModalStructure, element: Element) -> Matrix:
+def element_shape(structure: Structure, element: Element) -> Matrix:
     """Coordinate of an element over the modes [n_mode] (kg^-1/2), as the structure gives them."""
     shape = structure.shape(element.at)
     return shape if element.to is None else shape - structure.shape(element.to)

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.elements import Clearance, Cubic, Element, Magnet
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.functions import loaded
 from simulators.layout import CHANNEL, CONVERTER, PLANT, SITE, RigArrays, RigState, SiteKind
 from simulators.plant.assembly import LinearPlant
-from simulators.plant.discretise import pad, round_up, step_columns
+from simulators.plant.discretise import aligned, pad, round_up, step_columns
 from simulators.sensing.filters import channel_sections, output_sections, ring_size, skew_taps
 from simulators.sensing.parts import Converter, Sensor
 
-__all__ = ["at_rest", "local_sites", "rig_arrays"]
+__all__ = ["at_rest", "jenkins_elements", "local_sites", "rig_arrays"]
 
 Matrix = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ Matrix = NDArray[np.float64]
 def rig_arrays(
     plant: LinearPlant,
     elements: Sequence[Element],
-    joints: Sequence[JenkinsSite],
+    joints: Sequence[FrictionSite],
     outputs: Sequence[Matrix],
     sensors: Sequence[Sensor],
     converter: Converter,
@@ -33,23 +33,18 @@ def rig_arrays(
     seed: int,
 ) -> RigArrays:
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
-    predictor, corrector = step_columns(plant, 1.0 / (converter.sample_rate_hz * converter.substeps))
-    n_jenkins_element = round_up(max((len(joint.stiffness) for joint in joints), default=0))
-    jenkins = np.zeros((2, len(joints), n_jenkins_element))
-    for s, joint in enumerate(joints):
-        n = len(joint.stiffness)
-        jenkins[0, s, :n] = joint.stiffness
-        jenkins[1, s, :n] = np.multiply(joint.stiffness, joint.slip)
-    sizes = (plant.dynamics.shape[0], len(elements), converter.substeps // converter.oversampling)
+    step = step_columns(plant, len(joints), 1.0 / (converter.sample_rate_hz * converter.substeps))
+    jenkins = jenkins_elements(joints)
+    sizes = (plant.dynamics.shape[0], len(elements), len(joints), converter.substeps // converter.oversampling)
     delays, taps = skew_taps(sensors, converter)
     channels = [_channel(*pair, converter, noise_scale) for pair in zip(sensors, delays, strict=True)]
     return RigArrays(
         plant=np.array([sizes], PLANT),
-        step=pad(predictor),
-        correct=pad(corrector, rows=False),
+        step=step.predictor,
+        correct=step.corrector,
         sites=local_sites(elements),
         elements=jenkins,
-        stuck=jenkins[0].sum(axis=1),
+        stuck=jenkins[0].sum(axis=0),
         sense=pad(np.array(outputs).T),
         channels=np.array(channels, CHANNEL),
         converter=_converter(converter),
@@ -60,21 +55,34 @@ def rig_arrays(
     )
 
 
+def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:
+    """Stiffness and slip force of every element [2, n_element, n_joint], padded with elements without stiffness."""
+    n_element = max((len(joint.stiffness) for joint in joints), default=0)
+    table = aligned((2, n_element, round_up(len(joints))))
+    for s, joint in enumerate(joints):
+        n = len(joint.stiffness)
+        table[0, :n, s] = joint.stiffness
+        table[1, :n, s] = np.multiply(joint.stiffness, joint.slip)
+    return table
+
+
 def at_rest(rig: RigArrays) -> RigState:
     """The state of a rig at rest at sample 0."""
     n_input, n_row = rig.step.shape
     return RigState(
-        inputs=np.zeros(n_input),
-        deflection=np.zeros(rig.stuck.size),
-        friction=np.zeros(rig.elements.shape[1:]),
+        inputs=aligned(n_input),
+        deflection=aligned(rig.stuck.size),
+        friction=aligned(rig.elements.shape[1:]),
         filters=np.zeros((2, rig.channels.size)),
         counter=np.zeros(1, np.int64),
         memory=np.zeros((rig.sections.shape[0], 2, rig.sections.shape[2])),
         output_memory=np.zeros((rig.reconstruction.shape[0], 2, 1)),
         history=np.zeros((ring_size(rig.channels["delay"], rig.taps), rig.channels.size)),
         output_v=np.zeros(1),
-        rows=np.zeros(n_row),
-        forces=np.zeros(rig.correct.shape[0]),
+        rows=aligned(max(n_row, rig.stuck.size)),
+        forces=np.zeros(rig.sites.size),
+        joints=aligned(rig.stuck.size),
+        changes=np.zeros(rig.correct.shape[0]),
         outputs=np.zeros(rig.sense.shape[1]),
     )
 

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from simulators.plant.assembly import LinearPlant
+from vibrolock.lanes.kernels import WIDTH
 
-__all__ = ["PhiMatrices", "pad", "phi_matrices", "round_up", "step_columns"]
+__all__ = ["PhiMatrices", "StepColumns", "aligned", "pad", "phi_matrices", "round_up", "step_columns"]
 
 Matrix = NDArray[np.float64]
-_VECTOR = 4
 
 
 class PhiMatrices(NamedTuple):
@@ -39,24 +39,45 @@ def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrice
     return PhiMatrices(exponential[:n, :n], exponential[:n, n : n + k], exponential[:n, n + k :])
 
 
-def step_columns(plant: LinearPlant, step_s: float) -> tuple[Matrix, Matrix]:
-    """Predictor [n_input, n + n_site] and corrector [n_site, n + n_site], site coordinates folded in as further rows."""
+class StepColumns(NamedTuple):
+    """The sub-step as the kernels run it, padded; rows are ``[joint coordinates, element coordinates, x]``."""
+
+    predictor: Matrix
+    """[n_input, n_row]."""
+    corrector: Matrix
+    """[n_site, n_row]."""
+
+
+def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> StepColumns:
+    """Predictor and corrector, site coordinates folded in as rows of their own.
+
+    Joints are the last ``n_joint`` sites; their coordinates begin at row 0, where whole vectors can be loaded.
+    """
     columns = np.column_stack([plant.voltage_column, plant.site_columns])
     phi = phi_matrices(plant.dynamics, columns, step_s)
     predictor = np.hstack([phi.transition, phi.held])
     corrector = phi.ramp[:, 1:]
-    fold = np.vstack([np.eye(plant.dynamics.shape[0]), plant.site_rows])
-    return (fold @ predictor).T, (fold @ corrector).T
+    fold = np.vstack([np.roll(plant.site_rows, n_joint, axis=0), np.eye(plant.dynamics.shape[0])])
+    return StepColumns(pad((fold @ predictor).T), pad((fold @ corrector).T, rows=False))
 
 
 def pad(matrix: Matrix, *, rows: bool = True) -> Matrix:
-    """Zeros added until both sizes (or the last alone) are multiples of four."""
+    """Zeros added until both sizes (or the last alone) are multiples of the vector length."""
     n_row, n_column = matrix.shape
-    padded = np.zeros((round_up(n_row) if rows else n_row, round_up(n_column)))
+    padded = aligned((round_up(n_row) if rows else n_row, round_up(n_column)))
     padded[:n_row, :n_column] = matrix
     return padded
 
 
+def aligned(shape: int | tuple[int, ...]) -> Matrix:
+    """Zeros that begin where a cache line does, so that no vector of a compiled loop straddles two."""
+    size = int(np.prod(shape))
+    line = WIDTH
+    whole = np.zeros(size + line)
+    skip = (-whole.ctypes.data // whole.itemsize) % line
+    return whole[skip : skip + size].reshape(shape)
+
+
 def round_up(size: int) -> int:
-    """The next multiple of four."""
-    return -(-size // _VECTOR) * _VECTOR
+    """The next multiple of the vector length."""
+    return -(-size // WIDTH) * WIDTH

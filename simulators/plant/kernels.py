@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from simulators.layout import CLEARANCE, CUBIC, MAGNET_ONE_SIDED, MAGNET_RANGE, MAGNET_SYMMETRIC, RigArrays, RigState
 from vibrolock.compiled import Record, kernel
+from vibrolock.lanes.kernels import WIDTH, greatest, least, load, spread, store
 
 ir: Any = import_module("llvmlite.ir")  # it has no types
 
@@ -40,17 +41,25 @@ call_at: Any = intrinsic(_call_at)
 
 @kernel
 def combine(columns: NDArray[np.float64], weights: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """``out = sum_j weights[j] columns[j]``; both lengths are multiples of four.
-
-    Four columns at a time, so that the inner loop runs over contiguous rows with few loads and stores.
-    """
+    """``out = sum_j weights[j] columns[j]``; their number is even, their length a multiple of `WIDTH`."""
     n_column, n_row = columns.shape
-    for i in range(n_row):
-        out[i] = 0.0
-    for j in range(0, n_column, 4):
-        a, b, c, d = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
-        for i in range(n_row):
-            out[i] += (a * columns[j, i] + b * columns[j + 1, i]) + (c * columns[j + 2, i] + d * columns[j + 3, i])
+    for i in range(0, n_row, WIDTH):
+        even, odd = spread(0.0), spread(0.0)
+        for j in range(0, n_column, 2):
+            even = even + spread(weights[j]) * load(columns, j * n_row + i)
+            odd = odd + spread(weights[j + 1]) * load(columns, (j + 1) * n_row + i)
+        store(out, i, even + odd)
+
+
+@kernel
+def add_columns(columns: NDArray[np.float64], weights: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """``out += sum_j weights[j] columns[j]``, for any number of columns."""
+    n_column, n_row = columns.shape
+    for i in range(0, n_row, WIDTH):
+        total = load(out, i)
+        for j in range(n_column):
+            total = total + spread(weights[j]) * load(columns, j * n_row + i)
+        store(out, i, total)
 
 
 @kernel
@@ -106,62 +115,53 @@ def local_forces(
 
 
 @kernel
-def clip(value: float, limit: float) -> float:
-    """``value`` within plus and minus ``limit``."""
-    value = limit if value > limit else value
-    return -limit if value < -limit else value
+def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
+    """Forces of the friction joints into ``state.joints``, minus their stuck linear part: ``k delta - sum_j f_j``.
+
+    Each element slips at its limit, ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)`` from its committed force. Joints lie
+    side by side: a vector holds one element of eight joints. Where there are fewer, elements have no stiffness.
+    """
+    elements, rows, deflection, friction = rig.elements, state.rows, state.deflection, state.friction
+    _, n_element, n_joint = elements.shape
+    for s in range(0, n_joint, WIDTH):
+        z = load(rows, s)
+        dz = z - load(deflection, s)
+        total = spread(0.0)
+        for at in range(s, s + n_element * n_joint, n_joint):
+            limit = load(elements, n_element * n_joint + at)
+            force = load(friction, at) + load(elements, at) * dz
+            force = greatest(least(force, limit), spread(0.0) - limit)
+            if commit:
+                store(friction, at, force)
+            total = total + force
+        store(state.joints, s, load(rig.stuck, s) * z - total)
+        if commit:
+            store(deflection, s, z)
 
 
 @kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
-    """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE or 0.
-
-    Jenkins sites, minus their stuck linear part: ``k delta - sum_j f_j``; each element slips at its limit, ``f_j <-
-    clip(f_j + k_j d(delta), +-k_j delta_j)`` from its committed force. They stand here and not in a function of their own:
-    its arguments would cost more than its work. Four elements at a time, whose sums do not wait for each other.
-    """
-    step, correct, sites, elements, stuck = rig.step, rig.correct, rig.sites, rig.elements, rig.stuck
-    inputs, rows, forces, friction, deflection = (
-        state.inputs,
-        state.rows,
-        state.forces,
-        state.friction,
-        state.deflection,
-    )
-    n, n_local = rig.plant[0].n_state, rig.plant[0].n_local
-    _, n_jenkins, n_element = elements.shape
-    n_site = n_local + n_jenkins
+    """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE or 0."""
+    inputs, rows, forces, joints, changes = state.inputs, state.rows, state.forces, state.joints, state.changes
+    n, n_local, n_joint = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_joint
+    first_state, first_local, first_joint = n_joint + n_local, n + 1, n + 1 + n_local
     beyond = False
     inputs[n] = voltage
     for _ in range(rig.plant[0].substeps):
-        combine(step, inputs, rows)
-        for corrected in range(2):
-            beyond |= local_forces(sites, rows, n, forces)
-            for s in range(n_jenkins):
-                z = rows[n + n_local + s]
-                dz = z - deflection[s]
-                sum_0, sum_1, sum_2, sum_3 = 0.0, 0.0, 0.0, 0.0
-                for e in range(0, n_element, 4):
-                    f_0 = clip(friction[s, e] + elements[0, s, e] * dz, elements[1, s, e])
-                    f_1 = clip(friction[s, e + 1] + elements[0, s, e + 1] * dz, elements[1, s, e + 1])
-                    f_2 = clip(friction[s, e + 2] + elements[0, s, e + 2] * dz, elements[1, s, e + 2])
-                    f_3 = clip(friction[s, e + 3] + elements[0, s, e + 3] * dz, elements[1, s, e + 3])
-                    if corrected:
-                        friction[s, e], friction[s, e + 1], friction[s, e + 2], friction[s, e + 3] = f_0, f_1, f_2, f_3
-                    sum_0 += f_0
-                    sum_1 += f_1
-                    sum_2 += f_2
-                    sum_3 += f_3
-                forces[n_local + s] = stuck[s] * z - ((sum_0 + sum_1) + (sum_2 + sum_3))
-            if not corrected:
-                for s in range(n_site):
-                    change = forces[s] - inputs[n + 1 + s]
-                    for i in range(rows.size):
-                        rows[i] += change * correct[s, i]
-        for s in range(n_site):
-            inputs[n + 1 + s] = forces[s]
-        for s in range(n_jenkins):
-            deflection[s] = rows[n + n_local + s]
+        combine(rig.step, inputs, rows)
+        joint_forces(rig, state, False)
+        beyond |= local_forces(rig.sites, rows, n_joint, forces)
+        for s in range(n_local):
+            changes[s] = forces[s] - inputs[first_local + s]
+        for s in range(n_joint):
+            changes[n_local + s] = joints[s] - inputs[first_joint + s]
+        add_columns(rig.correct, changes, rows)
+        joint_forces(rig, state, True)
+        beyond |= local_forces(rig.sites, rows, n_joint, forces)
         for i in range(n):
-            inputs[i] = rows[i]
+            inputs[i] = rows[first_state + i]
+        for s in range(n_local):
+            inputs[first_local + s] = forces[s]
+        for s in range(n_joint):
+            inputs[first_joint + s] = joints[s]
     return MAGNET_RANGE if beyond else 0

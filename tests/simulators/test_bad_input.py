@@ -19,7 +19,10 @@ MAGNET = {"kind": "magnet-one-sided", "at": "magnet", "strength_n_m4": 1e-8, "ga
 MODAL = {"kind": "modal", "frequency_hz": [20.0, 30.0], "damping_ratio": [0.01, 0.01]}
 
 BAD: list[tuple[dict[str, Any], str]] = [
-    ({"specimen": "magnet-beem"}, "specimen = 'magnet-beem': allowed is one of magnet-beam, magnet-beam-symmetric"),
+    (
+        {"specimen": "magnet-beem"},
+        "specimen = 'magnet-beem': allowed is one of friction-beam, magnet-beam, magnet-beam-symmetric",
+    ),
     ({"specimen": "magnet-beam", "voltage": 1}, "voltage"),
     ({"specimen": "magnet-beam", "exciter": {"armature_mass": 0.2}}, "exciter.armature_mass\n"),
     ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": -0.2}}, "greater than 0"),

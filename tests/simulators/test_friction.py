@@ -3,9 +3,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from simulators.friction import JenkinsSite
 from simulators.kernels import run_open_loop
 from simulators.layout import CHANNEL, CONVERTER, PLANT, SITE, RigArrays, RigState
-from simulators.plant.compilation import at_rest
+from simulators.plant.compilation import at_rest, jenkins_elements
 from simulators.plant.kernels import advance
 from simulators.simulation import Simulation
 from tests.simulators.references import ideal
@@ -16,18 +17,18 @@ SLIP = np.array([0.1, 0.25, 0.5, 0.9, 1.6])
 
 def imposed_joint() -> tuple[RigArrays, RigState]:
     """One friction joint whose coordinate is the voltage: its deflection is imposed."""
-    elements = np.zeros((2, 1, 8))
-    elements[0, 0, :5], elements[1, 0, :5] = STIFFNESS, STIFFNESS * SLIP
-    step = np.zeros((4, 4))
-    step[1, :2] = 1.0
+    joint = JenkinsSite(at="joint", stiffness=tuple(STIFFNESS), slip=tuple(SLIP))
+    elements = jenkins_elements([joint])
+    step = np.zeros((8, 8))
+    step[1, 0] = 1.0
     rig = RigArrays(
-        plant=np.array([(1, 0, 1)], PLANT),
+        plant=np.array([(1, 0, 1, 1)], PLANT),
         step=step,
-        correct=np.zeros((1, 4)),
+        correct=np.zeros((1, 8)),
         sites=np.zeros(0, SITE),
         elements=elements,
-        stuck=np.array([STIFFNESS.sum()]),
-        sense=np.zeros((4, 4)),
+        stuck=elements[0].sum(axis=0),
+        sense=np.zeros((8, 8)),
         channels=np.zeros(1, CHANNEL),
         converter=np.zeros(1, CONVERTER),
         noise_keys=np.zeros(2, np.uint64),

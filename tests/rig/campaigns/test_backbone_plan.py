@@ -25,12 +25,12 @@ def test_the_levels_are_sorted_by_the_direction(direction, levels):
 
 
 def test_every_point_is_ramped_settled_and_recorded():
-    kinds = [segment.kind for segment in _plan().segments()]
+    kinds = [segment.kind for segment in _plan().segments(5000.0)]
     assert kinds == [SegmentKind.RAMP, SegmentKind.SETTLE, SegmentKind.RECORD] * 3
 
 
 def test_a_resumed_point_is_approached_from_the_level_before():
-    segments = _plan().segments(done=frozenset({0, 1}))
+    segments = _plan().segments(5000.0, done=frozenset({0, 1}))
     assert [(s.kind, s.level) for s in segments[:3]] == [
         (SegmentKind.RAMP, 0.4),
         (SegmentKind.HOLD, 0.4),
@@ -40,12 +40,12 @@ def test_a_resumed_point_is_approached_from_the_level_before():
 
 
 def test_a_resumed_point_on_the_way_down_is_approached_from_above():
-    segments = _plan(direction="up-down").segments(done=frozenset({0, 1, 2, 3}))
+    segments = _plan(direction="up-down").segments(5000.0, done=frozenset({0, 1, 2, 3}))
     assert [s.level for s in segments if s.kind is SegmentKind.RAMP] == [0.4, 0.2]
 
 
 def test_a_finished_plan_has_no_segments_left():
-    assert _plan().segments(done=frozenset({0, 1, 2})) == ()
+    assert _plan().segments(5000.0, done=frozenset({0, 1, 2})) == ()
 
 
 @pytest.mark.parametrize("name", shipped_plans())

@@ -1,0 +1,1 @@
+"""Analysis without a test: frequency responses, and periodic vibrations of the coupled rig by harmonic balance."""

@@ -1,0 +1,1 @@
+"""Vector arithmetic for kernels: eight numbers side by side."""
