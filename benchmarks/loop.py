@@ -39,7 +39,7 @@ def _started(bench: Bench, block: int = 1) -> tuple[VirtualDAQ, Tick]:
     daq.open()
     daq.start(block)
     lead = block + daq.latency_samples
-    return daq, Tick(bench, plan.controller, plan.amplitude_law, plan.settle, plan.segments(), lead)
+    return daq, Tick(bench, plan.controller, plan.amplitude_law, plan.settle, plan.segments(bench.sample_rate_hz), lead)
 
 
 def fused(bench: Bench) -> Callable[[], float]:

@@ -55,7 +55,6 @@ def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray
     if ratio == 1:
         return np.array(array)
     up, down = ratio.numerator, ratio.denominator
-    # The stubs of scipy know of no array here.
     low_pass: Any = firwin(2 * EDGE_SAMPLES * down + 1, _CORNER / down, window=("kaiser", _KAISER_BETA))
-    slower: NDArray[np.float64] = resample_poly(array, up, down, axis=-1, window=low_pass)
-    return slower
+    slower: Any = resample_poly(array, up, down, axis=-1, window=low_pass)
+    return np.asarray(slower, np.float64)
