@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from simulators.layout import DIVERGED, RigArrays, RigState
 from simulators.plant.kernels import advance, combine
 from simulators.sensing.kernels import anti_alias, condition, convert, delay, filter_channels, hold, sense
-from vibrolock.compiled import kernel
+from vibrolock.compiled import inner_kernel, kernel
 
 
-@kernel
+@inner_kernel
 def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.float64]) -> int:
     """Read every channel into ``out_v`` [n_channel] (V), then hold ``voltage`` (V) until the next instant.
 
@@ -43,7 +43,7 @@ def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.fl
     return flags | advance_internally(rig, state, index * oversampling, held_v)
 
 
-@kernel
+@inner_kernel
 def read(rig: RigArrays, state: RigState, instant: int) -> int:
     """From sensed values to conditioned and filtered volts, kept for skewed channels; returns SENSOR_CLIPPED or 0."""
     flags = 0

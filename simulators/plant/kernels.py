@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from simulators.layout import CLEARANCE, CUBIC, MAGNET_ONE_SIDED, MAGNET_RANGE, MAGNET_SYMMETRIC, RigArrays, RigState
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.lanes.kernels import WIDTH, greatest, least, load, spread, store
 
 ir: Any = import_module("llvmlite.ir")  # it has no types
@@ -139,7 +139,7 @@ def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
             store(deflection, s, z)
 
 
-@kernel
+@inner_kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
     """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE or 0."""
     inputs, rows, forces, joints, changes = state.inputs, state.rows, state.forces, state.joints, state.changes

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from simulators.layout import DAC_CLIPPED, SENSOR_CLIPPED
 from simulators.sensing.noise.kernels import normal
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 
 
 @kernel
@@ -38,7 +38,7 @@ def filter_channels(sections: NDArray[np.float64], memory: NDArray[np.float64], 
             values[c] = y
 
 
-@kernel
+@inner_kernel
 def sense(columns: NDArray[np.float64], weights: NDArray[np.float64], values: NDArray[np.float64]) -> bool:
     """``values = sum_j weights[j] columns[j]``, what every sensor senses (SI); False where one of them is not finite.
 
@@ -63,7 +63,7 @@ def sense(columns: NDArray[np.float64], weights: NDArray[np.float64], values: ND
     return finite
 
 
-@kernel
+@inner_kernel
 def condition(channels: NDArray[Any], filters: NDArray[np.float64], values: NDArray[np.float64]) -> None:
     """Turn sensed ``values`` [n_channel] (SI) into volts, in place.
 
@@ -112,7 +112,7 @@ def delay(
         values[c] = volts
 
 
-@kernel
+@inner_kernel
 def convert(
     channels: NDArray[Any],
     converter: Record,
@@ -142,7 +142,7 @@ def convert(
     return flags
 
 
-@kernel
+@inner_kernel
 def hold(converter: Record, noise_key: np.uint64, voltage: float, sample: int) -> tuple[float, int]:
     """What the digital-to-analogue converter makes of a voltage, noise included, and DAC_CLIPPED or 0."""
     flags = 0 if abs(voltage) <= converter.dac_range_v else DAC_CLIPPED

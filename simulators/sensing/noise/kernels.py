@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrolock.compiled import kernel
+from vibrolock.compiled import inner_kernel, kernel
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
@@ -86,7 +86,7 @@ def normal_beyond(bits: np.uint64, layer: np.int64, x: float) -> float:
             return float(x)
 
 
-@kernel
+@inner_kernel
 def normal(key: np.uint64, sample: int) -> float:
     """A standard normal number for a key and a sample index."""
     bits = mix(key + np.uint64(sample) * _GOLDEN)
