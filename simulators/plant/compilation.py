@@ -1,20 +1,21 @@
 """The arrays of a virtual rig from its parts."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.elements import Clearance, Cubic, Element, Magnet
+from simulators.elements import Element
+from simulators.exciter import Exciter
 from simulators.friction import JenkinsSite
-from simulators.functions import loaded
-from simulators.layout import CHANNEL, CONVERTER, PLANT, SITE, RigArrays, RigState, SiteKind
+from simulators.layout import CHANNEL, CONVERTER, PLANT, RigArrays, RigState
 from simulators.plant.assembly import LinearPlant
 from simulators.plant.discretise import aligned, pad, round_up, step_columns
+from simulators.plant.sites import local_sites
 from simulators.sensing.parts import Converter, Sensor
+from vibrolock.lanes.kernels import WIDTH
 
-__all__ = ["at_rest", "jenkins_elements", "local_sites", "rig_arrays"]
+__all__ = ["at_rest", "jenkins_elements", "rig_arrays"]
 
 Matrix = NDArray[np.float64]
 
@@ -23,6 +24,7 @@ def rig_arrays(
     plant: LinearPlant,
     elements: Sequence[Element],
     joints: Sequence[JenkinsSite],
+    exciter: Exciter,
     outputs: Sequence[Matrix],
     sensors: Sequence[Sensor],
     converter: Converter,
@@ -34,12 +36,12 @@ def rig_arrays(
     step = step_columns(plant, len(joints), 1.0 / (converter.sample_rate_hz * converter.substeps))
     jenkins = jenkins_elements(joints)
     n_pair = (len(sensors) + 1) // 2
-    sizes = (plant.dynamics.shape[0], len(elements), len(joints), converter.substeps)
+    sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), converter.substeps, exciter.input_limit_v)
     return RigArrays(
         plant=np.array([sizes], PLANT),
         step=step.predictor,
         correct=step.corrector,
-        sites=local_sites(elements),
+        sites=local_sites(elements, exciter),
         elements=jenkins,
         stuck=jenkins[0].sum(axis=0),
         sense=pad(np.array(outputs).T),
@@ -71,49 +73,12 @@ def at_rest(rig: RigArrays) -> RigState:
         friction=aligned(rig.elements.shape[1:]),
         filters=np.zeros((2, rig.channels.size)),
         counter=np.zeros(1, np.int64),
-        rows=aligned(max(n_row, rig.stuck.size)),
+        rows=aligned(n_row + WIDTH),  # the last vector of x may reach beyond
         forces=np.zeros(rig.sites.size),
         joints=aligned(rig.stuck.size),
         changes=np.zeros(rig.correct.shape[0]),
         outputs=np.zeros(rig.sense.shape[1]),
     )
-
-
-def local_sites(elements: Sequence[Element]) -> NDArray[Any]:
-    """Table of the elements for the kernels, one `simulators.layout.SITE` record each."""
-    table = np.zeros(len(elements), SITE)
-    table["limit"] = np.inf
-    for row, element in zip(table, elements, strict=True):
-        for name, value in _site(element).items():
-            row[name] = value
-    return table
-
-
-def _site(element: Element) -> dict[str, Any]:
-    if isinstance(element, Magnet):
-        return {
-            "kind": SiteKind.MAGNET_ONE_SIDED if element.one_sided else SiteKind.MAGNET_SYMMETRIC,
-            "limit": element.limit_m,
-            "stiffness": element.stiffness_n_m,
-            "strength": element.strength_n_m4,
-            "gap": element.gap_m,
-            "offset": element.strength_n_m4 / element.gap_m**4 if element.one_sided else 0.0,
-        }
-    if isinstance(element, Cubic):
-        return {"kind": SiteKind.CUBIC, "strength": element.stiffness_n_m3, "quadratic": element.quadratic_n_m2}
-    if isinstance(element, Clearance):
-        return {
-            "kind": SiteKind.CLEARANCE,
-            "strength": element.contact_stiffness_n_m,
-            "gap": element.gap_m,
-            "other_gap": np.inf if element.other_gap_m is None else element.other_gap_m,
-        }
-    return {
-        "kind": SiteKind.USER,
-        "stiffness": element.stiffness_n_m,
-        "address": loaded(element.function).address,
-        "parameters": element.padded_parameters,
-    }
 
 
 def _channel(
