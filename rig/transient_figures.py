@@ -201,9 +201,9 @@ def _response(page: Any, measured: InstrumentResponse, text: str) -> None:
     frequency = measured.frequency_hz
     size.semilogy(frequency, np.abs(measured.value), ".-", ms=3, color=MAIN, label=text)
     if np.any(measured.noise_std > 0.0):
-        size.semilogy(frequency, measured.noise_std, color=REJECTED, lw=0.9, label="deviation: noise")
+        size.semilogy(frequency, measured.noise_std, color=REJECTED, lw=0.9, label="noise")
     if np.isfinite(measured.total_std).any():
-        label = "deviation: noise and distortion"
+        label = "noise and distortion"
         size.semilogy(frequency, measured.total_std, color=SECOND, lw=0.9, label=label)
     unit = {"m/s2/N": "1/kg"}.get(measured.unit, measured.unit)
     size.set(ylabel=f"frequency response, {unit}")

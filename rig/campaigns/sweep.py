@@ -46,7 +46,9 @@ class SweepPlan(TonePlan):
         low, high = sorted((self.start_hz, self.stop_hz))
         for index, band in enumerate(self.off_resonance_hz or ()):
             if not low <= band[0] < band[1] <= high:
-                raise ValueError(f"off_resonance_hz[{index}] = {list(band)}: allowed is a band within {low:g} to {high:g} Hz")
+                raise ValueError(
+                    f"off_resonance_hz[{index}] = {list(band)}: allowed is a band within {low:g} to {high:g} Hz"
+                )
         return self
 
     @property
