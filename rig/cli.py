@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from rig.cli_analyse import app as analyse_app
+
 __all__ = ["app", "main"]
 
 app = typer.Typer(
@@ -14,6 +16,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+app.add_typer(analyse_app, name="analyse")
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
