@@ -21,6 +21,30 @@ Json = Annotated[bool, typer.Option("--json", help="Print all numbers as one JSO
 Harmonics = Annotated[int, typer.Option(help="Highest harmonic that is balanced.", min=1, max=200)]
 
 
+@app.command("modes")
+def modes_(bench: BenchName, near_hz: NearHz = None, output: Figure = None, json: Json = False) -> None:
+    """Linear modes of the structure, with their shapes at the channels, and of the coupled rig."""
+    from rig.analysis.modes import modes
+
+    _show(bench, near_hz, modes, output, json)
+
+
+@app.command("responses")
+def responses_(
+    bench: BenchName,
+    from_hz: Annotated[float | None, typer.Option(help="Lowest frequency, Hz.")] = None,
+    to_hz: Annotated[float | None, typer.Option(help="Highest frequency, Hz.")] = None,
+    points: Annotated[int, typer.Option(help="Number of frequencies, beside more around every resonance.")] = 500,
+    near_hz: NearHz = None,
+    output: Figure = None,
+    json: Json = False,
+) -> None:
+    """Linear frequency responses: voltage to force and accelerations, force to accelerations."""
+    from rig.analysis.linear_responses import responses
+
+    _show(bench, near_hz, lambda subject: responses(subject, from_hz=from_hz, to_hz=to_hz, points=points), output, json)
+
+
 @app.command("backbone")
 def backbone_(
     bench: BenchName,
@@ -51,6 +75,54 @@ def backbone_(
             highest=to_v if by_voltage else to_n,
             points=points,
             harmonics=harmonics,
+        ),
+        output,
+        json,
+    )
+
+
+@app.command("constant-force")
+def constant_force_(
+    bench: BenchName,
+    force_n: Annotated[list[float] | None, typer.Option(help="Peak of the fundamental force, N; repeatable.")] = None,
+    points: Annotated[int, typer.Option(help="Number of phase lags along each curve.")] = 141,
+    near_hz: NearHz = None,
+    harmonics: Harmonics = 15,
+    output: Figure = None,
+    json: Json = False,
+) -> None:
+    """Response curves at constant force with their unstable branches, and the backbone."""
+    from rig.analysis.constant_force import constant_force
+
+    _show(
+        bench,
+        near_hz,
+        lambda subject: constant_force(subject, force_n or (), points=points, harmonics=harmonics),
+        output,
+        json,
+    )
+
+
+@app.command("forced")
+def forced_(
+    bench: BenchName,
+    voltage_v: Annotated[float | None, typer.Option(help="Amplitude of the voltage, V.")] = None,
+    from_hz: Annotated[float | None, typer.Option(help="Lowest frequency, Hz.")] = None,
+    to_hz: Annotated[float | None, typer.Option(help="Highest frequency, Hz.")] = None,
+    points: Annotated[int, typer.Option(help="Number of frequencies, half of them around resonance.")] = 401,
+    near_hz: NearHz = None,
+    harmonics: Harmonics = 15,
+    output: Figure = None,
+    json: Json = False,
+) -> None:
+    """Steady response to a constant voltage, up and down: what a slow uncontrolled sweep sees."""
+    from rig.analysis.forced import forced
+
+    _show(
+        bench,
+        near_hz,
+        lambda subject: forced(
+            subject, voltage_v=voltage_v, from_hz=from_hz, to_hz=to_hz, points=points, harmonics=harmonics
         ),
         output,
         json,

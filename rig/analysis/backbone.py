@@ -83,7 +83,7 @@ class Backbone(Study):
 
     def draw_on(self, page: "Figure") -> None:
         """Frequency, damping, amplitude and harmonics over the level, and the loops."""
-        draw_backbone(page, self.responses, self.loops, [joint.at for joint in self.subject.rig.friction])
+        draw_backbone(page, self.responses, self.loops, self.subject.rig.friction)
 
 
 def backbone(

@@ -52,7 +52,11 @@ def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicRespons
     try:
         with refusing():
             path = phase_resonance_backbone(
-                subject.rig, voltages_v=volts, near_hz=subject.near_hz, harmonics=harmonics, samples=samples_for(harmonics)
+                subject.rig,
+                voltages_v=volts,
+                near_hz=subject.near_hz,
+                harmonics=harmonics,
+                samples=samples_for(harmonics),
             )
     except NotConvergedError as failure:
         if failure.found is None:
