@@ -42,17 +42,18 @@ def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:
         for axis in panels[max(0, count - 2) : count]:
             axis.set_xlabel("position along the beam, m")
             axis.tick_params(labelbottom=True)
-    page.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8)
+    page.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
 
 
 def _along_the_beam(axis: "Axes", rig: VirtualRig, beam: MeshedBeam, modes: LinearModes, k: int) -> None:
     x = np.linspace(0.0, beam.length_m, _STATIONS)
     shapes = np.array([beam.modes.shape(float(position)) for position in x])
     axis.plot(x, shapes @ (rig.plant.signs * modes.vectors[:, k]), color=MAIN)
-    for number, (label, at) in enumerate(_attached(rig).items()):
+    for number, (at, label) in enumerate(_attached(rig).items()):
         if at in beam.points_m:
             height = modes.at(rig.shape(at))[k]
-            axis.plot(beam.points_m[at], height, _marker(number), ms=5, color=f"C{number % 10}", label=label)
+            marker, colour = _MARKERS[number % len(_MARKERS)], f"C{number % 10}"
+            axis.plot(beam.points_m[at], height, marker, ms=5, color=colour, label=label)
 
 
 def _at_the_points(axis: "Axes", rig: VirtualRig, modes: LinearModes, k: int) -> None:
@@ -61,14 +62,12 @@ def _at_the_points(axis: "Axes", rig: VirtualRig, modes: LinearModes, k: int) ->
     axis.tick_params(axis="x", labelsize=8, labelrotation=30)
 
 
-def _marker(number: int) -> str:
-    return _MARKERS[number % len(_MARKERS)]
-
-
 def _attached(rig: VirtualRig) -> dict[str, str]:
-    """Legend and point of everything that is attached to the structure at a point."""
-    out = {f"stinger ({rig.stinger.at})": rig.stinger.at}
-    out |= {f"channel {sensor.name}": sensor.at for sensor in rig.sensors if sensor.at is not None}
-    out |= {f"{element.kind} ({element.at})": element.at for element in rig.elements}
-    out |= {f"joint ({joint.at})": joint.at for joint in rig.friction}
-    return out
+    """What is attached to each point of the structure, in words."""
+    there: dict[str, list[str]] = {rig.stinger.at: ["stinger"]}
+    for sensor in rig.sensors:
+        if sensor.at is not None:
+            there.setdefault(sensor.at, []).append(f"channel {sensor.name}")
+    for part in (*rig.elements, *rig.friction):
+        there.setdefault(part.at, []).append(f"{part.kind} at {part.at}")
+    return {at: ", ".join(dict.fromkeys(what)) for at, what in there.items()}
