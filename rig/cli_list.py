@@ -57,12 +57,11 @@ def _print_part(part: dict[str, Any]) -> None:
     where = group if part["name"] == group else f"{group}, {part['name']}"
     print(f"{where}\n\n{part['description'].replace('``', '')}\n")
     for key in part["keys"]:
-        default = (
-            "required"
-            if key["required"]
-            else "optional"
-            if key["default"] is None
-            else f"default {dumps(key['default'])}"
-        )
-        facts = ", ".join(text for text in (key["type"], key["unit"], default) if text)
+        facts = ", ".join(text for text in (key["type"], key["unit"], _default(key)) if text)
         print(f"{key['key']}: {facts}\n    {key['description']}")
+
+
+def _default(key: dict[str, Any]) -> str:
+    if key["required"]:
+        return "required"
+    return "optional" if key["default"] is None else f"default {dumps(key['default'])}"

@@ -22,7 +22,9 @@ from simulators.analysis import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Backbone", "backbone"]
+__all__ = ["Backbone", "backbone", "neglected"]
+
+_WORTH_A_NUMBER = 0.001
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -127,5 +129,6 @@ def backbone(
 def neglected(found: PeriodicResponses) -> str:
     """How much of the force lies above the harmonics that were balanced."""
     highest = found.force_harmonics_n.shape[1] - 1
-    share = 100.0 * float(np.max(found.neglected_share))
-    return f"force above harmonic {highest} is left out: up to {share:.2g} % of the fundamental (--harmonics)"
+    percent = 100.0 * float(np.max(found.neglected_share))
+    text = f"up to {percent:.2g} %" if percent >= _WORTH_A_NUMBER else f"less than {_WORTH_A_NUMBER:g} %"
+    return f"force above harmonic {highest} is left out: {text} of the fundamental (--harmonics)"

@@ -1,5 +1,6 @@
 """What a slow uncontrolled sweep at constant voltage sees: the force drops out at resonance and overshoots beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -47,8 +48,8 @@ class Forced(Study):
 
     @property
     def differ_hz(self) -> Real:
-        """Frequencies at which the two directions differ; empty where they never do."""
-        if self.up.frequency_hz.size != self.down.frequency_hz.size:
+        """Frequencies at which the two directions differ; empty where they never do, or were not found."""
+        if not self.complete:
             return np.zeros(0)
         apart = np.abs(self.up.amplitude_m - self.down.amplitude_m) > _SAME * np.max(self.up.amplitude_m)
         return np.asarray(self.up.frequency_hz[apart])
@@ -84,6 +85,8 @@ class Forced(Study):
         low = self.up.frequency_hz[0]
         headings = (f"force at {low:.4g} Hz, N", "lowest N", "at Hz", "% of the first", "highest over first", "at Hz")
         print_table(("direction", *headings, "largest mm"), rows)
+        if not self.complete:
+            return
         if self.differ_hz.size:
             print(f"up and down differ from {self.differ_hz[0]:.4f} to {self.differ_hz[-1]:.4f} Hz")
         else:
@@ -91,7 +94,7 @@ class Forced(Study):
 
     def draw_on(self, page: "Figure") -> None:
         """Force, response and lag over frequency."""
-        draw_forced(page, self.up, self.down if self.differ_hz.size else None)
+        draw_forced(page, self.up, self.down if self.differ_hz.size or not self.complete else None)
 
 
 def forced(
@@ -115,25 +118,45 @@ def forced(
         raise ConfigurationError(f"from_hz = {low:g}: allowed is less than to_hz = {high:g}")
     how: dict[str, Any] = {"near_hz": subject.near_hz, "harmonics": harmonics, "samples": samples_for(harmonics)}
     grid = _grid(low, high, most_points(points, 4), _resonance(subject, voltage, how))
-    notes, ways = [], []
-    for name, order in (("up", grid), ("down", grid[::-1])):
-        try:
-            with refusing():
-                ways.append(forced_response(subject.rig, voltage, order, **how))
-        except NotConvergedError as failure:
-            if failure.found is None:
-                raise ConfigurationError(f"{voltage:g} V: {failure}") from failure
-            ways.append(failure.found)
-            notes.append(f"{name} ends at {ways[-1].frequency_hz[-1]:.4f} Hz: {failure}")
-    excesses = dict.fromkeys(line for way in ways for line in subject.excesses(way))
+    up, up_ends = _followed(subject, voltage, grid, how)
+    down, down_ends = _followed(subject, voltage, grid[::-1], how)
+    up, down, notes = _completed(up, _turned(down), up_ends, down_ends)
+    excesses = dict.fromkeys(line for way in (up, down) for line in subject.excesses(way))
     return Forced(
         subject=subject,
-        notes=(*notes, *excesses, neglected(ways[0])),
-        complete=not notes,
+        notes=(*notes, *excesses, neglected(up)),
+        complete=not (up_ends and down_ends),
         voltage_v=voltage,
-        up=ways[0],
-        down=_reversed(ways[1]),
+        up=up,
+        down=down,
     )
+
+
+def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
+    """Vibrations in the order of the grid as far as they are found, and why no further."""
+    try:
+        with refusing():
+            return forced_response(subject.rig, voltage_v, grid, **how), ""
+    except NotConvergedError as failure:
+        if failure.found is None:
+            raise ConfigurationError(f"{voltage_v:g} V: {failure}") from failure
+        return failure.found, str(failure)
+
+
+def _completed(
+    up: PeriodicResponses, down: PeriodicResponses, up_ends: str, down_ends: str
+) -> tuple[PeriodicResponses, PeriodicResponses, list[str]]:
+    """Directions completed by each other: beyond the end of its branch a sweep jumps to the one that is left."""
+    n_up, n_down = up.frequency_hz.size, down.frequency_hz.size
+    jump = "the branch of {} frequency ends at {:.4f} Hz; beyond, the vibration of the other direction is taken"
+    if up_ends and down_ends:
+        both = (("rising", up.frequency_hz[-1], up_ends), ("falling", down.frequency_hz[0], down_ends))
+        return up, down, [f"{name} frequency ends at {ends_hz:.4f} Hz: {why}" for name, ends_hz, why in both]
+    if up_ends:
+        return _joined(up, _part(down, slice(n_up, None))), down, [jump.format("rising", up.frequency_hz[-1])]
+    if down_ends:
+        return up, _joined(_part(up, slice(0, n_up - n_down)), down), [jump.format("falling", down.frequency_hz[0])]
+    return up, down, []
 
 
 def _resonance(subject: Subject, voltage_v: float, how: dict[str, Any]) -> tuple[float, float, float]:
@@ -171,13 +194,26 @@ def _extremes(way: PeriodicResponses) -> dict[str, float]:
     }
 
 
-def _reversed(way: PeriodicResponses) -> PeriodicResponses:
+def _turned(way: PeriodicResponses) -> PeriodicResponses:
     """The same points in the opposite order."""
+    return _part(way, slice(None, None, -1))
+
+
+def _part(way: PeriodicResponses, rows: slice) -> PeriodicResponses:
+    return _of_columns(lambda column: column[rows], way)
+
+
+def _joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicResponses:
+    return _of_columns(lambda one, other: np.concatenate([one, other]), first, then)
+
+
+def _of_columns(make: Callable[..., Any], *ways: PeriodicResponses) -> PeriodicResponses:
+    """Responses whose every column is made of the columns of others."""
     columns: dict[str, Any] = {}
-    for field in fields(way):
-        column = getattr(way, field.name)
-        if isinstance(column, dict):
-            columns[field.name] = {name: item[::-1] for name, item in column.items()}
-        elif column is not None:
-            columns[field.name] = column[::-1]
+    for field in fields(PeriodicResponses):
+        those = [getattr(way, field.name) for way in ways]
+        if isinstance(those[0], dict):
+            columns[field.name] = {name: make(*(column[name] for column in those)) for name in those[0]}
+        elif those[0] is not None:
+            columns[field.name] = make(*those)
     return PeriodicResponses(**columns)

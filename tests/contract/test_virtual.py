@@ -62,7 +62,7 @@ class Boastful(VirtualDAQ):
 
     @property
     def latency_samples(self):
-        return 6.5
+        return 8.5
 
     @property
     def filter_delay_samples(self):
@@ -85,7 +85,7 @@ def test_the_contract_catches_filters_that_are_later_than_the_whole_device():
     class Contract(DriverContract):
         def make(self):
             daq = Boastful(bench_with())
-            daq.filters = 7.0
+            daq.filters = 9.0
             return daq
 
     with pytest.raises(AssertionError):
