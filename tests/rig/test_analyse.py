@@ -14,6 +14,7 @@ from rig.analysis.modes import modes
 from rig.analysis.subject import peak, subject_of
 from rig.cli import main
 from rig.errors import ConfigurationError
+from simulators.analysis import NotConvergedError, phase_resonance_backbone
 from tests.reference.harmonic_balance import backbone as reference_backbone
 from tests.reference.harmonic_balance import response_to_voltage
 from tests.reference.parameters import ONE_SIDED
@@ -233,14 +234,27 @@ def test_a_structure_given_by_its_modes_is_drawn_at_its_points(command, tmp_path
         assert (tmp_path / "figure.svg").stat().st_size > 5000
 
 
-def test_levels_out_of_reach_end_the_table_with_a_note_and_status_one(command):
-    status, out, err = command("analyse backbone --bench friction-beam --from-n 0.5 --to-n 2000 --points 3 --json")
-    assert status == 1
-    assert err == ""
+def test_levels_out_of_reach_end_the_table_with_a_note_and_status_one(command, monkeypatch):
+    def ends_early(rig, forces_n, **how):
+        raise NotConvergedError("no vibration at 7 N", phase_resonance_backbone(rig, forces_n=forces_n[:2], **how))
+
+    monkeypatch.setattr("rig.analysis.backbone.phase_resonance_backbone", ends_early)
+    status, out, err = command("analyse backbone --bench magnet-beam --from-n 0.1 --to-n 0.5 --points 3 --json")
+    assert (status, err) == (1, "")
     summary = json.loads(out)
     assert not summary["complete"]
-    assert 0 < len(summary["points"]) < 3
-    assert any("ends after" in note for note in summary["notes"])
+    assert len(summary["points"]) == 2
+    assert "ends after 2 of 3 levels: no vibration at 7 N" in summary["notes"]
+
+
+def test_where_nothing_at_all_is_found_one_line_says_so(command, monkeypatch):
+    def finds_nothing(*_, **__):
+        raise NotConvergedError("no vibration at 0.1 N")
+
+    monkeypatch.setattr("rig.analysis.backbone.phase_resonance_backbone", finds_nothing)
+    status, out, err = command("analyse backbone --bench magnet-beam --from-n 0.1 --to-n 0.5")
+    assert (status, out) == (1, "")
+    assert err.startswith("rig: no vibration at resonance found at the lowest level: no vibration at 0.1 N")
 
 
 def test_leaving_the_valid_range_is_said():
