@@ -84,7 +84,7 @@ def periodic_vibration(
     frequency_hz, periods, count, warnings = _whole_periods(theta, rate_hz, harmonics)
     theta, data = _without_ripple(theta[:count], harmonics), data[:, :count]
     design = _design(theta, harmonics)
-    solution = np.linalg.lstsq(design, data.T, rcond=None)[0]
+    solution = _least_squares(design, data.T)
     residual = data.T - design @ solution
     return PeriodicVibration(
         channels=tuple(channels),
@@ -144,8 +144,16 @@ def _without_ripple(theta: Float, harmonics: int) -> Float:
     columns = _design(straight, harmonics)[:, 1 : 2 * harmonics + 1]
     weight = np.hanning(mean.size)  # else the ends of a slow wander leak into the fit
     swing = (theta - straight)[inside] - mean
-    fitted = np.linalg.lstsq(columns[inside] * weight[:, None], swing * weight, rcond=None)[0]
+    fitted = _least_squares(columns[inside] * weight[:, None], swing * weight)
     return np.asarray(theta - columns @ fitted)
+
+
+def _least_squares(columns: Float, values: Float) -> Float:
+    """Least squares by the normal equations: the columns are harmonics, as good as orthogonal, and there are few of them.
+
+    Columns of zeros get a coefficient of zero.
+    """
+    return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=None)[0])
 
 
 def _design(theta: Float, harmonics: int) -> Float:

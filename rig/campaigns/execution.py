@@ -87,7 +87,8 @@ class Execution:
 
     def go(self, first_sample: int) -> None:
         """Run to the end of the plan or of what can be done of it; raises only what could not be recorded."""
-        self._write(self.journal.part, {"first_sample": first_sample, "points_done": self.finished})
+        information = {"first_sample": first_sample, "points_done": self.finished, "device_flags": [*self.daq.counters]}
+        self._write(self.journal.part, information)
         for remark in self.daq.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 import rig
+from rig.campaigns.execution import Silent
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.sweep import SweepPlan
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
+from rig.summary import summarise_recording as show
 from simulators.virtual_rig import VirtualRig
 from tests.reference.harmonic_balance import response_to_voltage
 from tests.reference.parameters import ONE_SIDED
@@ -204,3 +206,42 @@ def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
 def test_a_sweep_that_makes_no_sense_is_refused(changes, fault):
     with pytest.raises(ValueError, match=fault):
         _sweep(**changes)
+
+
+class StopAfterOne(Silent):
+    """Asks for a stop as soon as the first point is done."""
+
+    def __init__(self):
+        self.done = 0
+
+    def point(self, point, number, total):
+        self.done = number
+
+    def advance(self, rows, tick):
+        if self.done == 1:
+            tick.request_stop()
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        _plan(frequencies_hz=(22.0, 23.0, 24.0)),
+        _sweep(levels_v=(0.1, 0.2), hold_periods=5, rate_hz_per_s=1.0),
+        MULTISINE.model_copy(update={"transient_periods": 1}),
+    ],
+    ids=lambda plan: plan.kind,
+)
+def test_an_interrupted_open_loop_test_is_ramped_down_and_resumed(plan, tmp_path):
+    output = tmp_path / "out.h5"
+    with rig.run(plan, output=output, progress=StopAfterOne()) as run:
+        assert not run.complete
+        assert sum(point["accepted"] for point in run.recording.points) == 1
+        part = run.recording.parts[0]
+        assert part.rows("output_v")[-1] == 0.0
+        assert np.abs(np.diff(np.abs(part.rows("command_v")))).max() < 0.03
+    with rig.resume(output) as run:
+        assert run.complete
+        numbers = {point["number"] for point in run.recording.points if point["accepted"]}
+        assert numbers == {target.number for target in plan.targets()}
+        assert len(run.recording.parts) == 2
+        assert show(run.recording)["complete"]
