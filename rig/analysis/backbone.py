@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Backbone", "backbone", "neglected"]
 
 _WORTH_A_NUMBER = 0.001
+_ROUNDING_J = 1e-15
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,7 +79,7 @@ class Backbone(Study):
         print(f"modal frequency, largest amplitude over smallest: {100.0 * r.frequency_shift:+.2f} %")
         for point, loops in self.loops.items():
             lost = ", ".join(
-                f"{joint.at} {loop.dissipated_j:.3g}"
+                f"{joint.at} {loop.dissipated_j if loop.dissipated_j > _ROUNDING_J else 0.0:.3g}"
                 for joint, loop in zip(self.subject.rig.friction, loops, strict=True)
             )
             print(f"lost per period in the joints at {r.force_n[point]:.4g} N, J: {lost}")

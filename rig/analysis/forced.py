@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.backbone import neglected
 from rig.analysis.forced_figure import draw_forced
-from rig.analysis.levels import most_points, samples_for
+from rig.analysis.levels import highest_resonance, most_points, samples_for
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
 from rig.console import number, print_table
@@ -23,7 +23,7 @@ __all__ = ["Forced", "forced"]
 
 Real = NDArray[np.float64]
 
-_DEFAULT_SHARE_OF_LIMIT = 0.2
+_DEFAULT_SHARE = 0.5
 _SPAN = (0.7, 1.3)
 _DENSE_WIDTHS = 12.0
 """Half-widths of the resonance, on either side of it, in which half of the points lie."""
@@ -108,10 +108,12 @@ def forced(
 ) -> Forced:
     """Steady response to a constant voltage over frequency, rising and falling; half of the points lie around resonance.
 
-    Default: a fifth of the bench's voltage limit, from 0.7 to 1.3 times the frequency of the mode under test.
+    Default: half of the voltage that the bench may be driven at at resonance, from 0.7 to 1.3 times the frequency of the mode under test.
     """
-    limit_v = subject.bench.limits.voltage_v
-    voltage = positive("voltage_v", _DEFAULT_SHARE_OF_LIMIT * limit_v if voltage_v is None else voltage_v)
+    if voltage_v is None:
+        path, last = highest_resonance(subject, harmonics)
+        voltage_v = float(f"{_DEFAULT_SHARE * path.voltage_v[last]:.2g}")
+    voltage = positive("voltage_v", voltage_v)
     low = positive("from_hz", _SPAN[0] * subject.frequency_hz if from_hz is None else from_hz)
     high = positive("to_hz", _SPAN[1] * subject.frequency_hz if to_hz is None else to_hz)
     if low >= high:

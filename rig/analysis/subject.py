@@ -38,6 +38,7 @@ class Demand:
     """Largest value at each point [n]."""
     limit: float
     unit: str
+    whose: str = "the bench's"
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +79,7 @@ class Subject:
         travel = np.max([np.abs(harmonics[:, 1]) / omega**2 for harmonics in moving], axis=0)
         return [
             Demand("voltage", responses.voltage_v, limits.voltage_v, "V"),
+            Demand("voltage", responses.voltage_v, self.rig.exciter.input_limit_v, "V", "the amplifier's"),
             Demand("force", peak(responses.force_harmonics_n), limits.force_n, "N"),
             Demand("acceleration", peaks, limits.acceleration_m_s2, "m/s^2"),
             Demand("displacement", travel, limits.displacement_m, "m"),
@@ -102,7 +104,7 @@ class Subject:
             if count := int(np.count_nonzero(demand.values > _TOLERANCE * demand.limit)):
                 lines.append(
                     f"{demand.name} reaches {np.max(demand.values):.4g} {demand.unit} and is in {count} of {total} {of} "
-                    f"above the bench's limit of {demand.limit:g} {demand.unit}"
+                    f"above {demand.whose} limit of {demand.limit:g} {demand.unit}"
                 )
         return tuple(lines)
 
