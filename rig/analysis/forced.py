@@ -108,7 +108,8 @@ def forced(
 ) -> Forced:
     """Steady response to a constant voltage over frequency, rising and falling; half of the points lie around resonance.
 
-    Default: half of the voltage that the bench may be driven at at resonance, from 0.7 to 1.3 times the frequency of the mode under test.
+    Default: half of the voltage that the bench may be driven at in resonance,
+    from 0.7 to 1.3 times the frequency of the mode under test.
     """
     if voltage_v is None:
         path, last = highest_resonance(subject, harmonics)
