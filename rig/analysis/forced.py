@@ -1,7 +1,6 @@
 """What a slow uncontrolled sweep at constant voltage sees: the force drops out at resonance and overshoots beside it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from rig.analysis.backbone import neglected
 from rig.analysis.forced_figure import draw_forced
 from rig.analysis.levels import highest_resonance, most_points, samples_for
+from rig.analysis.rows import joined, part, turned
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
 from rig.console import number, print_table
@@ -123,7 +123,7 @@ def forced(
     grid = _grid(low, high, most_points(points, 4), _resonance(subject, voltage, how))
     up, up_ends = _followed(subject, voltage, grid, how)
     down, down_ends = _followed(subject, voltage, grid[::-1], how)
-    up, down, notes = _completed(up, _turned(down), up_ends, down_ends)
+    up, down, notes = _completed(up, turned(down), up_ends, down_ends)
     excesses = dict.fromkeys(line for way in (up, down) for line in subject.excesses(way))
     return Forced(
         subject=subject,
@@ -156,9 +156,9 @@ def _completed(
         both = (("rising", up.frequency_hz[-1], up_ends), ("falling", down.frequency_hz[0], down_ends))
         return up, down, [f"{name} frequency ends at {ends_hz:.4f} Hz: {why}" for name, ends_hz, why in both]
     if up_ends:
-        return _joined(up, _part(down, slice(n_up, None))), down, [jump.format("rising", up.frequency_hz[-1])]
+        return joined(up, part(down, slice(n_up, None))), down, [jump.format("rising", up.frequency_hz[-1])]
     if down_ends:
-        return up, _joined(_part(up, slice(0, n_up - n_down)), down), [jump.format("falling", down.frequency_hz[0])]
+        return up, joined(part(up, slice(0, n_up - n_down)), down), [jump.format("falling", down.frequency_hz[0])]
     return up, down, []
 
 
@@ -195,28 +195,3 @@ def _extremes(way: PeriodicResponses) -> dict[str, float]:
         "highest_hz": float(way.frequency_hz[highest]),
         "highest_share": float(force[highest] / force[0]),
     }
-
-
-def _turned(way: PeriodicResponses) -> PeriodicResponses:
-    """The same points in the opposite order."""
-    return _part(way, slice(None, None, -1))
-
-
-def _part(way: PeriodicResponses, rows: slice) -> PeriodicResponses:
-    return _of_columns(lambda column: column[rows], way)
-
-
-def _joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicResponses:
-    return _of_columns(lambda one, other: np.concatenate([one, other]), first, then)
-
-
-def _of_columns(make: Callable[..., Any], *ways: PeriodicResponses) -> PeriodicResponses:
-    """Responses whose every column is made of the columns of others."""
-    columns: dict[str, Any] = {}
-    for field in fields(PeriodicResponses):
-        those = [getattr(way, field.name) for way in ways]
-        if isinstance(those[0], dict):
-            columns[field.name] = {name: make(*(column[name] for column in those)) for name in those[0]}
-        elif those[0] is not None:
-            columns[field.name] = make(*those)
-    return PeriodicResponses(**columns)
