@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from identification.channels import Channel, find_role
 from identification.errors import IdentificationError
@@ -183,6 +182,8 @@ def _fundamental(theta: Float, signal: Float, once: slice, at: NDArray[np.intp],
     A mean is a difference of the antiderivative of an interpolating spline: windows end between samples, as seldom a
     whole number of them makes a period.
     """
+    from scipy.interpolate import CubicSpline  # a third of a second, for sweeps alone
+
     integral = CubicSpline(theta, 2.0 * np.exp(-1j * theta) * signal).antiderivative()
     mean = (integral(theta[once] + reach) - integral(theta[once] - reach)) / (2.0 * reach)
     again = CubicSpline(theta[once], mean).antiderivative()

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter
 
 from simulators.sensing.parts import TAPS, Converter, Sensor
 
@@ -31,6 +30,8 @@ def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Matrix:
     """
     if corner_hz == 0.0:
         return np.zeros((0, 5))
+    from scipy.signal import butter  # half a second, which a rig without filters need not wait for
+
     sections: Matrix = butter(order, corner_hz, fs=rate_hz, output="sos")
     return sections[:, [0, 1, 2, 4, 5]]
 
