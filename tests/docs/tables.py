@@ -99,7 +99,9 @@ def bounds(field: dict[str, Any]) -> str:
 
 def table_under(heading: str, text: str) -> re.Match[str]:
     """The first table below a heading."""
-    found = re.search(rf"^#+ {re.escape(heading)}$(?:(?!^#).)*?(?P<table>(?:^\|[^\n]*\n)+)", text, re.MULTILINE | re.DOTALL)
+    found = re.search(
+        rf"^#+ {re.escape(heading)}$(?:(?!^#).)*?(?P<table>(?:^\|[^\n]*\n)+)", text, re.MULTILINE | re.DOTALL
+    )
     assert found, f"no table under {heading!r}"
     return found
 
