@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive
 
@@ -12,25 +12,68 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Exciter(Part):
-    """Shaker behind a voltage amplifier: ``L i' = u - R i - G v_a``, ``m_a v_a' = G i - k_a x_a - c_a v_a - F``.
+    """Shaker and amplifier: ``m_a v_a' = G(x_a) i - k_a x_a - k_a3 x_a^3 - c_a v_a - F``.
 
-    Not modelled: rotation of the armature, droop of the force factor, stiffening of the suspension, amplifier dynamics.
+    Voltage amplifier: ``L i' = g u - R i - G(x_a) v_a``. Current amplifier: a first-order loop, ``i' = w_c (g u - i)``,
+    whatever the coil's voltage. The force factor acts on force and back-EMF alike, ``G(x_a) = G (1 + b_1 x_a + b_2
+    x_a^2)``, so that it moves power and makes none; this and the polynomial suspension are the large-signal model of
+    electrodynamic transducers (Klippel 2006, Tutorial: Loudspeaker Nonlinearities, J. Audio Eng. Soc. 54 (10)).
+
+    Not modelled: rotation of the armature, amplifier dynamics beyond these, the coil voltage that limits a current
+    amplifier, inductance that changes with position, eddy currents, heating.
     """
 
-    amplifier: Literal["voltage"] = "voltage"
-    """The amplifier holds the voltage at the coil."""
+    amplifier: Literal["voltage", "current"] = "voltage"
+    """What the amplifier holds at the coil."""
+    amplifier_gain: Positive = 1.0
+    """Gain g: V/V of a voltage amplifier, A/V of a current amplifier."""
+    voltage_limit_v: Positive | None = None
+    """Largest voltage of a voltage amplifier, at the coil; beyond, it clips and is flagged."""
+    current_limit_a: Positive | None = None
+    """Largest current that a current amplifier can be asked for; beyond, it clips and is flagged."""
+    bandwidth_hz: Positive = 3000.0
+    """Bandwidth w_c/(2 pi) of the loop of a current amplifier."""
     armature_mass_kg: Positive
     """Moving mass m_a."""
     suspension_stiffness_n_m: NotNegative
     """Suspension stiffness k_a."""
+    suspension_cubic_n_m3: NotNegative = 0.0
+    """Stiffening of the suspension k_a3."""
     suspension_damping_n_s_m: NotNegative
     """Suspension damping c_a."""
     force_factor_n_a: Positive
-    """Force factor G (N/A, the same as V s/m)."""
+    """Force factor G at rest (N/A, the same as V s/m)."""
+    droop_per_m: float = 0.0
+    """Slope b_1 of the force factor over the armature's position (1/m)."""
+    droop_per_m2: float = 0.0
+    """Curvature b_2 of it (1/m^2); negative where the coil leaves the gap on either side."""
     resistance_ohm: NotNegative
     """Resistance R of coil, cable and amplifier together."""
     inductance_h: Positive
     """Coil inductance L."""
+
+    @model_validator(mode="after")
+    def _limit_is_the_amplifiers(self) -> "Exciter":
+        if self.amplifier == "current" and self.voltage_limit_v is not None:
+            raise ValueError(
+                f"voltage_limit_v = {self.voltage_limit_v!r}: allowed is current_limit_a, it holds a current"
+            )
+        if self.amplifier == "voltage" and self.current_limit_a is not None:
+            raise ValueError(
+                f"current_limit_a = {self.current_limit_a!r}: allowed is voltage_limit_v, it holds a voltage"
+            )
+        return self
+
+    @property
+    def input_limit_v(self) -> float:
+        """Voltage at the amplifier's input beyond which it clips; infinite without a limit."""
+        limit = self.voltage_limit_v if self.amplifier == "voltage" else self.current_limit_a
+        return float("inf") if limit is None else limit / self.amplifier_gain
+
+    @property
+    def droops(self) -> bool:
+        """True where the force factor depends on position."""
+        return self.droop_per_m != 0.0 or self.droop_per_m2 != 0.0
 
 
 class Stinger(Part):

@@ -24,9 +24,11 @@ class Flag(IntFlag):
     """The voltage asked for is beyond the digital-to-analogue converter, or not a number (then 0 V is held)."""
     DIVERGED = 8
     """The state is no longer finite. From then on it is held and every channel reads NaN."""
+    AMPLIFIER_CLIPPED = 16
+    """The voltage asked for would take the amplifier beyond its limit."""
 
 
-MAGNET_RANGE, SENSOR_CLIPPED, DAC_CLIPPED, DIVERGED = (int(flag) for flag in Flag)
+MAGNET_RANGE, SENSOR_CLIPPED, DAC_CLIPPED, DIVERGED, AMPLIFIER_CLIPPED = (int(flag) for flag in Flag)
 
 
 class SiteKind(IntEnum):
@@ -37,13 +39,14 @@ class SiteKind(IntEnum):
     CUBIC = 2
     CLEARANCE = 3
     USER = 4
+    DROOP = 5
 
 
-MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER = (int(kind) for kind in SiteKind)
+MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER, DROOP = (int(kind) for kind in SiteKind)
 N_PARAMETER = 8
 
-PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_joint", "i8"), ("substeps", "i8")])
-"""Sizes (one record)."""
+PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_joint", "i8"), ("substeps", "i8"), ("input_limit_v", "f8")])
+"""Sizes, and the voltage beyond which the amplifier clips (one record)."""
 
 SITE = np.dtype(
     [
@@ -55,12 +58,14 @@ SITE = np.dtype(
         ("gap", "f8"),
         ("other_gap", "f8"),
         ("offset", "f8"),
+        ("partner", "i8"),
         ("address", "i8"),
         ("parameters", "f8", (N_PARAMETER,)),
     ]
 )
 """A local site: limit of validity (m), linear stiffness that the linear part already holds (N/m); strength K0 (N m^4), k3
-(N/m^3) or k (N/m), quadratic stiffness k2 (N/m^2), gaps (m), force at rest that is taken off (N); address of a user's
+(N/m^3) or k (N/m), quadratic stiffness k2 (N/m^2), gaps (m), force at rest that is taken off (N); how many sites before
+stands the position that a droop depends on, with G b_1 as quadratic and G b_2 as strength; address of a user's
 function, good in the process that made the table, and the numbers that it is given."""
 
 CHANNEL = np.dtype(

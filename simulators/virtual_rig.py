@@ -104,7 +104,7 @@ class VirtualRig(Part):
             if joint.relative_to_mode_1 and self.structure.shape(joint.at, joint.quantity)[0] == 0.0:
                 raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
         slipping = self.plant.modal_stiffness.copy()
-        for joint, row in zip(self.friction, self.plant.site_rows[len(self.elements) :], strict=True):
+        for joint, row in zip(self.friction, self.plant.site_rows[self.plant.n_local :], strict=True):
             coordinate = row[: self.plant.n_mode]
             slipping -= joint.stuck_stiffness * np.outer(coordinate, coordinate)
         lowest = np.linalg.eigvalsh(slipping)[0]
@@ -127,6 +127,7 @@ class VirtualRig(Part):
             self.plant,
             self.elements,
             self.friction,
+            self.exciter,
             [self.output_row(sensor) for sensor in self.sensors],
             self.sensors,
             self.converter,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from simulators.analysis.kernels import friction_over_a_period, memoryless_over_a_period
 from simulators.analysis.series import Series
-from simulators.plant.compilation import local_sites
+from simulators.plant.sites import local_sites
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["SiteForces", "SiteWaves"]
@@ -34,7 +34,7 @@ class SiteForces:
     """The nonlinear sites of a rig, in the order of ``rig.plant.site_rows``: those without memory, then the joints."""
 
     def __init__(self, rig: VirtualRig) -> None:
-        self.sites = local_sites(rig.elements)
+        self.sites = local_sites(rig.elements, rig.exciter)
         self.n_site = rig.plant.site_rows.shape[0]
         self.n_local = self.n_site - len(rig.friction)
         self.joints = [

@@ -14,16 +14,20 @@ from numpy.typing import NDArray
 from simulators.elements import Element
 from simulators.exciter import Exciter, Stinger
 from simulators.friction import FrictionSite
+from simulators.plant.sites import Place, element_places, exciter_places
 from simulators.structure import Structure
 
-__all__ = ["LinearPlant", "assemble", "element_shape"]
+__all__ = ["LinearPlant", "assemble"]
 
 Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
-    """The coupled plant ``x' = A x + b_u u + B_f f`` with site coordinates ``C_s x``; sites are elements, then joints."""
+    """The coupled plant ``x' = A x + b_u u + B_f f`` with site coordinates ``C_s x``.
+
+    Sites are elements, the exciter's own, joints, in this order.
+    """
 
     dynamics: Matrix
     """A [n, n]."""
@@ -32,7 +36,9 @@ class LinearPlant:
     site_columns: Matrix
     """B_f [n, n_site]."""
     site_rows: Matrix
-    """C_s [n_site, n]; deflection (m) or velocity (m/s) of an element, coordinate of a joint."""
+    """C_s [n_site, n]; of an element (m, m/s), of the exciter (m, m/s, A), of a joint."""
+    n_local: int
+    """Number of sites without memory, which come first: elements, then the exciter's own."""
     modal_stiffness: Matrix
     """Stiffness of the structure in its modal coordinates [n_mode, n_mode], that of the elements included (s^-2)."""
     modal_damping: Matrix
@@ -77,24 +83,23 @@ def assemble(
     omega = structure.omega_rad_s
     signs = np.where(structure.shape(stinger.at) < 0.0, -1.0, 1.0)
     drive = signs * structure.shape(stinger.at)
-    coordinates = [signs * element_shape(structure, element) for element in elements]
-    stiffness = np.diag(omega**2)
-    for element, row in zip(elements, coordinates, strict=True):
-        stiffness += element.stiffness_n_m * np.outer(row, row)
-    for joint in joints:
-        row = signs * structure.shape(joint.at, joint.quantity)
-        coordinates.append(row / row[0] if joint.relative_to_mode_1 else row)
-    damping = 2.0 * np.array(structure.damping_ratio) * omega
     m = omega.size
-    site_rows = np.zeros((len(coordinates), 2 * m + 3))
-    site_columns = np.zeros((2 * m + 3, len(coordinates)))
-    for site, row in enumerate(coordinates):
-        moves_with = elements[site].moves_with if site < len(elements) else "deflection"
-        first = m if moves_with == "velocity" else 0
-        site_rows[site, first : first + m] = row
-        site_columns[m : 2 * m, site] = row
+    places = [*element_places(structure, elements, signs), *exciter_places(exciter, 2 * m + 3)]
+    n_local = len(places)
+    stiffness = np.diag(omega**2)
+    for place in places:
+        stiffness += place.stiffness_n_m * np.outer(place.row[:m], place.row[:m])
+    for joint in joints:
+        shape = signs * structure.shape(joint.at, joint.quantity)
+        shape = shape / shape[0] if joint.relative_to_mode_1 else shape
+        row, column = np.zeros((2, 2 * m + 3))
+        row[:m] = column[m : 2 * m] = shape
+        places.append(Place(row, column))
+    damping = 2.0 * np.array(structure.damping_ratio) * omega
     voltage = np.zeros(2 * m + 3)
-    voltage[-1] = 1.0 / exciter.inductance_h
+    voltage[-1] = exciter.amplifier_gain * (
+        _corner(exciter) if exciter.amplifier == "current" else 1.0 / exciter.inductance_h
+    )
     stinger_row = np.concatenate(
         [
             -stinger.stiffness_n_m * drive,
@@ -105,20 +110,15 @@ def assemble(
     return LinearPlant(
         dynamics=_dynamics(stiffness, damping, drive, exciter, stinger_row),
         voltage_column=voltage,
-        site_columns=site_columns,
-        site_rows=site_rows,
+        site_columns=np.array([place.column for place in places]).reshape(-1, 2 * m + 3).T,
+        site_rows=np.array([place.row for place in places]).reshape(-1, 2 * m + 3),
+        n_local=n_local,
         modal_stiffness=stiffness,
         modal_damping=damping,
         stinger_row=stinger_row,
         drive_shape=drive,
         signs=signs,
     )
-
-
-def element_shape(structure: Structure, element: Element) -> Matrix:
-    """Coordinate of an element over the modes [n_mode] (kg^-1/2), as the structure gives them."""
-    shape = structure.shape(element.at)
-    return shape if element.to is None else shape - structure.shape(element.to)
 
 
 def _dynamics(stiffness: Matrix, damping: Matrix, drive: Matrix, exciter: Exciter, force: Matrix) -> Matrix:
@@ -137,6 +137,14 @@ def _dynamics(stiffness: Matrix, damping: Matrix, drive: Matrix, exciter: Excite
     dynamics[v_a, v_a] -= exciter.suspension_damping_n_s_m
     dynamics[v_a, i] += exciter.force_factor_n_a
     dynamics[v_a] /= exciter.armature_mass_kg
-    dynamics[i, v_a] = -exciter.force_factor_n_a / exciter.inductance_h
-    dynamics[i, i] = -exciter.resistance_ohm / exciter.inductance_h
+    if exciter.amplifier == "current":
+        dynamics[i, i] = -_corner(exciter)
+    else:
+        dynamics[i, v_a] = -exciter.force_factor_n_a / exciter.inductance_h
+        dynamics[i, i] = -exciter.resistance_ohm / exciter.inductance_h
     return dynamics
+
+
+def _corner(exciter: Exciter) -> float:
+    """Corner of the loop of a current amplifier (rad/s)."""
+    return 2.0 * np.pi * exciter.bandwidth_hz

@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.elements import Clearance, Cubic, Element, Magnet
+from simulators.elements import Element
+from simulators.exciter import Exciter
 from simulators.friction import FrictionSite
-from simulators.functions import loaded
-from simulators.layout import CHANNEL, CONVERTER, PLANT, SITE, RigArrays, RigState, SiteKind
+from simulators.layout import CHANNEL, CONVERTER, PLANT, RigArrays, RigState
 from simulators.plant.assembly import LinearPlant
 from simulators.plant.discretise import aligned, pad, round_up, step_columns
+from simulators.plant.sites import local_sites
 from simulators.sensing.filters import channel_sections, output_sections, ring_size, skew_taps
 from simulators.sensing.parts import Converter, Sensor
+from vibrolock.lanes.kernels import WIDTH
 
-__all__ = ["at_rest", "jenkins_elements", "local_sites", "rig_arrays"]
+__all__ = ["at_rest", "jenkins_elements", "rig_arrays"]
 
 Matrix = NDArray[np.float64]
 
@@ -25,6 +27,7 @@ def rig_arrays(
     plant: LinearPlant,
     elements: Sequence[Element],
     joints: Sequence[FrictionSite],
+    exciter: Exciter,
     outputs: Sequence[Matrix],
     sensors: Sequence[Sensor],
     converter: Converter,
@@ -35,14 +38,15 @@ def rig_arrays(
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
     step = step_columns(plant, len(joints), 1.0 / (converter.sample_rate_hz * converter.substeps))
     jenkins = jenkins_elements(joints)
-    sizes = (plant.dynamics.shape[0], len(elements), len(joints), converter.substeps // converter.oversampling)
+    substeps = converter.substeps // converter.oversampling
+    sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
     delays, taps = skew_taps(sensors, converter)
     channels = [_channel(*pair, converter, noise_scale) for pair in zip(sensors, delays, strict=True)]
     return RigArrays(
         plant=np.array([sizes], PLANT),
         step=step.predictor,
         correct=step.corrector,
-        sites=local_sites(elements),
+        sites=local_sites(elements, exciter),
         elements=jenkins,
         stuck=jenkins[0].sum(axis=0),
         sense=pad(np.array(outputs).T),
@@ -79,49 +83,12 @@ def at_rest(rig: RigArrays) -> RigState:
         output_memory=np.zeros((rig.reconstruction.shape[0], 2, 1)),
         history=np.zeros((ring_size(rig.channels["delay"], rig.taps), rig.channels.size)),
         output_v=np.zeros(1),
-        rows=aligned(max(n_row, rig.stuck.size)),
+        rows=aligned(n_row + WIDTH),  # the last vector of x may reach beyond
         forces=np.zeros(rig.sites.size),
         joints=aligned(rig.stuck.size),
         changes=np.zeros(rig.correct.shape[0]),
         outputs=np.zeros(rig.sense.shape[1]),
     )
-
-
-def local_sites(elements: Sequence[Element]) -> NDArray[Any]:
-    """Table of the elements for the kernels, one `simulators.layout.SITE` record each."""
-    table = np.zeros(len(elements), SITE)
-    table["limit"] = np.inf
-    for row, element in zip(table, elements, strict=True):
-        for name, value in _site(element).items():
-            row[name] = value
-    return table
-
-
-def _site(element: Element) -> dict[str, Any]:
-    if isinstance(element, Magnet):
-        return {
-            "kind": SiteKind.MAGNET_ONE_SIDED if element.one_sided else SiteKind.MAGNET_SYMMETRIC,
-            "limit": element.limit_m,
-            "stiffness": element.stiffness_n_m,
-            "strength": element.strength_n_m4,
-            "gap": element.gap_m,
-            "offset": element.strength_n_m4 / element.gap_m**4 if element.one_sided else 0.0,
-        }
-    if isinstance(element, Cubic):
-        return {"kind": SiteKind.CUBIC, "strength": element.stiffness_n_m3, "quadratic": element.quadratic_n_m2}
-    if isinstance(element, Clearance):
-        return {
-            "kind": SiteKind.CLEARANCE,
-            "strength": element.contact_stiffness_n_m,
-            "gap": element.gap_m,
-            "other_gap": np.inf if element.other_gap_m is None else element.other_gap_m,
-        }
-    return {
-        "kind": SiteKind.USER,
-        "stiffness": element.stiffness_n_m,
-        "address": loaded(element.function).address,
-        "parameters": element.padded_parameters,
-    }
 
 
 def _channel(

@@ -17,7 +17,17 @@ from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from simulators.layout import CLEARANCE, CUBIC, MAGNET_ONE_SIDED, MAGNET_RANGE, MAGNET_SYMMETRIC, RigArrays, RigState
+from simulators.layout import (
+    AMPLIFIER_CLIPPED,
+    CLEARANCE,
+    CUBIC,
+    DROOP,
+    MAGNET_ONE_SIDED,
+    MAGNET_RANGE,
+    MAGNET_SYMMETRIC,
+    RigArrays,
+    RigState,
+)
 from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.lanes.kernels import WIDTH, greatest, least, load, spread, store
 
@@ -105,12 +115,19 @@ def local_force(site: Record, z: float) -> float:
 def local_forces(
     sites: NDArray[Any], coordinates: NDArray[np.float64], first: int, forces: NDArray[np.float64]
 ) -> bool:
-    """Forces of the sites without memory, whose coordinates begin at ``first``; True where a magnet is beyond its limit."""
+    """Forces of the sites without memory, whose coordinates begin at ``first``; True where a magnet is beyond its limit.
+
+    The droop of the force factor is a product of two coordinates, its own and one that stands before it.
+    """
     beyond = False
     for s in range(sites.size):
         z = coordinates[first + s]
-        forces[s] = local_force(sites[s], z)
-        beyond |= abs(z) > sites[s].limit
+        if sites[s].kind == DROOP:
+            x = coordinates[first + s - sites[s].partner]
+            forces[s] = (sites[s].quadratic + sites[s].strength * x) * x * z
+        else:
+            forces[s] = local_force(sites[s], z)
+            beyond |= abs(z) > sites[s].limit
     return beyond
 
 
@@ -141,12 +158,14 @@ def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
 
 @inner_kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
-    """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE or 0."""
+    """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE, AMPLIFIER_CLIPPED or 0, or-ed."""
     inputs, rows, forces, joints, changes = state.inputs, state.rows, state.forces, state.joints, state.changes
     n, n_local, n_joint = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_joint
     first_state, first_local, first_joint = n_joint + n_local, n + 1, n + 1 + n_local
     beyond = False
-    inputs[n] = voltage
+    limit = rig.plant[0].input_limit_v
+    held = min(max(voltage, -limit), limit)
+    inputs[n] = held
     for _ in range(rig.plant[0].substeps):
         combine(rig.step, inputs, rows)
         joint_forces(rig, state, False)
@@ -158,10 +177,11 @@ def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
         add_columns(rig.correct, changes, rows)
         joint_forces(rig, state, True)
         beyond |= local_forces(rig.sites, rows, n_joint, forces)
-        for i in range(n):
-            inputs[i] = rows[first_state + i]
+        for i in range(0, n, WIDTH):  # what is carried beyond x is overwritten at once
+            store(inputs, i, load(rows, first_state + i))
+        inputs[n] = held
         for s in range(n_local):
             inputs[first_local + s] = forces[s]
         for s in range(n_joint):
             inputs[first_joint + s] = joints[s]
-    return MAGNET_RANGE if beyond else 0
+    return (MAGNET_RANGE if beyond else 0) | (AMPLIFIER_CLIPPED if held != voltage else 0)

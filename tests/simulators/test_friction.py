@@ -22,7 +22,7 @@ def imposed_joint() -> tuple[RigArrays, RigState]:
     step = np.zeros((8, 8))
     step[1, 0] = 1.0
     rig = RigArrays(
-        plant=np.array([(1, 0, 1, 1)], PLANT),
+        plant=np.array([(1, 0, 1, 1, np.inf)], PLANT),
         step=step,
         correct=np.zeros((1, 8)),
         sites=np.zeros(0, SITE),

@@ -1,0 +1,102 @@
+"""Where the sites without memory sit in the plant, and their records for the kernels: elements, then the exciter's own."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.elements import Clearance, Cubic, Element, Magnet
+from simulators.exciter import Exciter
+from simulators.functions import loaded
+from simulators.layout import SITE, SiteKind
+from simulators.structure import Structure
+
+__all__ = ["Place", "element_places", "exciter_places", "local_sites"]
+
+Matrix = NDArray[np.float64]
+
+
+class Place(NamedTuple):
+    """A site in the plant ``x' = A x + B f`` with ``x = [q, q', x_a, v_a, i]``."""
+
+    row: Matrix
+    """Its coordinate as a row over the state [n]."""
+    column: Matrix
+    """What its force does to the rates of the state [n]."""
+    stiffness_n_m: float = 0.0
+    """Linear stiffness on its coordinate that the linear plant takes over."""
+
+
+def element_places(structure: Structure, elements: Sequence[Element], signs: Matrix) -> list[Place]:
+    """One place per element; ``signs`` [n_mode] turn the shapes."""
+    return [_element_place(structure, element, signs) for element in elements]
+
+
+def _element_place(structure: Structure, element: Element, signs: Matrix) -> Place:
+    shape = signs * structure.shape(element.at)
+    if element.to is not None:
+        shape = shape - signs * structure.shape(element.to)
+    m = shape.size
+    row, column = np.zeros((2, 2 * m + 3))
+    first = m if element.moves_with == "velocity" else 0
+    row[first : first + m] = shape
+    column[m : 2 * m] = shape
+    return Place(row, column, element.stiffness_n_m)
+
+
+def exciter_places(exciter: Exciter, n: int) -> list[Place]:
+    """Places of the exciter's own nonlinearities, as many as `_exciter_records` has; ``n`` states."""
+    x_a, v_a, i = np.eye(n)[n - 3 :]
+    force, emf = v_a / exciter.armature_mass_kg, -i / exciter.inductance_h
+    places = [Place(x_a, force), Place(i, force), Place(v_a, emf)]
+    return places[: len(_exciter_records(exciter))]
+
+
+def _exciter_records(exciter: Exciter) -> list[dict[str, Any]]:
+    """Suspension on the armature; where the force factor droops, its force on it and its back-EMF on the coil."""
+    suspension = {"kind": SiteKind.CUBIC, "strength": exciter.suspension_cubic_n_m3}
+    if not exciter.droops:
+        return [suspension] if exciter.suspension_cubic_n_m3 else []
+    g = exciter.force_factor_n_a
+    droop = {"kind": SiteKind.DROOP, "quadratic": g * exciter.droop_per_m, "strength": g * exciter.droop_per_m2}
+    force, emf = droop | {"partner": 1}, droop | {"partner": 2}
+    return [suspension, force] if exciter.amplifier == "current" else [suspension, force, emf]
+
+
+def local_sites(elements: Sequence[Element], exciter: Exciter) -> NDArray[Any]:
+    """Table for the kernels, one `simulators.layout.SITE` record per site."""
+    records = [*(_record(element) for element in elements), *_exciter_records(exciter)]
+    table = np.zeros(len(records), SITE)
+    table["limit"] = np.inf
+    for row, record in zip(table, records, strict=True):
+        for name, value in record.items():
+            row[name] = value
+    return table
+
+
+def _record(element: Element) -> dict[str, Any]:
+    if isinstance(element, Magnet):
+        return {
+            "kind": SiteKind.MAGNET_ONE_SIDED if element.one_sided else SiteKind.MAGNET_SYMMETRIC,
+            "limit": element.limit_m,
+            "stiffness": element.stiffness_n_m,
+            "strength": element.strength_n_m4,
+            "gap": element.gap_m,
+            "offset": element.strength_n_m4 / element.gap_m**4 if element.one_sided else 0.0,
+        }
+    if isinstance(element, Cubic):
+        return {"kind": SiteKind.CUBIC, "strength": element.stiffness_n_m3, "quadratic": element.quadratic_n_m2}
+    if isinstance(element, Clearance):
+        return {
+            "kind": SiteKind.CLEARANCE,
+            "strength": element.contact_stiffness_n_m,
+            "gap": element.gap_m,
+            "other_gap": np.inf if element.other_gap_m is None else element.other_gap_m,
+        }
+    return {
+        "kind": SiteKind.USER,
+        "stiffness": element.stiffness_n_m,
+        "address": loaded(element.function).address,
+        "parameters": element.padded_parameters,
+    }
