@@ -23,6 +23,16 @@ def test_an_even_harmonic_makes_half_periods_unequal_and_their_sum_a_period() ->
     np.testing.assert_allclose(halves[1:] + halves[:-1], 1 / 25.0, rtol=1e-3)
 
 
+def test_samples_of_exactly_zero_are_neither_missed_nor_counted_twice() -> None:
+    # up through a zero, touching zero from above and from below, down through two zeros, up without any
+    signal = [-1.0, 0.0, 2.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, -3.0, 3.0, 1.0]
+    result = zero_crossings(signal, sample_rate_hz=1.0)
+    crossings = [2 / 3, 5.5, 9.5]
+    assert result.time_s.tolist() == pytest.approx([(2 / 3 + 5.5) / 2, 7.5])
+    assert (0.5 / result.frequency_hz).tolist() == pytest.approx(np.diff(crossings))
+    assert result.magnitude.tolist() == [2.0, 3.0]
+
+
 def test_a_signal_that_never_returns_is_refused() -> None:
     with pytest.raises(IdentificationError, match="signal: has 1 zero crossings, needs at least 2"):
         zero_crossings(np.linspace(-1.0, 2.0, 100), sample_rate_hz=RATE_HZ)

@@ -25,7 +25,7 @@ def component(signal: np.ndarray, line: int) -> complex:
 def test_power_lies_on_the_excited_lines_only_and_rms_is_as_asked(
     period: int, band: tuple[float, float], grid: str, rms: float, seed: int
 ) -> None:
-    design = MultisineDesign(1000.0, period, 1000.0 * band[0], 1000.0 * band[1], grid, rms)  # type: ignore[arg-type]
+    design = MultisineDesign(1000.0, period, 1000.0 * band[0], 1000.0 * band[1], grid, rms)
     signal = design.realisation(seed, 0)
     assert np.sqrt(np.mean(signal**2)) == pytest.approx(rms)
     spectrum = np.abs(np.fft.rfft(signal)) * 2 / period
