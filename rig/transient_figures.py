@@ -27,7 +27,7 @@ __all__ = ["draw_multisine", "draw_stepped_sine", "draw_sweep"]
 
 Float = NDArray[np.float64]
 
-_SYMBOL = {"m/s2": "m/s²"}
+_SYMBOL = {"m/s2": "m/s²", "m/s^2": "m/s²"}
 
 
 def draw_sweep(
@@ -205,7 +205,7 @@ def _response(page: Any, measured: InstrumentResponse, text: str) -> None:
     if np.isfinite(measured.total_std).any():
         label = "noise and distortion"
         size.semilogy(frequency, measured.total_std, color=SECOND, lw=0.9, label=label)
-    unit = {"m/s2/N": "1/kg"}.get(measured.unit, measured.unit)
+    unit = {"m/s2/N": "1/kg", "m/s^2/N": "1/kg"}.get(measured.unit, measured.unit)
     size.set(ylabel=f"frequency response, {unit}")
     page.legend(fontsize=8, ncols=3, loc="outside lower center")
     degrees = (np.degrees(np.angle(measured.value)) + 90.0) % 360.0 - 90.0  # neither 0 nor 180 deg is torn apart
