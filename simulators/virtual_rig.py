@@ -33,7 +33,7 @@ class VirtualRig(Part):
     """
 
     specimen: str | None = None
-    """Shipped specimen that the other tables change: magnet-beam or magnet-beam-symmetric."""
+    """Shipped specimen that the other tables change: magnet-beam, magnet-beam-symmetric or friction-beam."""
     provenance: dict[str, str] = Field(default_factory=dict)
     """Which of the numbers are published, calibrated, chosen, unverified; carried along, not used."""
     structure: Structure
