@@ -39,7 +39,7 @@ def _started(bench: Bench, block: int = 1) -> tuple[VirtualDAQ, Tick]:
     daq.open()
     daq.start(block)
     lead = block + daq.latency_samples
-    return daq, Tick(bench, plan.controller, plan.amplitude_law, plan.settle, plan.segments(), lead)
+    return daq, Tick(bench, plan.controller, plan.amplitude_law, plan.settle, plan.segments(bench.sample_rate_hz), lead)
 
 
 def fused(bench: Bench) -> Callable[[], float]:
@@ -62,12 +62,12 @@ def exchanged(bench: Bench, block: int) -> Callable[[], float]:
     calls = SAMPLES // 4 // block
     readings, rows = tick.buffers(block)
     voltages = np.zeros(block)
-    tick_block(tick.arrays, daq.exchange(voltages), readings, rows, voltages)
+    tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
 
     def once() -> float:
         start = time.perf_counter()
         for _ in range(calls):
-            tick_block(tick.arrays, daq.exchange(voltages), readings, rows, voltages)
+            tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
         return 1e6 * (time.perf_counter() - start) / (calls * block)
 
     return once

@@ -16,47 +16,72 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
+    from identification.half_periods import HalfPeriods, zero_crossings
     from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
     from identification.mode_shapes import ModeShapes, mac
+    from identification.multisine import MultisineDesign
+    from identification.multisine_spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
     from identification.nonlinear_modes import NonlinearMode
     from identification.phase_resonance import nonlinear_mode
     from identification.stepped_sine import stepped_sine_mode
+    from identification.sweeps import ForceDropOut, force_drop_out
+    from identification.transients import Transient, demodulate
 
 __all__ = [
     "Backbone",
     "Channel",
+    "ForceDropOut",
     "FrequencyResponse",
     "FrequencyResponseMapping",
+    "HalfPeriods",
     "IdentificationError",
+    "InstrumentResponse",
     "ModeShapes",
+    "MultisineDesign",
     "NonlinearMode",
+    "PeriodicSpectra",
     "PeriodicVibration",
+    "Transient",
+    "demodulate",
+    "force_drop_out",
     "mac",
     "map_frequency_responses",
     "nonlinear_mode",
     "pack_frequency_responses",
+    "periodic_spectra",
     "periodic_vibration",
     "stepped_sine_mode",
     "unpack_frequency_responses",
+    "zero_crossings",
 ]
 
 _MODULE_OF = {
     "Backbone": "backbones",
     "Channel": "channels",
+    "ForceDropOut": "sweeps",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping",
+    "HalfPeriods": "half_periods",
     "IdentificationError": "errors",
+    "InstrumentResponse": "multisine_spectra",
     "ModeShapes": "mode_shapes",
+    "MultisineDesign": "multisine",
     "NonlinearMode": "nonlinear_modes",
+    "PeriodicSpectra": "multisine_spectra",
     "PeriodicVibration": "measurements",
+    "Transient": "transients",
+    "demodulate": "transients",
+    "force_drop_out": "sweeps",
     "mac": "mode_shapes",
     "map_frequency_responses": "mapping",
     "nonlinear_mode": "phase_resonance",
     "pack_frequency_responses": "frequency_responses",
+    "periodic_spectra": "multisine_spectra",
     "periodic_vibration": "fourier",
     "stepped_sine_mode": "stepped_sine",
     "unpack_frequency_responses": "frequency_responses",
+    "zero_crossings": "half_periods",
 }
 
 

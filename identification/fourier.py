@@ -29,6 +29,7 @@ Float = NDArray[np.float64]
 
 _MAX_BATCHES = 20
 _MIN_BATCHES = 4
+_SAMPLES_TO_SPARE = 3  # that many more are needed to be sure of the last period
 
 
 def periodic_vibration(
@@ -83,7 +84,7 @@ def periodic_vibration(
     frequency_hz, periods, count, warnings = _whole_periods(theta, rate_hz, harmonics)
     theta, data = _without_ripple(theta[:count], harmonics), data[:, :count]
     design = _design(theta, harmonics)
-    solution = np.linalg.lstsq(design, data.T, rcond=None)[0]
+    solution = _least_squares(design, data.T)
     residual = data.T - design @ solution
     return PeriodicVibration(
         channels=tuple(channels),
@@ -120,7 +121,7 @@ def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float,
         )
     count = int(np.searchsorted(theta - theta[0], 2.0 * np.pi * periods - 0.5 * step))
     warnings = []
-    if theta.size - count > 1:
+    if theta.size - count > _SAMPLES_TO_SPARE:
         warnings.append(f"{theta.size - count} samples beyond {periods} whole periods are left out")
     if periods < _MIN_BATCHES:
         warnings.append(
@@ -143,8 +144,16 @@ def _without_ripple(theta: Float, harmonics: int) -> Float:
     columns = _design(straight, harmonics)[:, 1 : 2 * harmonics + 1]
     weight = np.hanning(mean.size)  # else the ends of a slow wander leak into the fit
     swing = (theta - straight)[inside] - mean
-    fitted = np.linalg.lstsq(columns[inside] * weight[:, None], swing * weight, rcond=None)[0]
+    fitted = _least_squares(columns[inside] * weight[:, None], swing * weight)
     return np.asarray(theta - columns @ fitted)
+
+
+def _least_squares(columns: Float, values: Float) -> Float:
+    """Least squares by the normal equations: the columns are harmonics, as good as orthogonal, and there are few of them.
+
+    Columns of zeros get a coefficient of zero.
+    """
+    return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=None)[0])
 
 
 def _design(theta: Float, harmonics: int) -> Float:

@@ -3,14 +3,14 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from identification import Backbone
+from identification import Backbone, FrequencyResponse, PeriodicSpectra, Transient
 from rig.bench import Bench, load_bench
-from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.execution import Progress
+from rig.campaigns.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.runner import carry_out, take_up
 from rig.errors import ConfigurationError
-from rig.measurements import backbone
+from rig.measurements import backbone, frequency_responses, spectra, sweeps
 from rig.recording.reader import Recording
 
 __all__ = ["Run", "resume", "run"]
@@ -32,6 +32,18 @@ class Run:
         """The accepted points as a backbone."""
         return backbone(self.recording)
 
+    def frequency_responses(self) -> tuple[FrequencyResponse, ...]:
+        """The accepted points of a stepped-sine test, one frequency response per level."""
+        return frequency_responses(self.recording)
+
+    def sweeps(self) -> dict[int, Transient]:
+        """Fundamentals over time of every sweep, by the number of its point."""
+        return sweeps(self.recording)
+
+    def spectra(self) -> dict[float, PeriodicSpectra]:
+        """Spectra of all realisations of a multisine test, by level in V RMS."""
+        return spectra(self.recording)
+
     def close(self) -> None:
         """Let go of the file; a temporary one is removed."""
         self.recording.close()
@@ -49,7 +61,7 @@ class Run:
 
 
 def run(
-    plan: BackbonePlan | str | Path,
+    plan: Plan | str | Path,
     *,
     bench: Bench | str | Path | None = None,
     output: str | Path | None = None,
@@ -69,8 +81,8 @@ def run(
     """
     if not 0 <= seed < 2**63:
         raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
-    source = "" if isinstance(plan, BackbonePlan) else plan
-    plan = plan if isinstance(plan, BackbonePlan) else load_plan(plan)
+    source = "" if isinstance(plan, Plan) else plan
+    plan = plan if isinstance(plan, Plan) else load_plan(plan)
     if bench is None:
         bench = bench_of(plan, source)
     elif not isinstance(bench, Bench):

@@ -12,6 +12,8 @@ from rig.errors import ConfigurationError
 
 __all__ = ["Bench", "DriverChoice", "Limits", "SpecimenFacts", "load_bench", "shipped_benches"]
 
+HIGHEST_PART = 0.45  # of the sample rate; a phase-locked loop keeps to a quarter of its own accord
+
 
 class DriverChoice(Configured):
     """Which driver stands between the loop and the rig."""
@@ -108,10 +110,10 @@ class Bench(Configured):
             raise ValueError(
                 f"limits.voltage_v = {self.limits.voltage_v:g}: allowed is up to output_range_v = {self.output_range_v:g}"
             )
-        if self.limits.frequency_hz[1] > self.sample_rate_hz / 4.0:
+        if self.limits.frequency_hz[1] > HIGHEST_PART * self.sample_rate_hz:
             raise ValueError(
-                f"limits.frequency_hz = {list(self.limits.frequency_hz)}: allowed is up to a quarter of "
-                f"sample_rate_hz, {self.sample_rate_hz / 4.0:g} Hz"
+                f"limits.frequency_hz = {list(self.limits.frequency_hz)}: allowed is up to {HIGHEST_PART:g} of "
+                f"sample_rate_hz, {HIGHEST_PART * self.sample_rate_hz:g} Hz"
             )
         for channel in self.channels:
             limit = self.limits.force_n if channel.role == "force" else self.limits.acceleration_m_s2

@@ -70,6 +70,7 @@ def run(
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
     _carry(
         json,
+        loaded.kind,
         lambda progress: rig.run(
             loaded, bench=chosen, output=output, seed=seed, realtime=realtime, overwrite=overwrite, progress=progress
         ),
@@ -84,16 +85,20 @@ def resume(
 ) -> None:
     """Finish a run that was interrupted; points that were accepted stay."""
     import rig
+    from rig.recording.reader import Recording
 
-    _carry(json, lambda progress: rig.resume(output, realtime=realtime, progress=progress))
+    with Recording(output) as recording:
+        kind = recording.kind
+    _carry(json, kind, lambda progress: rig.resume(output, realtime=realtime, progress=progress))
 
 
-def _carry(json: bool, start: Any) -> None:
+def _carry(json: bool, kind: str, start: Any) -> None:
+    from rig.campaigns.kinds import KINDS
     from rig.console import RunProgress, print_json
     from rig.summary import summarise_recording
     from rig.tables import say_how_it_ended
 
-    progress = RunProgress()
+    progress = RunProgress(KINDS[kind].columns)
     try:
         result = start(progress)
     finally:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
+    from rig.campaigns.plan import Column
     from rig.tick.tick import Tick
 
 __all__ = ["RunProgress", "number", "print_json", "print_table"]
@@ -43,40 +44,32 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         print("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
 
-POINT_LINE = (
-    "point {number:>3}/{total}  {level:>7} {level_unit}  {force:>7} N  {frequency:>8} Hz  {damping:>6} %  "
-    "{amplitude:>8} mm  phase error {phase:>6} deg  settled in {settle:>4} periods"
-)
+def _in_a_line(column: "Column", point: Mapping[str, Any]) -> str:
+    """A quantity of a point with its unit, and its name where the unit does not say it."""
+    text = f"{number(point.get(column.key), column.pattern, column.scale):>8} {column.unit}".rstrip()
+    return text if column.plain else f"{column.heading} {text}"
 
 
 class RunProgress:
     """Writes a line for each point, and on a terminal a status line below that follows the loop."""
 
-    def __init__(self) -> None:
+    def __init__(self, columns: "Sequence[Column]" = ()) -> None:
+        self._columns = columns
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._finished = 0
 
     def point(self, point: dict[str, Any], number_done: int, total: int) -> None:
         """Print the point's line."""
         self._finished = number_done
-        if point["settled"] and "force_n" in point:
-            line = POINT_LINE.format(
-                number=number_done,
-                total=total,
-                level=f"{point['level']:.4g}",
-                level_unit=point["level_unit"],
-                force=number(point["force_n"], ".4f"),
-                frequency=number(point["frequency_hz"], ".4f"),
-                damping=number(point["damping_ratio"], ".4f", 100.0),
-                amplitude=number(point["amplitude_m"], ".4f", 1e3),
-                phase=number(point["phase_error_deg"], ".2f"),
-                settle=number(point["settle_periods"], ".0f"),
-            )
+        head = f"point {number_done:>3}/{total}  {point['level']:>7.4g} {point['level_unit']}"
+        if any(column.key in point for column in self._columns):
+            shown = "  ".join(_in_a_line(column, point) for column in self._columns)
+            line = f"{head}  {shown}"
+            if "settle_periods" in point:
+                line += f"  settled in {number(point['settle_periods'], '.0f'):>4} periods"
             line += "" if point["accepted"] else f"  NOT ACCEPTED: {point['reason']}"
         else:
-            line = (
-                f"point {number_done:>3}/{total}  {point['level']:.4g} {point['level_unit']}  FAILED: {point['reason']}"
-            )
+            line = f"{head}  FAILED: {point['reason']}"
         self._print(line)
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:

@@ -103,6 +103,9 @@ class DAQ(ABC):
     by the constructor. `close` may be called at any time, any number of times, and leaves the output at 0 V; so does
     `stop`. A driver implements the methods with a leading underscore and leaves the rest alone.
 
+    ``flags`` (uint16[n]) are the device's own remarks on each sample of the last block, as bits: a driver that has any fills it
+    in `_exchange` and names the bits, lowest first, by its `counters`.
+
     Errors: `DaqRefused` for what the device or the present state cannot do, `DaqTimeout`, `DaqDisconnected`,
     `DaqOverrun` for what happens on the way.
     """
@@ -112,6 +115,7 @@ class DAQ(ABC):
         self.sample_rate_hz = sample_rate_hz
         self.output_range_v = output_range_v
         self.block = 0
+        self.flags = np.zeros(0, np.uint16)
         self.state = State.CLOSED
 
     @property
@@ -169,6 +173,7 @@ class DAQ(ABC):
         if not 1 <= block <= largest:
             raise DaqRefused(f"block = {block}: allowed is 1 to {largest} samples")
         self.block = block
+        self.flags = np.zeros(block, np.uint16)
         self._start()
         self.state = State.RUNNING
 

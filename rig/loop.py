@@ -91,7 +91,8 @@ class Loop:
         if self._fused is not None:
             self._fused.run_fused(self.tick.arrays, readings, rows)
         else:
-            tick_block(self.tick.arrays, np.empty((0, len(self.daq.channels))), readings, rows, np.empty(0))
+            nothing = np.empty((0, len(self.daq.channels)))
+            tick_block(self.tick.arrays, nothing, self.daq.flags, readings, rows, np.empty(0))
 
     def _over(self) -> bool:
         return self.failure is not None or self.tick.over
@@ -112,7 +113,7 @@ class Loop:
                 self._fail(error)
                 return first
             part = slice(first, first + block)
-            tick_block(self.tick.arrays, inputs, readings[part], rows[part], self._voltages)
+            tick_block(self.tick.arrays, inputs, self.daq.flags, readings[part], rows[part], self._voltages)
             if self._over():
                 return first + block
         return int(rows.size)

@@ -1,16 +1,23 @@
 """Recordings as measurements in memory, the form that `identification` takes."""
 
 from pathlib import Path
+from typing import Any
 
-from identification import Backbone
+import numpy as np
+
+from identification import Backbone, FrequencyResponse, IdentificationError, PeriodicSpectra, Transient
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.evaluate import backbone_of
+from rig.campaigns.backbone_points import backbone_of
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import spectra_of
+from rig.campaigns.stepped_sine_points import frequency_responses_of
+from rig.campaigns.sweep_points import transient_of
 from rig.configuration import validated
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
-__all__ = ["backbone", "load_backbone"]
+__all__ = ["backbone", "frequency_responses", "load_backbone", "point_rows", "spectra", "sweeps"]
 
 
 def backbone(recording: Recording) -> Backbone:
@@ -18,13 +25,11 @@ def backbone(recording: Recording) -> Backbone:
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
-    if recording.kind != "backbone":
-        raise RecordingError(f"the recording is a {recording.kind}, wanted is a backbone")
-    bench = validated(Bench, recording.configuration["bench"], "bench of the recording")
+    _expect(recording, "backbone")
+    bench = _bench(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
-    latest = {point["number"]: point for point in recording.points}
     return backbone_of(
-        [latest[number] for number in sorted(latest)],
+        _by_number(recording).values(),
         recording.channels,
         bench.specimen.name,
         bench.specimen.drive_mode_shape,
@@ -32,7 +37,76 @@ def backbone(recording: Recording) -> Backbone:
     )
 
 
+def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
+    """The accepted points of a stepped-sine recording: the fundamentals of force and drive, one response per level.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    """
+    _expect(recording, "stepped-sine")
+    return frequency_responses_of(_by_number(recording).values(), recording.channels, _bench(recording).specimen.name)
+
+
+def sweeps(recording: Recording) -> dict[int, Transient]:
+    """Fundamentals over time of every accepted sweep, by the number of its point; the output is channel ``voltage``.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any sweep.
+    """
+    _expect(recording, "sweep")
+    bench = _bench(recording)
+    return {number: transient_of(bench, point_rows(recording, number)) for number in _accepted(recording)}
+
+
+def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
+    """Spectra of every accepted realisation, by level (V RMS); the output is channel ``voltage``.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
+    """
+    _expect(recording, "multisine")
+    bench = _bench(recording)
+    plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
+    levels: dict[float, dict[int, np.ndarray]] = {}
+    for number, point in _accepted(recording).items():
+        levels.setdefault(point["level"], {})[point["realisation"]] = point_rows(recording, number)
+    return {level: spectra_of(bench, plan, records) for level, records in levels.items()}
+
+
+def point_rows(recording: Recording, number: int) -> np.ndarray:
+    """All recorded rows of a point: structured array, inputs in SI units (`rig.tick.layout.recorded_row`).
+
+    Raises `RecordingError` where there is no such point or nothing was recorded of it.
+    """
+    for part in reversed(recording.parts):
+        for point in part.points:
+            if point["number"] == number and "end_sample" in point:
+                return part.read(point["first_sample"], point["end_sample"])
+    raise RecordingError(
+        f"point {number}: nothing was recorded of it; points {sorted(_by_number(recording))} are known"
+    )
+
+
 def load_backbone(path: Path) -> Backbone:
     """`backbone` of a file."""
     with Recording(path) as recording:
         return backbone(recording)
+
+
+def _expect(recording: Recording, kind: str) -> None:
+    if recording.kind != kind:
+        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {kind}")
+
+
+def _bench(recording: Recording) -> Bench:
+    return validated(Bench, recording.configuration["bench"], "bench of the recording")
+
+
+def _by_number(recording: Recording) -> dict[int, dict[str, Any]]:
+    """The last result of each point."""
+    latest = {point["number"]: point for point in recording.points}
+    return {number: latest[number] for number in sorted(latest)}
+
+
+def _accepted(recording: Recording) -> dict[int, dict[str, Any]]:
+    accepted = {number: point for number, point in _by_number(recording).items() if point["accepted"]}
+    if not accepted:
+        raise IdentificationError("points: none of the recording was accepted")
+    return accepted

@@ -3,38 +3,18 @@
 from pathlib import Path
 from typing import Any
 
-from rig.campaigns.backbone import BackbonePlan
-from rig.configuration import validated
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.plans import plan_from
 from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 __all__ = ["summarise", "summarise_recording"]
 
-POINT_KEYS = (
-    "number",
-    "level",
-    "level_unit",
-    "direction",
-    "repeat",
-    "force_n",
-    "frequency_hz",
-    "damping_ratio",
-    "amplitude_m",
-    "phase_error_deg",
-    "phase_scatter_deg",
-    "frequency_scatter",
-    "force_purity",
-    "response_purity",
-    "settled",
-    "accepted",
-    "reason",
-    "periods",
-    "settle_periods",
-    "warnings",
-    "first_sample",
-    "end_sample",
-)
+BULKY = {"harmonics", "harmonics_std", "residual_rms", "drift"}
+"""What a point holds and a summary leaves in the file."""
+
+QUALITY = ("settled", "accepted", "reason", "periods", "settle_periods", "warnings", "first_sample", "end_sample")
 
 
 def summarise(path: Path) -> dict[str, Any]:
@@ -49,6 +29,7 @@ def summarise(path: Path) -> dict[str, Any]:
 def summarise_recording(recording: Recording) -> dict[str, Any]:
     """Points with their quality, statistics of the loop, how each part ended."""
     bench = recording.configuration["bench"]
+    plan = plan_from(recording.configuration["plan"], "plan of the recording")
     latest = {point["number"]: point for point in recording.points}
     parts = [
         {
@@ -67,10 +48,8 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "software_version": recording.software_version,
         "seed": recording.seed,
         "complete": recording.complete,
-        "points_planned": len(
-            validated(BackbonePlan, recording.configuration["plan"], "plan of the recording").targets()
-        ),
-        "points": [{key: latest[number].get(key) for key in POINT_KEYS} for number in sorted(latest)],
+        "points_planned": len(plan.targets()),
+        "points": [_shown(latest[number], plan.kind) for number in sorted(latest)],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {
             name: sum(end["counters"].get(name, 0) for end in ends)
@@ -78,6 +57,12 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         },
         "parts": parts,
     }
+
+
+def _shown(point: dict[str, Any], kind: str) -> dict[str, Any]:
+    """A point without what is bulky; what a failed one does not have is None."""
+    expected = dict.fromkeys([*(column.key for column in KINDS[kind].columns), *QUALITY])
+    return {**expected, **{key: value for key, value in point.items() if key not in BULKY}}
 
 
 def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, Any]:

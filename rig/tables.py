@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from rig.campaigns.kinds import KINDS
 from rig.console import number, print_table
 
 __all__ = ["print_summary", "say_how_it_ended"]
@@ -40,23 +41,23 @@ def print_summary(summary: dict[str, Any]) -> None:
         return
     loop = summary["loop"]
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
+    columns = KINDS[summary["kind"]].columns
     print_table(
-        ("level", "", "force N", "frequency Hz", "damping %", "amplitude mm", "phase error deg", "settled", "quality"),
+        ("level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality"),
         [
             (
                 f"{p['level']:.4g}",
                 p["level_unit"],
-                number(p["force_n"], ".4f"),
-                number(p["frequency_hz"], ".4f"),
-                number(p["damping_ratio"], ".4f", 100.0),
-                number(p["amplitude_m"], ".4f", 1e3),
-                number(p["phase_error_deg"], ".2f"),
-                "yes" if p["settled"] else "no",
+                *(number(p[column.key], column.pattern, column.scale) for column in columns),
+                {True: "yes", False: "no", None: "-"}[p["settled"]],
                 "ok" if p["accepted"] else p["reason"],
             )
             for p in summary["points"]
         ],
     )
+    for p in summary["points"]:
+        for warning in p["warnings"] or ():
+            print(f"warning: point {p['number']}: {warning}")
     line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
     if loop["realtime_factor"] is not None:
         factor = f"{loop['realtime_factor']:.0f} times real time"

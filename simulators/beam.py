@@ -1,48 +1,77 @@
 """Euler-Bernoulli beam by finite elements, from geometry to mass-normalised modes.
 
-Two-node elements with cubic Hermite shapes for deflection and slope and the consistent mass matrix; lumped masses may sit
-anywhere. Frequencies converge with the fourth power of the element length, deflections with the same, curvatures with
-the second (with the fourth at a clamp). Shear, rotary inertia and rotation of the lumped masses are not modelled.
+Two-node elements with cubic Hermite shapes for deflection and slope and the consistent mass matrix; lumped masses and
+springs may sit anywhere. Frequencies converge with the fourth power of the element length, deflections with the same,
+curvatures with the second (with the fourth at a clamp). Shear and rotary inertia of the section are not modelled.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-__all__ = ["BeamModes", "Boundary", "Quantity", "beam_modes"]
+__all__ = [
+    "BeamModes",
+    "Boundary",
+    "Lump",
+    "Quantity",
+    "Spring",
+    "beam_modes",
+    "bending_element",
+    "hermite",
+    "solve_modes",
+]
 
-Boundary = Literal["clamped-free", "free-free"]
+Matrix = NDArray[np.float64]
+Boundary = Literal[
+    "clamped-free", "clamped-pinned", "clamped-guided", "clamped-clamped",
+    "pinned-free", "pinned-pinned", "pinned-guided", "pinned-clamped",
+    "guided-free", "guided-pinned", "guided-guided", "guided-clamped",
+    "free-free", "free-pinned", "free-guided", "free-clamped",
+]  # fmt: skip
+"""Condition at position 0, then at the other end; a guided end moves without turning."""
 Quantity = Literal["deflection", "slope", "curvature"]
 
 _DERIVATIVE: dict[Quantity, int] = {"deflection": 0, "slope": 1, "curvature": 2}
+_HELD = {"clamped": (True, True), "pinned": (True, False), "guided": (False, True), "free": (False, False)}
+
+
+class Lump(NamedTuple):
+    """A rigid body at a position (m) of the beam: mass (kg), rotary inertia (kg m^2)."""
+
+    position_m: float
+    mass_kg: float
+    inertia_kg_m2: float = 0.0
+
+
+class Spring(NamedTuple):
+    """A spring to ground at a position (m): on the deflection (N/m), on the slope (N m/rad)."""
+
+    position_m: float
+    stiffness_n_m: float
+    rotational_stiffness_n_m_rad: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class BeamModes:
     """Modes of a beam, lowest first, normalised to unit modal mass."""
 
-    omega_rad_s: NDArray[np.float64]
+    omega_rad_s: Matrix
     """Angular natural frequencies [n_mode]; exactly zero for rigid-body modes."""
     length_m: float
     """Length; the nodes are spaced evenly along it."""
-    dofs: NDArray[np.float64]
+    dofs: Matrix
     """Deflection and slope of every node [2 (n_element + 1), n_mode]: kg^-1/2 and kg^-1/2 / m."""
 
-    def shape(self, position_m: float, quantity: Quantity = "deflection") -> NDArray[np.float64]:
+    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
         """Mode shapes [n_mode] at a position: deflection (kg^-1/2), slope (per m) or curvature (per m^2)."""
-        n_element = self.dofs.shape[0] // 2 - 1
-        size = self.length_m / n_element
-        element = min(int(position_m / size), n_element - 1)
-        local = position_m / size - element
-        shape: NDArray[np.float64] = hermite(local, size, quantity) @ self.dofs[2 * element : 2 * element + 4]
-        return shape
+        return _row(position_m, self.length_m, self.dofs.shape[0], quantity) @ self.dofs
 
 
-def hermite(s: float, size_m: float, quantity: Quantity = "deflection") -> NDArray[np.float64]:
+def hermite(s: float, size_m: float, quantity: Quantity = "deflection") -> Matrix:
     """Cubic Hermite shapes [4] of an element at ``s`` in [0, 1]: deflection and slope of its left, then its right node."""
     shapes = {
         "deflection": [1 - 3 * s**2 + 2 * s**3, size_m * s * (1 - s) ** 2, s**2 * (3 - 2 * s), size_m * s**2 * (s - 1)],
@@ -60,37 +89,43 @@ def beam_modes(
     n_element: int,
     n_mode: int,
     boundary: Boundary = "clamped-free",
-    lumped: Sequence[tuple[float, float]] = (),
+    lumps: Sequence[Lump] = (),
+    springs: Sequence[Spring] = (),
 ) -> BeamModes:
-    """Lowest modes of a uniform beam, clamped (if at all) at position 0, with ``lumped`` (position m, mass kg) on it."""
-    size = length_m / n_element
-    stiffness, mass = _assemble(n_element, size, bending_stiffness_n_m2, mass_per_length_kg_m)
-    for position_m, mass_kg in lumped:
-        element = min(int(position_m / size), n_element - 1)
-        dofs = slice(2 * element, 2 * element + 4)
-        shape = hermite(position_m / size - element, size)
-        mass[dofs, dofs] += mass_kg * np.outer(shape, shape)
-    clamped = 2 if boundary == "clamped-free" else 0
-    # Solved as M v = mu (K + shift M) v: the wanted modes are then the largest eigenvalues and lose no digits to the highest.
+    """Lowest modes of a uniform beam with bodies and springs on it."""
+    n_dof = 2 * n_element + 2
+    stiffness, mass = _assemble(n_element, length_m / n_element, bending_stiffness_n_m2, mass_per_length_kg_m)
+    for lump in lumps:
+        mass += lump.mass_kg * _square(lump.position_m, length_m, n_dof, "deflection")
+        mass += lump.inertia_kg_m2 * _square(lump.position_m, length_m, n_dof, "slope")
+    for spring in springs:
+        stiffness += spring.stiffness_n_m * _square(spring.position_m, length_m, n_dof, "deflection")
+        stiffness += spring.rotational_stiffness_n_m_rad * _square(spring.position_m, length_m, n_dof, "slope")
+    left, right = boundary.split("-")
+    free = ~np.array([*_HELD[left], *[False] * (n_dof - 4), *_HELD[right]])
     typical = bending_stiffness_n_m2 / (mass_per_length_kg_m * length_m**4)
-    shift = 0.0 if clamped else typical
-    n_dof = mass.shape[0]
-    mu, vectors = eigh(
-        mass[clamped:, clamped:],
-        (stiffness + shift * mass)[clamped:, clamped:],
-        subset_by_index=[n_dof - clamped - n_mode, n_dof - clamped - 1],
-    )
-    omega_squared = 1.0 / mu[::-1] - shift
-    omega_squared[omega_squared < 1e-6 * typical] = 0.0
-    dofs_of_modes = np.zeros((n_dof, n_mode))
-    dofs_of_modes[clamped:] = vectors[:, ::-1] / np.sqrt(mu[::-1])
-    return BeamModes(np.sqrt(omega_squared), length_m, dofs_of_modes)
+    squared, vectors = solve_modes(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], n_mode, typical)
+    squared[: _n_rigid(length_m, left, right, springs)] = 0.0
+    dofs = np.zeros((n_dof, n_mode))
+    dofs[free] = vectors
+    return BeamModes(np.sqrt(squared), length_m, dofs)
 
 
-def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Stiffness and consistent mass matrix of ``n`` equal elements, both [2 (n + 1), 2 (n + 1)]."""
-    h = size
-    element_stiffness = (ei / h**3) * np.array(
+def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> tuple[Matrix, Matrix]:
+    """Lowest ``omega^2`` [n_mode] (not negative) and mass-normalised vectors [n, n_mode] of ``K v = omega^2 M v``.
+
+    Solved as ``M v = mu (K + shift M) v``: the wanted modes are then the largest eigenvalues and lose no digits to the
+    highest, and a stiffness without ground does no harm. ``shift`` (rad/s)^2 is about that of the lowest mode.
+    """
+    n = mass.shape[0]
+    mu, vectors = eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
+    return np.maximum(1.0 / mu[::-1] - shift, 0.0), vectors[:, ::-1] / np.sqrt(mu[::-1])
+
+
+def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[Matrix, Matrix]:
+    """Stiffness and consistent mass matrix [4, 4] of one element over deflection and slope of its two nodes."""
+    h = size_m
+    stiffness = (ei_n_m2 / h**3) * np.array(
         [
             [12, 6 * h, -12, 6 * h],
             [6 * h, 4 * h**2, -6 * h, 2 * h**2],
@@ -98,7 +133,7 @@ def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[NDArray[np.
             [6 * h, 2 * h**2, -6 * h, 4 * h**2],
         ]
     )
-    element_mass = (rho_a * h / 420) * np.array(
+    mass = (rho_a_kg_m * h / 420) * np.array(
         [
             [156, 22 * h, 54, -13 * h],
             [22 * h, 4 * h**2, 13 * h, -3 * h**2],
@@ -106,9 +141,40 @@ def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[NDArray[np.
             [-13 * h, -3 * h**2, -22 * h, 4 * h**2],
         ]
     )
+    return stiffness, mass
+
+
+def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[Matrix, Matrix]:
+    """Stiffness and mass of ``n`` equal elements, both [2 (n + 1), 2 (n + 1)]."""
+    element_stiffness, element_mass = bending_element(size, ei, rho_a)
     stiffness, mass = np.zeros((2, 2 * n + 2, 2 * n + 2))
     for element in range(n):
         dofs = slice(2 * element, 2 * element + 4)
         stiffness[dofs, dofs] += element_stiffness
         mass[dofs, dofs] += element_mass
     return stiffness, mass
+
+
+def _row(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> Matrix:
+    """The row [n_dof] that reads a quantity at a position off the nodes."""
+    n_element = n_dof // 2 - 1
+    size = length_m / n_element
+    element = min(int(position_m / size), n_element - 1)
+    row = np.zeros(n_dof)
+    row[2 * element : 2 * element + 4] = hermite(position_m / size - element, size, quantity)
+    return row
+
+
+def _square(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> Matrix:
+    row = _row(position_m, length_m, n_dof, quantity)
+    return np.outer(row, row)
+
+
+def _n_rigid(length_m: float, left: str, right: str, springs: Sequence[Spring]) -> int:
+    """Number of rigid motions ``a + b x/L`` that neither the ends nor the springs resist."""
+    held = [(*_HELD[left], 0.0), (*_HELD[right], 1.0)]
+    resisted = [np.array([1.0, at]) for deflection, _, at in held if deflection]
+    resisted += [np.array([0.0, 1.0]) for _, slope, _ in held if slope]
+    resisted += [np.array([1.0, spring.position_m / length_m]) for spring in springs if spring.stiffness_n_m]
+    resisted += [np.array([0.0, 1.0]) for spring in springs if spring.rotational_stiffness_n_m_rad]
+    return 2 - int(np.linalg.matrix_rank(np.array(resisted))) if resisted else 2

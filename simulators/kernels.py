@@ -1,7 +1,9 @@
 """Compiled virtual rig: one sample of exciter, structure, sensors and converters, and runs of many.
 
 Within instant i the sensors are read first, then the state is advanced to instant i + 1 with the voltage held. A
-voltage therefore shows in the readings of the next instant: the one sample of latency that any hold has.
+voltage therefore shows in the readings of the next instant: the one sample of latency that any hold has. Where the
+converter is oversampled, the way from i to i + 1 goes over internal instants: the output passes its reconstruction
+filter, the sensors pass theirs, and only the last of these instants is converted. That is the decimation.
 """
 
 import math
@@ -9,30 +11,65 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.layout import DAC_CLIPPED, DIVERGED, RigArrays, RigState
+from simulators.layout import DIVERGED, RigArrays, RigState
 from simulators.plant.kernels import advance, combine
-from simulators.sensing.kernels import measure, quantise
-from vibrolock.compiled import kernel
+from simulators.sensing.kernels import anti_alias, condition, convert, delay, filter_channels, hold, sense
+from vibrolock.compiled import inner_kernel, kernel
 
 
-@kernel
+@inner_kernel
 def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.float64]) -> int:
     """Read every channel into ``out_v`` [n_channel] (V), then hold ``voltage`` (V) until the next instant.
 
     Returns the `simulators.layout.Flag` bits of this sample. A voltage beyond the converter is clipped, NaN becomes
     0 V; both are flagged. A state that is no longer finite is held, and reads NaN on every channel.
     """
-    combine(rig.sense, state.inputs, state.outputs)
     index = state.counter[0]
     state.counter[0] = index + 1
-    flags = measure(rig.channels, rig.converter, rig.noise_keys, state.filters, state.outputs, index, out_v)
-    if flags & DIVERGED:
-        return flags
-    converter = rig.converter[0]
-    if not abs(voltage) <= converter.dac_range_v:
-        flags |= DAC_CLIPPED
-    held_v = 0.0 if math.isnan(voltage) else quantise(voltage, converter.dac_step_v, converter.dac_range_v)
-    return flags | advance(rig, state, held_v)
+    converter, values = rig.converter[0], state.outputs
+    oversampling = converter.oversampling
+    if not sense(rig.sense, state.inputs, values):
+        for c in range(out_v.size):
+            out_v[c] = math.nan
+        return DIVERGED
+    flags = read(rig, state, index * oversampling)
+    if state.history.shape[0] > 0:
+        delay(rig.channels, rig.taps, state.history, index * oversampling, values)
+    flags |= convert(rig.channels, converter, rig.noise_keys, index, values, out_v)
+    held_v, clipped = hold(converter, rig.noise_keys[0], voltage, index)
+    flags |= clipped
+    if oversampling == 1:
+        return flags | advance(rig, state, held_v)
+    return flags | advance_internally(rig, state, index * oversampling, held_v)
+
+
+@inner_kernel
+def read(rig: RigArrays, state: RigState, instant: int) -> int:
+    """From sensed values to conditioned and filtered volts, kept for skewed channels; returns SENSOR_CLIPPED or 0."""
+    flags = 0
+    condition(rig.channels, state.filters, state.outputs)
+    if rig.sections.shape[0] > 0:
+        flags = anti_alias(rig.channels, rig.sections, state.memory, state.outputs)
+    n_ring = state.history.shape[0]
+    if n_ring > 0:
+        for c in range(rig.channels.size):
+            state.history[instant & (n_ring - 1), c] = state.outputs[c]
+    return flags
+
+
+@kernel
+def advance_internally(rig: RigArrays, state: RigState, instant: int, held_v: float) -> int:
+    """Advance by one sample over its internal instants, with filters on either side of the plant; returns flags."""
+    flags = 0
+    filtered_v = state.output_v
+    for m in range(rig.converter[0].oversampling):
+        if m > 0:
+            sense(rig.sense, state.inputs, state.outputs)
+            flags |= read(rig, state, instant + m)
+        filtered_v[0] = held_v
+        filter_channels(rig.reconstruction, state.output_memory, filtered_v)
+        flags |= advance(rig, state, filtered_v[0])
+    return flags
 
 
 @kernel

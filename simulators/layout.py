@@ -73,15 +73,27 @@ CHANNEL = np.dtype(
         ("hold", "f8"),
         ("old", "f8"),
         ("new", "f8"),
-        ("noise_rms", "f8"),
+        ("noise_v", "f8"),
         ("sensitivity", "f8"),
         ("range_v", "f8"),
+        ("delay", "i8"),
     ]
 )
-"""A sensor: low-pass coefficients of its high-pass, noise (RMS, SI), V per SI unit, own range (V)."""
+"""A sensor: low-pass coefficients of its high-pass, noise of sensor and converter together (RMS, V), V per SI unit, own
+range (V), and how many internal instants back its first tap lies."""
 
-CONVERTER = np.dtype([("adc_step_v", "f8"), ("adc_range_v", "f8"), ("dac_step_v", "f8"), ("dac_range_v", "f8")])
-"""Steps and ranges (one record). A step of zero means no quantisation."""
+CONVERTER = np.dtype(
+    [
+        ("oversampling", "i8"),
+        ("adc_step_v", "f8"),
+        ("adc_codes_per_v", "f8"),
+        ("adc_range_v", "f8"),
+        ("dac_step_v", "f8"),
+        ("dac_range_v", "f8"),
+        ("dac_noise_v", "f8"),
+    ]
+)
+"""Internal instants per sample, steps and ranges, noise of the output (one record). A step of zero means no quantisation."""
 
 
 class RigArrays(NamedTuple):
@@ -91,8 +103,12 @@ class RigArrays(NamedTuple):
     rows are ``[joint coordinates, local coordinates, x]``. ``correct`` [n_site, n_row]: what a change of each site
     force over the sub-step adds. ``elements`` [2, n_element, n_joint]: stiffness and slip force of every Jenkins element;
     ``stuck`` [n_joint]: sum of the stiffnesses of a joint. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
-    vector. ``noise_keys`` [n_pair]: one key per pair of channels. Inputs, rows, joints and the columns of ``sense`` are
-    padded with zeros to whole vectors of the compiled loops.
+    vector. Inputs, rows, joints and the columns of ``sense`` are padded with zeros to whole vectors of the compiled loops.
+
+    ``noise_keys`` [1 + n_channel]: of the output, then of each channel. ``sections`` [n_section, 5, n_channel] and
+    ``reconstruction`` [n_section, 5, 1]: filters of sensors and output as second-order sections, b_0 b_1 b_2 a_1 a_2, at
+    the internal rate; n_section is 0 without filters. ``taps`` [n_channel, n_tap]: weights that interpolate a skewed
+    channel.
     """
 
     plant: NDArray[Any]
@@ -105,6 +121,9 @@ class RigArrays(NamedTuple):
     channels: NDArray[Any]
     converter: NDArray[Any]
     noise_keys: NDArray[np.uint64]
+    sections: NDArray[np.float64]
+    reconstruction: NDArray[np.float64]
+    taps: NDArray[np.float64]
 
 
 class RigState(NamedTuple):
@@ -113,7 +132,9 @@ class RigState(NamedTuple):
     ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_joint]`` at the present instant. ``deflection``
     [n_joint] and ``friction`` [n_element, n_joint]: committed state of the Jenkins elements. ``filters``
     [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
-    which its noise is drawn. The others carry nothing from one sample to the next.
+    which its noise is drawn. ``memory`` [n_section, 2, n_channel] and ``output_memory`` [n_section, 2, 1]: of the filters.
+    ``history`` [n_ring, n_channel]: ring of conditioned volts at internal instants, its length a power of two, or 0 where
+    no channel is skewed. The others carry nothing from one sample to the next.
     """
 
     inputs: NDArray[np.float64]
@@ -121,6 +142,10 @@ class RigState(NamedTuple):
     friction: NDArray[np.float64]
     filters: NDArray[np.float64]
     counter: NDArray[np.int64]
+    memory: NDArray[np.float64]
+    output_memory: NDArray[np.float64]
+    history: NDArray[np.float64]
+    output_v: NDArray[np.float64]
     rows: NDArray[np.float64]
     forces: NDArray[np.float64]
     joints: NDArray[np.float64]

@@ -23,9 +23,13 @@ class LinearModes:
     vectors: NDArray[np.float64]
     """Modes as columns over the structure's modal coordinates [n_mode, n_mode]; empty for the coupled rig."""
 
+    def at(self, shape: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mass-normalised deflection [n_mode] (kg^-1/2) of a point, from ``VirtualRig.shape`` there; structure only."""
+        return shape @ self.vectors
+
 
 def structure_modes(plant: LinearPlant) -> LinearModes:
-    """Undamped modes of the structure with linear magnet stiffness, joints stuck; damping from the diagonal of its matrix."""
+    """Undamped modes of the structure, elements linear and joints stuck; damping from the diagonal of its matrix."""
     squared, vectors = np.linalg.eigh(plant.modal_stiffness)
     omega = np.sqrt(np.maximum(squared, 0.0))
     drive = plant.drive_shape @ vectors

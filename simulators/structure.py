@@ -1,4 +1,4 @@
-"""The vibrating structure: a beam from its geometry, or modes that are given."""
+"""The vibrating structure: a beam or a jointed beam from its geometry, or modes that are given."""
 
 from functools import cached_property
 from typing import Annotated, Literal
@@ -8,70 +8,30 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simulators.beam import BeamModes, Boundary, Quantity, beam_modes
+from simulators.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
+from simulators.lap_mesh import LapMesh
+from simulators.meshed import MeshedBeam
 from simulators.part import Part, Positive, Several
 
-__all__ = ["BeamStructure", "LumpedMass", "ModalStructure", "Structure"]
+__all__ = ["BeamStructure", "LapJointedBeam", "ModalStructure", "Structure"]
 
-DampingRatio = Annotated[float, Field(ge=0.0, lt=1.0)]
-
-
-class LumpedMass(Part):
-    """A point mass on a beam: a sensor, a magnet."""
-
-    at: str
-    """Name of the point it sits on."""
-    mass_kg: Annotated[float, Field(ge=0.0)]
-    """Mass."""
+Matrix = NDArray[np.float64]
+NotNegative = Annotated[float, Field(ge=0.0)]
 
 
-class BeamStructure(Part):
-    """A uniform Euler-Bernoulli beam with lumped masses; its modes come from finite elements (`simulators.beam`)."""
+class BeamStructure(MeshedBeam):
+    """A uniform Euler-Bernoulli beam with lumped masses and supports; its modes come from finite elements."""
 
     kind: Literal["beam"]
     """This kind of structure."""
-    length_m: Positive
-    """Length; positions count from 0, the clamped end where there is one."""
-    width_m: Positive
-    """Width of the rectangular section."""
-    thickness_m: Positive
-    """Thickness of the section, in the direction of vibration."""
-    youngs_modulus_pa: Positive
-    """Young's modulus."""
-    density_kg_m3: Positive
-    """Density."""
     boundary: Boundary = "clamped-free"
-    """Clamped at 0 and free at the other end, or free at both."""
+    """Condition at position 0 and at the other end: clamped, pinned, guided or free."""
     n_element: Annotated[int, Field(ge=4, le=400)] = 40
     """Number of equal finite elements."""
-    damping_ratio: Annotated[Several[DampingRatio], Field(min_length=1)]
-    """Viscous modal damping ratios, lowest mode first; their number is the number of modes kept."""
-    points_m: dict[str, float]
-    """Named positions along the beam, which sensors, magnets, joints and the stinger refer to."""
-    lumped_masses: Several[LumpedMass] = ()
-    """Masses on the beam, part of its modes."""
-
-    @model_validator(mode="after")
-    def _fits(self) -> "BeamStructure":
-        for name, position_m in self.points_m.items():
-            if not 0.0 <= position_m <= self.length_m:
-                raise ValueError(f"points_m.{name} = {position_m!r}: allowed is 0 to length_m = {self.length_m!r}")
-        for index, lumped in enumerate(self.lumped_masses):
-            if lumped.at not in self.points_m:
-                raise ValueError(f"lumped_masses[{index}].at = {lumped.at!r}: allowed is one of {_list(self.points)}")
-        if len(self.damping_ratio) > 2 * self.n_element:
-            raise ValueError(
-                f"damping_ratio: has {len(self.damping_ratio)} modes, allowed is 1 to {2 * self.n_element}"
-            )
-        return self
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Names that a shape may be asked for at."""
-        return tuple(self.points_m)
 
     @cached_property
     def modes(self) -> BeamModes:
-        """Mass-normalised modes of the beam with its lumped masses."""
+        """Mass-normalised modes of the beam with its lumped masses and supports."""
         area_m2 = self.width_m * self.thickness_m
         return beam_modes(
             length_m=self.length_m,
@@ -80,17 +40,90 @@ class BeamStructure(Part):
             n_element=self.n_element,
             n_mode=len(self.damping_ratio),
             boundary=self.boundary,
-            lumped=[(self.points_m[mass.at], mass.mass_kg) for mass in self.lumped_masses],
+            lumps=self.lumps,
+            springs=self.springs,
+        )
+
+    def _most_modes(self) -> int:
+        held = {"clamped": 2, "pinned": 1, "guided": 1, "free": 0}
+        left, right = self.boundary.split("-")
+        return 2 * self.n_element + 2 - held[left] - held[right]
+
+
+class LapJointedBeam(MeshedBeam):
+    """Two beams joined by a bolted lap, hung on its supports (the Brake-Reuss beam); modes by finite elements.
+
+    `simulators.lap_joint` has the model. Modes are those of the stuck joint; friction sites take their stiffness from it.
+    """
+
+    kind: Literal["lap-jointed-beam"]
+    """This kind of structure."""
+    lap_length_m: Positive
+    """Length of the lap, in the middle of the beam."""
+    tangential_stiffness_n_m: NotNegative
+    """Stiffness of the interface against sliding, all of it."""
+    normal_stiffness_n_m: NotNegative
+    """Stiffness of the interface against opening, all of it."""
+    bolts_m: Annotated[Several[float], Field(min_length=1)]
+    """Positions of the bolts along the beam, around which the stiffness is gathered."""
+    bolt_width_m: Positive
+    """Standard deviation of the bell of stiffness around each bolt."""
+    stiffness_floor: NotNegative = 0.0
+    """Stiffness density far from the bolts, as a fraction of that at a bolt."""
+    n_arm_element: Annotated[int, Field(ge=2, le=200)] = 10
+    """Finite elements in each arm."""
+    n_lap_element: Annotated[int, Field(ge=2, le=200)] = 24
+    """Finite elements in each leg."""
+    sites_m: dict[str, float] = Field(default_factory=dict)
+    """Named positions in the lap; their shape is the relative tangential displacement of the legs, a joint's coordinate."""
+
+    @model_validator(mode="after")
+    def _lap_fits(self) -> "LapJointedBeam":
+        if not self.lap_length_m < self.length_m:
+            raise ValueError(f"lap_length_m = {self.lap_length_m!r}: allowed is less than length_m = {self.length_m!r}")
+        first, last = (self.length_m - self.lap_length_m) / 2.0, (self.length_m + self.lap_length_m) / 2.0
+        named = {f"sites_m.{name}": position_m for name, position_m in self.sites_m.items()}
+        named |= {f"bolts_m[{index}]": position_m for index, position_m in enumerate(self.bolts_m)}
+        for path, position_m in named.items():
+            if not first <= position_m <= last:
+                raise ValueError(f"{path} = {position_m!r}: allowed is the lap, {first:.6g} to {last:.6g}")
+        if twice := sorted(set(self.sites_m) & set(self.points_m)):
+            raise ValueError(f"sites_m.{twice[0]}: is also in points_m, allowed is a name of its own")
+        return self
+
+    @cached_property
+    def modes(self) -> LapJointModes:
+        """Mass-normalised modes of the beam with its joint stuck."""
+        return lap_joint_modes(
+            LapMesh(self.length_m, self.lap_length_m, self.thickness_m, self.n_arm_element, self.n_lap_element),
+            Section(self.youngs_modulus_pa, self.density_kg_m3, self.width_m, self.thickness_m),
+            Interface(
+                self.tangential_stiffness_n_m,
+                self.normal_stiffness_n_m,
+                self.bolts_m,
+                self.bolt_width_m,
+                self.stiffness_floor,
+            ),
+            n_mode=len(self.damping_ratio),
+            lumps=self.lumps,
+            springs=self.springs,
         )
 
     @property
-    def omega_rad_s(self) -> NDArray[np.float64]:
-        """Angular natural frequencies [n_mode]."""
-        return self.modes.omega_rad_s
+    def points(self) -> tuple[str, ...]:
+        """Names that a shape may be asked for at: points and friction sites."""
+        return (*self.points_m, *self.sites_m)
 
-    def shape(self, at: str, quantity: Quantity = "deflection") -> NDArray[np.float64]:
-        """Mode shapes [n_mode] at a named point."""
-        return self.modes.shape(self.points_m[at], quantity)
+    def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
+        """Mode shapes [n_mode] at a named point, or the relative tangential displacement at a named friction site."""
+        if at in self.points_m:
+            return self.modes.shape(self.points_m[at], quantity)
+        if quantity != "deflection":
+            raise ValueError(f"quantity = {quantity!r}: allowed is 'deflection' at the friction site {at!r}")
+        return self.modes.slip(self.sites_m[at])
+
+    def _most_modes(self) -> int:
+        return 4 * self.n_arm_element
 
 
 class ModalStructure(Part):
@@ -98,9 +131,9 @@ class ModalStructure(Part):
 
     kind: Literal["modal"]
     """This kind of structure."""
-    frequency_hz: Annotated[Several[Annotated[float, Field(ge=0.0)]], Field(min_length=1)]
+    frequency_hz: Annotated[Several[NotNegative], Field(min_length=1)]
     """Natural frequencies, lowest first, without magnets and with all joints stuck."""
-    damping_ratio: Several[DampingRatio]
+    damping_ratio: Several[Annotated[float, Field(ge=0.0, lt=1.0)]]
     """Viscous modal damping ratios, one per mode."""
     shapes: dict[str, Several[float]]
     """Mass-normalised mode shapes (kg^-1/2) at named points, or of named relative displacements; one value per mode."""
@@ -120,20 +153,16 @@ class ModalStructure(Part):
         return tuple(self.shapes)
 
     @property
-    def omega_rad_s(self) -> NDArray[np.float64]:
+    def omega_rad_s(self) -> Matrix:
         """Angular natural frequencies [n_mode]."""
         return 2.0 * np.pi * np.array(self.frequency_hz)
 
-    def shape(self, at: str, quantity: Quantity = "deflection") -> NDArray[np.float64]:
+    def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
         """The shape [n_mode] given under a name; slopes and curvatures are given as shapes of their own."""
         if quantity != "deflection":
             raise ValueError(f"quantity = {quantity!r}: allowed is 'deflection' where the modes are given")
         return np.array(self.shapes[at])
 
 
-Structure = Annotated[BeamStructure | ModalStructure, Field(discriminator="kind")]
-"""Either kind of structure."""
-
-
-def _list(names: tuple[str, ...]) -> str:
-    return ", ".join(names) or "(no points are named)"
+Structure = Annotated[BeamStructure | LapJointedBeam | ModalStructure, Field(discriminator="kind")]
+"""Any kind of structure."""

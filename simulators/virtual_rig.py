@@ -7,14 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from simulators.elements import Element
+from simulators.elements import Element, Magnet
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
 from simulators.plant.assembly import LinearPlant, assemble
 from simulators.plant.compilation import at_rest, rig_arrays
+from simulators.scatter import Deviation, Scatter, deviated
+from simulators.sensing.filters import channel_delays, filter_delay
 from simulators.sensing.parts import Converter, Sensor
 from simulators.shipped import merged, specimen_table
 from simulators.structure import ModalStructure, Structure
@@ -38,7 +40,7 @@ class VirtualRig(Part):
     """The vibrating structure."""
     elements: Several[Element] = ()
     """Local nonlinear elements without memory: magnets, springs, stops, functions of the user's own."""
-    friction: Several[JenkinsSite] = ()
+    friction: Several[FrictionSite] = ()
     """Friction joints."""
     exciter: Exciter
     """The shaker and its amplifier."""
@@ -48,10 +50,14 @@ class VirtualRig(Part):
     """One channel per sensor, in this order."""
     converter: Converter = Converter()
     """Sampling and converters."""
+    deviation: Deviation = Deviation()
+    """By how much the modes of this specimen deviate from those of its structure."""
+    scatter: Scatter = Scatter()
+    """How specimens differ from run to run and from assembly to assembly; nothing scatters by default."""
     noise_scale: Annotated[float, Field(ge=0.0)] = 1.0
     """Multiplies the noise of every sensor; 0 for none, 10 for a bad day."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of the noise."""
+    """Seed of noise and scatter."""
 
     @classmethod
     def shipped(cls, specimen: str, **changes: Any) -> "VirtualRig":
@@ -74,6 +80,7 @@ class VirtualRig(Part):
         if not np.any(self.structure.shape(self.stinger.at)):
             raise ValueError(f"stinger.at = {self.stinger.at!r}: allowed is a point that moves")
         self._check_joints()
+        self._check_low_passes()
         return self
 
     def _check_points(self) -> None:
@@ -105,8 +112,17 @@ class VirtualRig(Part):
             total = sum(joint.stuck_stiffness for joint in self.friction)
             raise ValueError(f"friction: stiffness {total:.6g} in all, allowed is less than the structure has there")
 
+    def _check_low_passes(self) -> None:
+        half_hz = 0.5 * self.converter.internal_rate_hz
+        for i, sensor in enumerate(self.sensors):
+            if sensor.low_pass_hz >= half_hz:
+                message = f"allowed is below {half_hz:g}, half the internal rate"
+                raise ValueError(f"sensors[{i}].low_pass_hz = {sensor.low_pass_hz:g}: {message}")
+
     def build(self, seed: int | None = None) -> tuple[RigArrays, RigState]:
-        """Arrays for the kernels, and a state at rest; ``seed`` of the noise in place of the rig's own."""
+        """Arrays for the kernels, and a state at rest; ``seed`` of noise and scatter in place of the rig's own."""
+        if self.scatters:
+            return self.realised(seed).build(seed)
         rig = rig_arrays(
             self.plant,
             self.elements,
@@ -119,6 +135,23 @@ class VirtualRig(Part):
             seed=self.seed if seed is None else seed,
         )
         return rig, at_rest(rig)
+
+    @property
+    def scatters(self) -> bool:
+        """Whether a run gets anything else than the nominal specimen."""
+        return self.scatter.run_scatters or self.scatter.assembly_scatters
+
+    def realised(self, seed: int | None = None) -> "VirtualRig":
+        """The specimen that a run with this seed gets, of the assembly that ``scatter`` names; nothing in it scatters."""
+        frequency, damping = self.scatter.modal_factors(self.seed if seed is None else seed, self.plant.n_mode)
+        changes: dict[str, Any] = {"scatter": Scatter()}
+        if self.scatter.run_scatters:
+            changes["deviation"] = self.deviation.combined(frequency, damping)
+        if self.scatter.assembly_scatters:
+            magnets = iter(self.scatter.magnets([part for part in self.elements if isinstance(part, Magnet)]))
+            changes["elements"] = [next(magnets) if isinstance(part, Magnet) else part for part in self.elements]
+            changes["friction"] = self.scatter.joints(self.friction)
+        return VirtualRig.model_validate({name: getattr(self, name) for name in VirtualRig.model_fields} | changes)
 
     def output_row(self, sensor: Sensor) -> NDArray[np.float64]:
         """What a sensor senses (SI), as a row over the input vector ``[x, u, f]``."""
@@ -140,10 +173,21 @@ class VirtualRig(Part):
         """Volts per newton or per m/s^2 of each channel [n_channel]."""
         return np.array([sensor.sensitivity_v_per_unit for sensor in self.sensors])
 
+    @property
+    def filter_delay_samples(self) -> float:
+        """Delay of every channel by the filters of the converter, in samples at low frequency; the hold not included."""
+        return filter_delay(self.converter)
+
+    @property
+    def channel_delays_samples(self) -> NDArray[np.float64]:
+        """Delay of each channel by its own low-pass and skew [n_channel], in samples at low frequency."""
+        return channel_delays(self.sensors, self.converter)
+
     @cached_property
     def plant(self) -> LinearPlant:
         """Linear part of the coupled plant."""
-        return assemble(self.structure, self.elements, self.friction, self.exciter, self.stinger)
+        nominal = assemble(self.structure, self.elements, self.friction, self.exciter, self.stinger)
+        return deviated(nominal, self.structure.omega_rad_s, self.deviation)
 
     @cached_property
     def linear_modes(self) -> LinearModes:

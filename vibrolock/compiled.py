@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numba
 
-__all__ = ["Record", "kernel", "kernel_cache_folder"]
+__all__ = ["Record", "inner_kernel", "kernel", "kernel_cache_folder"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -90,4 +90,13 @@ inside them, which otherwise cost a third of the time of a sample."""
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a kernel with numba, cached on disk."""
     compiled: Callable[P, R] = numba.njit(**OPTIONS)(function)
+    return compiled
+
+
+def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a kernel that becomes part of each kernel that calls it.
+
+    For what runs every sample and takes bundles of arrays: handing over a rig and its state costs as much as the sensors do.
+    """
+    compiled: Callable[P, R] = numba.njit(forceinline=True, **OPTIONS)(function)
     return compiled

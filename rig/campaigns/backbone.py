@@ -5,27 +5,16 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from controller import AmplitudeLaw, PhaseLockedLoop
-from rig.configuration import Configured
+from rig.bench import Bench
+from rig.campaigns.plan import Plan, Target
+from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
 from rig.sequencer.segments import Segment, SettleRule
 
-__all__ = ["BackbonePlan", "Target"]
+__all__ = ["BackbonePlan"]
 
 
-class Target(Configured):
-    """One point of a plan: where it is and from where it is approached."""
-
-    number: int
-    """From 0, in the order of measurement."""
-    level: float
-    """Level in V or N, after the plan's amplitude law."""
-    direction: Literal["up", "down"]
-    """Whether the level before was lower or higher; matters where the specimen remembers."""
-    repeat: int
-    """Number of the pass through the levels, from 1."""
-
-
-class BackbonePlan(Configured):
+class BackbonePlan(Plan):
     """Phase-resonant vibrations at a series of levels.
 
     The levels are either amplitudes of the output voltage (``levels_v``, the paper's way) or of the fundamental force
@@ -35,10 +24,6 @@ class BackbonePlan(Configured):
 
     kind: Literal["backbone"] = "backbone"
     """Kind of campaign."""
-    description: str = ""
-    """What the plan is for."""
-    bench: str = Field(min_length=1)
-    """Name of a shipped bench or a TOML file."""
     controller: PhaseLockedLoop
     """The phase-locked loop; the force loop where levels are in newtons."""
     levels_v: tuple[float, ...] | None = None
@@ -100,6 +85,16 @@ class BackbonePlan(Configured):
         """``V`` or ``N``."""
         return "V" if self.amplitude_law is AmplitudeLaw.VOLTAGE else "N"
 
+    @property
+    def law(self) -> PhaseLockedLoop:
+        """The phase-locked loop."""
+        return self.controller
+
+    @property
+    def settle_rule(self) -> SettleRule:
+        """When a point counts as settled."""
+        return self.settle
+
     def targets(self) -> tuple[Target, ...]:
         """All points in the order of measurement."""
         rising = sorted(self.levels)
@@ -118,7 +113,7 @@ class BackbonePlan(Configured):
             )
         )
 
-    def segments(self, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done`` already.
 
         A point whose predecessor is done is approached from its predecessor's level, so that it is reached from the
@@ -141,6 +136,32 @@ class BackbonePlan(Configured):
             out.append(Segment(SegmentKind.RECORD, number, level, self.record_periods + 1.0, failure, lost))
             at = level
         return tuple(out)
+
+    def check(self, bench: Bench) -> None:
+        """Refuse, before anything moves, what the bench cannot do."""
+        name, unit = ("levels_v", "V") if self.levels_v is not None else ("levels_n", "N")
+        largest = bench.limits.voltage_v if self.levels_v is not None else bench.limits.force_n
+        for index, level in enumerate(self.levels):
+            if level > largest:
+                raise ConfigurationError(
+                    f"{name}[{index}] = {level:g} {unit}: the bench {bench.name} allows up to {largest:g} {unit}"
+                )
+        window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
+        linear = bench.specimen.linear_frequency_hz
+        if not window[0] < linear < window[1]:
+            raise ConfigurationError(
+                f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
+                f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
+            )
+        highest = int(bench.sample_rate_hz / window[1] / 2.0) - 2
+        if self.harmonics > highest:
+            raise ConfigurationError(
+                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s"
+            )
+        if window[0] < allowed[0] or window[1] > allowed[1]:
+            raise ConfigurationError(
+                f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"
+            )
 
     @property
     def _hold_periods(self) -> float:

@@ -13,8 +13,9 @@ import numpy as np
 
 from controller import LockState
 from rig.bench import Bench
-from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.evaluate import failed_point, measured_point
+from rig.campaigns.evaluate import failed_point
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.plan import Plan
 from rig.daq import DAQ
 from rig.errors import RecordingError
 from rig.loop import Loop
@@ -22,10 +23,12 @@ from rig.recording.journal import JournalWriter
 from rig.safety.layout import EndReason, GuardMode
 from rig.safety.limits import describe_end
 from rig.sequencer.layout import Outcome, SegmentKind
+from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.tick import Tick
 
 __all__ = ["Execution", "Progress", "Silent"]
 
+EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP}
 OVER = {Outcome.DONE, Outcome.NOT_SETTLED, Outcome.DISTURBED, Outcome.LOST_LOCK, Outcome.UNREACHABLE}
 
 
@@ -60,7 +63,7 @@ class Execution:
 
     def __init__(
         self,
-        plan: BackbonePlan,
+        plan: Plan,
         bench: Bench,
         daq: DAQ,
         tick: Tick,
@@ -72,6 +75,7 @@ class Execution:
         self.plan, self.bench, self.daq, self.tick = plan, bench, daq, tick
         self.journal, self.progress = journal, progress
         self.loop = Loop(daq, tick, paced=realtime)
+        self.measure = KINDS[plan.kind].measure
         self.targets = plan.targets()
         self.finished = len(done)
         self.accepted = len(done)
@@ -83,7 +87,8 @@ class Execution:
 
     def go(self, first_sample: int) -> None:
         """Run to the end of the plan or of what can be done of it; raises only what could not be recorded."""
-        self._write(self.journal.part, {"first_sample": first_sample, "points_done": self.finished})
+        information = {"first_sample": first_sample, "points_done": self.finished, "device_flags": [*self.daq.counters]}
+        self._write(self.journal.part, information)
         for remark in self.daq.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
@@ -146,20 +151,26 @@ class Execution:
             if number >= 0 and code is not Outcome.SKIPPED:
                 if code is not Outcome.DONE:
                     self._report(failed_point(self.plan, self.targets[number], entry))
-                elif kind == SegmentKind.RECORD:
+                elif kind in EVALUATED:
                     first, end = int(entry["first_sample"]), int(entry["end_sample"])
                     settling = outcomes[self.next_segment - 1]
-                    point = measured_point(
-                        self.bench, self.plan, self.targets[number], self._rows(first, end), settling
-                    )
+                    rows = self._rows(first, end)
+                    point = self.measure(self.bench, self.plan, self.targets[number], rows, settling)
+                    point["warnings"] = [*point.get("warnings", []), *self._device_warnings(rows)]
                     self._report({**point, "first_sample": first, "end_sample": end})
             self.next_segment += 1
         self._drop_rows_before(self._first_needed())
 
+    def _device_warnings(self, rows: np.ndarray) -> list[str]:
+        """A line for each flag that the device had up while the point was recorded."""
+        flags = rows["flags"] >> DEVICE_SHIFT
+        counted = ((name, int(np.count_nonzero(flags & (1 << bit)))) for bit, name in enumerate(self.daq.counters))
+        return [f"{name.replace('_', ' ')} in {count} of {rows.size} samples" for name, count in counted if count]
+
     def _first_needed(self) -> int:
         if self.next_segment < self.tick.outcomes.size:
             entry = self.tick.outcomes[self.next_segment]
-            records = int(self.tick.arrays.segments[self.next_segment]["kind"]) == SegmentKind.RECORD
+            records = int(self.tick.arrays.segments[self.next_segment]["kind"]) in EVALUATED
             if records and int(entry["outcome"]) == Outcome.RUNNING:
                 return int(entry["first_sample"])
         return self.tick.sample

@@ -2,15 +2,15 @@
 
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from rig.bench import Bench, load_bench
-from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.plan import Plan
 from rig.configuration import find_toml, read_toml, shipped_names, validated
 from rig.errors import ConfigurationError
 
-__all__ = ["bench_of", "load_plan", "shipped_plans"]
-
-KINDS = {"backbone": BackbonePlan}
+__all__ = ["bench_of", "load_plan", "plan_from", "shipped_plans"]
 
 
 def _folder() -> Path:
@@ -22,17 +22,21 @@ def shipped_plans() -> list[str]:
     return shipped_names(_folder())
 
 
-def load_plan(name_or_path: str | Path) -> BackbonePlan:
+def load_plan(name_or_path: str | Path) -> Plan:
     """A shipped plan by its name, or a plan from a TOML file; `ConfigurationError` names what is wrong with it."""
     text = str(name_or_path)
-    table = read_toml(find_toml(name_or_path, _folder(), "plan"))
+    return plan_from(read_toml(find_toml(name_or_path, _folder(), "plan")), text)
+
+
+def plan_from(table: dict[str, Any], source: str) -> Plan:
+    """A plan of any kind from its table; `ConfigurationError` names what is wrong with it and the ``source``."""
     kind = table.get("kind")
     if kind not in KINDS:
-        raise ConfigurationError(f"{text}: kind = {kind!r}: allowed is {', '.join(map(repr, KINDS))}")
-    return validated(KINDS[kind], table, text)
+        raise ConfigurationError(f"{source}: kind = {kind!r}: allowed is {', '.join(map(repr, KINDS))}")
+    return validated(KINDS[kind].plan, table, source)
 
 
-def bench_of(plan: BackbonePlan, plan_source: str | Path) -> Bench:
+def bench_of(plan: Plan, plan_source: str | Path) -> Bench:
     """The bench that a plan names; a relative file is looked for beside the plan's own file."""
     if plan.bench.endswith(".toml") and not Path(plan.bench).is_absolute() and Path(str(plan_source)).suffix == ".toml":
         return load_bench(Path(str(plan_source)).parent / plan.bench)

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import vibrolock
 from rig.bench import Bench
-from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.execution import Execution, Progress, Silent
 from rig.campaigns.output import make_way, set_aside
+from rig.campaigns.plan import Plan
+from rig.campaigns.plans import plan_from
 from rig.configuration import validated
 from rig.daq import DAQ
 from rig.drivers import make_daq
@@ -20,11 +21,11 @@ from rig.sequencer.segments import Segment
 from rig.tick.layout import ROW_COLUMNS
 from rig.tick.tick import Tick
 
-__all__ = ["carry_out", "check", "take_up"]
+__all__ = ["carry_out", "take_up"]
 
 
 def carry_out(
-    plan: BackbonePlan,
+    plan: Plan,
     bench: Bench,
     output: Path,
     *,
@@ -39,11 +40,11 @@ def carry_out(
     file exists or cannot be written, `rig.errors.DaqError` where the driver cannot be started. A run that ends early
     raises nothing: the recording's last part says how it ended.
     """
-    check(plan, bench)
+    plan.check(bench)
     make_way(output, overwrite)
     with _armable(bench, seed) as daq:
         daq.start(bench.block)
-        tick = _tick(plan, bench, daq, plan.segments())
+        tick = _tick(plan, bench, daq, plan.segments(bench.sample_rate_hz))
         header = Header(
             kind=plan.kind,
             configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
@@ -71,13 +72,13 @@ def take_up(
     Points that had failed are tried again. A recording that is complete is returned as it is.
     """
     with Recording(output) as recording:
-        plan = validated(BackbonePlan, recording.configuration["plan"], f"{output}: plan")
+        plan = plan_from(recording.configuration["plan"], f"{output}: plan")
         bench = validated(Bench, recording.configuration["bench"], f"{output}: bench")
         done = frozenset(int(point["number"]) for point in recording.points if point["accepted"])
         first_sample = recording.n_rows
         seed = recording.seed or 0
         parts = len(recording.parts)
-    segments = plan.segments(done)
+    segments = plan.segments(bench.sample_rate_hz, done)
     if not segments:
         if journal_path(output).exists():
             finalise(journal_path(output), output)
@@ -92,33 +93,6 @@ def take_up(
     return Recording(output)
 
 
-def check(plan: BackbonePlan, bench: Bench) -> None:
-    """Refuse, before anything moves, what the bench cannot do."""
-    name, unit = ("levels_v", "V") if plan.levels_v is not None else ("levels_n", "N")
-    largest = bench.limits.voltage_v if plan.levels_v is not None else bench.limits.force_n
-    for index, level in enumerate(plan.levels):
-        if level > largest:
-            raise ConfigurationError(
-                f"{name}[{index}] = {level:g} {unit}: the bench {bench.name} allows up to {largest:g} {unit}"
-            )
-    window, allowed = plan.controller.frequency_window_hz, bench.limits.frequency_hz
-    linear = bench.specimen.linear_frequency_hz
-    if not window[0] < linear < window[1]:
-        raise ConfigurationError(
-            f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
-            f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
-        )
-    highest = int(bench.sample_rate_hz / window[1] / 2.0) - 2
-    if plan.harmonics > highest:
-        raise ConfigurationError(
-            f"harmonics = {plan.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s"
-        )
-    if window[0] < allowed[0] or window[1] > allowed[1]:
-        raise ConfigurationError(
-            f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"
-        )
-
-
 def _armable(bench: Bench, seed: int) -> DAQ:
     """The bench's driver, not yet open; refused where something physical would move."""
     daq = make_daq(bench, seed)
@@ -127,6 +101,14 @@ def _armable(bench: Bench, seed: int) -> DAQ:
     return daq
 
 
-def _tick(plan: BackbonePlan, bench: Bench, daq: DAQ, segments: tuple[Segment, ...]) -> Tick:
+def _tick(plan: Plan, bench: Bench, daq: DAQ, segments: tuple[Segment, ...]) -> Tick:
     lead = bench.block + daq.latency_samples
-    return Tick(bench, plan.controller, plan.amplitude_law, plan.settle, segments, lead)
+    return Tick(
+        bench,
+        plan.law,
+        plan.amplitude_law,
+        plan.settle_rule,
+        segments,
+        lead,
+        waveforms=plan.waveforms(bench.sample_rate_hz),
+    )

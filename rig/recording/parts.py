@@ -15,7 +15,7 @@ __all__ = ["Part", "rows_at_once"]
 
 def rows_at_once(row_dtype: np.dtype[Any]) -> int:
     """Return how many rows are held in memory while reading or converting, and make one chunk of an HDF5 dataset."""
-    return max(min(4096, 2**22 // row_dtype.itemsize), 1)
+    return max(min(16384, 2**22 // row_dtype.itemsize), 1)
 
 
 class Part(ABC):

@@ -55,6 +55,7 @@ def watch_input(
         shut_down(guard, SENSOR_OVERLOAD, index, volts * channel.unit_per_volt, sample, False)
     watch.same_samples = watch.same_samples + 1 if driven and volts == watch.last_v else 0
     watch.last_v = volts
+    watch.alert = 1 if watch.same_samples > 0 or watch.overload_samples > 0 else 0
     if watch.same_samples >= limits.stuck_samples:
         shut_down(guard, SENSOR_STUCK, index, volts * channel.unit_per_volt, sample, False)
     if guard.mode == ARMED and abs(volts * channel.unit_per_volt) > channel.limit:
@@ -64,12 +65,23 @@ def watch_input(
 
 
 @kernel
-def watch_motion(guard: Record, limits: Record, amplitude_m: float, index: int, omega: float, sample: int) -> None:
-    """Check a displacement amplitude (m) and the frequency (rad/s)."""
-    if amplitude_m > OVERTRAVEL_FACTOR * limits.displacement_m:
-        shut_down(guard, OVERTRAVEL, index, amplitude_m, sample, True)
-    elif amplitude_m > limits.displacement_m:
-        shut_down(guard, DISPLACEMENT_LIMIT, index, amplitude_m, sample, False)
+def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: float, index: int, sample: int) -> None:
+    """Integrate an acceleration (m/s^2) twice, with a leak that forgets its mean, and check the displacement (m)."""
+    gain, keep = limits.integrator_gain, 1.0 - limits.integrator_leak
+    velocity = keep * watch.velocity + gain * acceleration
+    displacement = keep * watch.displacement + gain * velocity
+    watch.velocity = velocity
+    watch.displacement = displacement
+    travel_m = abs(displacement)
+    if travel_m > OVERTRAVEL_FACTOR * limits.displacement_m:
+        shut_down(guard, OVERTRAVEL, index, travel_m, sample, True)
+    elif travel_m > limits.displacement_m:
+        shut_down(guard, DISPLACEMENT_LIMIT, index, travel_m, sample, False)
+
+
+@kernel
+def watch_frequency(guard: Record, limits: Record, omega: float, sample: int) -> None:
+    """Check the frequency (rad/s) of what is put out."""
     if guard.mode == ARMED and (omega < limits.lowest_rad_s or omega > limits.highest_rad_s):
         shut_down(guard, FREQUENCY_LIMIT, -1, omega / (2.0 * math.pi), sample, False)
 

@@ -76,6 +76,8 @@ LIMITS = np.dtype(
         ("overload_samples", "i8"),
         ("stuck_samples", "i8"),
         ("ramp_down_samples", "i8"),
+        ("integrator_gain", "f8"),
+        ("integrator_leak", "f8"),
     ]
 )
 """Limits of a bench in samples and SI units (one record)."""
@@ -84,6 +86,7 @@ INPUT = np.dtype(
     [
         ("unit_per_volt", "f8"),
         ("overload_v", "f8"),
+        ("alarm_v", "f8"),
         ("limit", "f8"),
         ("role", "i8"),
         ("skew_samples", "f8"),
@@ -93,7 +96,16 @@ INPUT = np.dtype(
 """What the tick needs to know of an input channel (one record a channel)."""
 
 INPUT_WATCH = np.dtype(
-    [("mean", "f8"), ("estimate", "c16"), ("last_v", "f8"), ("same_samples", "i8"), ("overload_samples", "i8")]
+    [
+        ("mean", "f8"),
+        ("estimate", "c16"),
+        ("velocity", "f8"),
+        ("displacement", "f8"),
+        ("last_v", "f8"),
+        ("same_samples", "i8"),
+        ("overload_samples", "i8"),
+        ("alert", "i8"),
+    ]
 )
 """Running state of an input channel (one record a channel)."""
 

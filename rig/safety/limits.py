@@ -7,6 +7,8 @@ import numpy as np
 from rig.bench import Bench
 from rig.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, TEXT, EndReason, GuardMode
 
+INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
+
 __all__ = ["describe_end", "guard_record", "input_records", "limits_record", "watch_records"]
 
 
@@ -21,6 +23,8 @@ def limits_record(bench: Bench) -> np.ndarray:
     out["overload_samples"] = max(1, round(limits.overload_s * rate))
     out["stuck_samples"] = max(2, round(limits.stuck_s * rate))
     out["ramp_down_samples"] = max(1, round(limits.ramp_down_s * rate))
+    out["integrator_gain"] = 1.0 / rate
+    out["integrator_leak"] = -math.expm1(-2.0 * math.pi * INTEGRATOR_CORNER * limits.frequency_hz[0] / rate)
     return out
 
 
@@ -38,6 +42,7 @@ def input_records(bench: Bench) -> np.ndarray:
             if accelerates
             else math.inf
         )
+        record["alarm_v"] = min(record["overload_v"], record["limit"] * abs(channel.sensitivity_v_per_unit))
         record["role"] = channel.role_code
         record["skew_samples"] = channel.skew_samples
         record["watch_displacement"] = accelerates

@@ -8,7 +8,7 @@ from controller.kernels import reacquire
 from controller.layout import LOST
 from rig.safety.kernels import shut_down
 from rig.safety.layout import ARMED, EndReason
-from rig.sequencer.layout import LONGEST_AVERAGE, RAMP, RECORD, SETTLE, OnFailure, Outcome
+from rig.sequencer.layout import LONGEST_AVERAGE, RAMP, RECORD, SETTLE, SWEEP, OnFailure, Outcome
 from vibrolock.compiled import Record, kernel
 
 COMPLETED = int(EndReason.COMPLETED)
@@ -49,12 +49,14 @@ def judge_period(
     force: float,
     wanted_force: float,
     saturated: bool,
+    open_loop: bool,
 ) -> None:
     """Take in one period's means and apply the settle rule.
 
     Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the
     averaged response amplitude within ``amplitude`` (relative) of what it was that many periods before, for
-    ``settled_periods`` in a row. With a force level, the averaged force must be within ``amplitude`` of it too.
+    ``settled_periods`` in a row. With a force level, the averaged force must be within ``amplitude`` of it too; in open
+    loop it must keep still as the response does.
     """
     n = rule.average_periods
     slot = settling.count % (2 * LONGEST_AVERAGE)
@@ -71,6 +73,10 @@ def judge_period(
     if wanted_force > 0.0:
         miss = mean_of(settling.forces, last, n) / wanted_force - 1.0
         drift = miss if abs(miss) > abs(drift) else drift
+    if open_loop:
+        new = mean_of(settling.forces, last, n)
+        moved = (new - mean_of(settling.forces, last - n, n)) / new if new > 0.0 else math.inf
+        drift = moved if abs(moved) > abs(drift) else drift
     settling.drift = drift
     off = math.inf  # where a phase could not be read, too
     if math.isfinite(settling.mean_error_rad):
@@ -134,6 +140,14 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, sam
 
 
 @kernel
+def swept(segment: Record, start_omega: float, samples: int) -> float:
+    """Frequency (rad/s) of a sweep in the middle of a sampling interval: held over it, a linear one has its exact phase."""
+    way = segment.rate * (samples + 0.5)
+    omega = start_omega * math.exp(way) if segment.logarithmic else start_omega + way
+    return float(min(omega, segment.omega) if segment.rate > 0.0 else max(omega, segment.omega))
+
+
+@kernel
 def advance(
     progress: Record,
     segments: np.ndarray,
@@ -145,7 +159,7 @@ def advance(
     cycle: float,
     sample: int,
 ) -> None:
-    """One sample of the sequencer: sets ``progress.level``, moves on when a segment is over, ends the run after the last.
+    """One sample of the sequencer: sets level and frequency, moves on when a segment is over, ends the run after the last.
 
     ``cycle`` is the number of oscillator periods seen by the inputs so far, with its fraction.
     """
@@ -166,7 +180,9 @@ def advance(
     if not progress.entered:
         progress.entered = 1
         progress.start_cycle = cycle
+        progress.start_sample = sample
         progress.start_level = progress.level
+        progress.start_omega = progress.omega
         outcomes[progress.segment].outcome = RUNNING
         outcomes[progress.segment].first_sample = sample
         if segment.kind == RAMP and lock.state == LOST:
@@ -176,13 +192,19 @@ def advance(
     elapsed = cycle - progress.start_cycle
     if segment.kind == RAMP:
         done = min(elapsed / segment.periods, 1.0)
-        progress.level = progress.start_level + (segment.level - progress.start_level) * 0.5 * (
-            1.0 - math.cos(math.pi * done)
-        )
+        rise = 0.5 * (1.0 - math.cos(math.pi * done))
+        progress.level = progress.start_level + (segment.level - progress.start_level) * rise
+        progress.omega = progress.start_omega + (segment.omega - progress.start_omega) * rise
         if done >= 1.0:
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
         return
     progress.level = segment.level
+    if segment.kind == SWEEP:
+        progress.omega = swept(segment, progress.start_omega, sample - progress.start_sample)
+        if progress.omega == segment.omega:
+            close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        return
+    progress.omega = segment.omega
     if segment.kind == SETTLE and settling.good_periods >= rule.settled_periods:
         close_segment(progress, outcomes, settling, DONE, cycle, sample)
         return

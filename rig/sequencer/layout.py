@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-__all__ = ["OUTCOME", "PROGRESS", "SEGMENT", "SETTLE_RULE", "SETTLING", "OnFailure", "Outcome", "SegmentKind"]
+__all__ = ["OUTCOME", "PROGRESS", "SEGMENT", "SETTLE_RULE", "SETTLING", "Drive", "OnFailure", "Outcome", "SegmentKind"]
 
 
 class SegmentKind(IntEnum):
@@ -21,6 +21,19 @@ class SegmentKind(IntEnum):
     """Hold for ``periods``, watched all the time; these rows are evaluated."""
     HOLD = 3
     """Hold for ``periods``, watched by nobody."""
+    SWEEP = 4
+    """Hold the level and sweep the frequency of a tone to ``omega``; these rows are evaluated."""
+
+
+class Drive(IntEnum):
+    """Where the output's frequency comes from."""
+
+    LOOP = 0
+    """The phase-locked loop."""
+    TONE = 1
+    """The plan: one frequency, ramped, stepped or swept."""
+    WAVEFORM = 2
+    """The plan: a periodic waveform of unit peak is played; the level is its peak, one oscillator period its period."""
 
 
 class Outcome(IntEnum):
@@ -47,12 +60,26 @@ class OnFailure(IntEnum):
     STOP = 1
 
 
-RAMP, SETTLE, RECORD, HOLD = (int(kind) for kind in SegmentKind)
+RAMP, SETTLE, RECORD, HOLD, SWEEP = (int(kind) for kind in SegmentKind)
+LOOP_DRIVE, TONE, WAVEFORM = (int(drive) for drive in Drive)
 
 SEGMENT = np.dtype(
-    [("kind", "i8"), ("point", "i8"), ("level", "f8"), ("periods", "f8"), ("on_failure", "i8"), ("on_lost_lock", "i8")]
+    [
+        ("kind", "i8"),
+        ("point", "i8"),
+        ("level", "f8"),
+        ("periods", "f8"),
+        ("on_failure", "i8"),
+        ("on_lost_lock", "i8"),
+        ("drive", "i8"),
+        ("omega", "f8"),
+        ("rate", "f8"),
+        ("logarithmic", "i8"),
+        ("waveform", "i8"),
+    ]
 )
-"""One segment of a plan; ``level`` in V or N after the plan's amplitude law."""
+"""One segment of a plan; ``level`` in V or N after the plan's amplitude law, ``omega`` (rad/s) that a tone ends with, ``rate``
+of a sweep in rad/s per sample, of a logarithmic one in 1 per sample, ``waveform`` the number of the one that is played."""
 
 OUTCOME = np.dtype(
     [
@@ -91,8 +118,11 @@ PROGRESS = np.dtype(
         ("segment", "i8"),
         ("segments", "i8"),
         ("start_cycle", "f8"),
+        ("start_sample", "i8"),
         ("start_level", "f8"),
         ("level", "f8"),
+        ("start_omega", "f8"),
+        ("omega", "f8"),
         ("finished", "i8"),
         ("entered", "i8"),
     ]

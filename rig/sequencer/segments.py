@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from rig.configuration import Configured
-from rig.sequencer.layout import LONGEST_AVERAGE, OUTCOME, SEGMENT, SETTLE_RULE, OnFailure, SegmentKind
+from rig.sequencer.layout import LONGEST_AVERAGE, OUTCOME, SEGMENT, SETTLE_RULE, Drive, OnFailure, SegmentKind
 
-__all__ = ["Segment", "SettleRule", "segment_table"]
+__all__ = ["Excitation", "Segment", "SettleRule", "segment_table"]
 
 
 class SettleRule(Configured):
@@ -54,8 +54,26 @@ class SettleRule(Configured):
 
 
 @dataclass(frozen=True)
+class Excitation:
+    """What is sent out where the loop does not choose the frequency.
+
+    A tone of ``frequency_hz``, with which the segment ends; a sweep goes there at ``rate``, in Hz/s, or in octaves/s where it
+    is ``logarithmic``. Or the ``waveform`` of that number, whose fundamental is ``frequency_hz``.
+    """
+
+    frequency_hz: float
+    rate: float = 0.0
+    logarithmic: bool = False
+    waveform: int | None = None
+
+
+@dataclass(frozen=True)
 class Segment:
-    """One step of a plan: its kind, the point it belongs to (-1: none), the level (V or N) and its length in periods."""
+    """One step of a plan: its kind, the point it belongs to (-1: none), the level (V or N) and its length in periods.
+
+    Without an ``excitation`` the phase-locked loop chooses the frequency. A sweep is over at its last frequency, whatever its
+    ``periods``.
+    """
 
     kind: SegmentKind
     point: int
@@ -63,16 +81,28 @@ class Segment:
     periods: float
     on_failure: OnFailure = OnFailure.SKIP
     on_lost_lock: OnFailure = OnFailure.STOP
+    excitation: Excitation | None = None
 
 
-def segment_table(segments: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
+def segment_table(segments: Sequence[Segment], sample_rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
     """The table of segments, and the table of outcomes that goes with it, all pending."""
     table = np.zeros(len(segments), SEGMENT)
     for row, segment in zip(table, segments, strict=True):
         row["kind"], row["point"], row["level"] = segment.kind, segment.point, segment.level
         row["periods"] = segment.periods
         row["on_failure"], row["on_lost_lock"] = segment.on_failure, segment.on_lost_lock
+        if segment.excitation is not None:
+            _fill_in(row, segment.excitation, sample_rate_hz)
     outcomes = np.zeros(len(segments), OUTCOME)
     outcomes["mean_error_rad"] = np.nan
     outcomes["drift"] = np.nan
     return table, outcomes
+
+
+def _fill_in(row: np.void, excitation: Excitation, sample_rate_hz: float) -> None:
+    row["drive"] = Drive.TONE if excitation.waveform is None else Drive.WAVEFORM
+    row["waveform"] = excitation.waveform or 0
+    row["omega"] = 2.0 * math.pi * excitation.frequency_hz
+    row["logarithmic"] = excitation.logarithmic
+    unit = math.log(2.0) if excitation.logarithmic else 2.0 * math.pi
+    row["rate"] = unit * excitation.rate / sample_rate_hz

@@ -21,13 +21,22 @@ from controller.kernels import (
     wrap,
 )
 from controller.layout import FORCE, LOCKED, SIGN
-from rig.safety.kernels import NON_FINITE_OUTPUT, permitted_amplitude, shut_down, watch_input, watch_motion
+from rig.safety.kernels import (
+    NON_FINITE_OUTPUT,
+    SENSOR_OVERLOAD,
+    permitted_amplitude,
+    shut_down,
+    watch_frequency,
+    watch_input,
+    watch_motion,
+)
 from rig.safety.layout import ARMED
 from rig.sequencer.kernels import advance, judge_period
-from rig.sequencer.layout import RAMP
-from rig.tick.layout import FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
+from rig.sequencer.layout import LOOP_DRIVE, RAMP, TONE, WAVEFORM
+from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
 from vibrolock.compiled import Record, kernel
 
+STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
 HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
 
 
@@ -43,35 +52,55 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 
 
 @kernel
+def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tuple[bool, bool]:
+    """A reading that is not plainly in order: watch it; returns whether it may be used, and whether it is a motion.
+
+    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel.
+    """
+    guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
+    channel, watch = t.inputs[index], t.watches[index]
+    usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
+    faulty = watch.same_samples >= STUCK_SAMPLES or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD)
+    return usable, not faulty and abs(volts * channel.unit_per_volt) <= channel.limit
+
+
+@kernel
 def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
     """Check, convert and demodulate every input channel; returns the telemetry flags of the inputs."""
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
-    driven = guard.mode == ARMED and loop.held == 1
+    armed = guard.mode == ARMED
+    driven = armed and loop.held == 1
+    mean_gain, gain, first = law.mean_gain, law.demodulator_gain, loop.sample == 0
     flags = 0
     force = 0.0
     drive = 0.0
     for index in range(t.inputs.size):
         channel, watch = t.inputs[index], t.watches[index]
-        usable = watch_input(guard, limits, channel, watch, index, volts[index], loop.sample, driven)
-        value = volts[index] * channel.unit_per_volt
+        volt = volts[index]
+        value = volt * channel.unit_per_volt
         readings[index] = value
-        if not usable:
-            continue
-        if watch.overload_samples > 0:
-            flags |= SENSOR_AT_RANGE
-        if loop.sample == 0:
-            watch.mean = value
-        watch.mean = track(watch.mean, value, law.mean_gain)
-        value -= watch.mean
-        watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, law.demodulator_gain)
+        moves = True
+        in_order = armed and abs(volt) < channel.alarm_v and volt != watch.last_v and watch.alert == 0
+        if in_order:
+            watch.last_v = volt
+        else:
+            usable, moves = examine_input(t, index, volt, driven)
+            if not usable:
+                continue
+            if watch.overload_samples > 0:
+                flags |= SENSOR_AT_RANGE
+        mean = value if first else track(watch.mean, value, mean_gain)
+        watch.mean = mean
+        value -= mean
+        watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, gain)
         if index == loop.force_channel:
             force = value
         if index == loop.drive_channel:
             drive = value
-        if channel.watch_displacement == 1:
-            amplitude_m = size(watch.estimate) / (loop.omega * loop.omega)
-            watch_motion(guard, limits, amplitude_m, index, loop.omega, loop.sample)
-    loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), law.demodulator_gain)
+        if channel.watch_displacement == 1 and moves:
+            watch_motion(guard, limits, watch, value, index, loop.sample)
+    if law.detector == SIGN:
+        loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), gain)
     return flags
 
 
@@ -91,11 +120,13 @@ def close_period(t: TickArrays, present: bool) -> None:
     """An oscillator period has ended at the inputs: lock state and settle rule take its means."""
     law, loop = t.law[0], t.loop[0]
     n = loop.sum_samples
-    if n > 0:
+    if n > 0 and loop.drive != WAVEFORM:
         error = loop.sum_error / n if present else math.nan
-        next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
+        open_loop = loop.drive == TONE
+        if not open_loop:
+            next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
         wanted = t.progress[0].level if law.amplitude_law == FORCE else 0.0
-        locked = t.lock[0].state == LOCKED and loop.held_back == 0
+        locked = (open_loop or t.lock[0].state == LOCKED) and loop.held_back == 0
         judge_period(
             t.settling[0],
             t.rule[0],
@@ -105,6 +136,7 @@ def close_period(t: TickArrays, present: bool) -> None:
             loop.sum_force / n,
             wanted,
             loop.saturated == 1,
+            open_loop,
         )
     loop.sum_error = 0.0
     loop.sum_response = 0.0
@@ -127,6 +159,55 @@ def demanded_amplitude(t: TickArrays, force_amplitude: float) -> float:
 
 
 @kernel
+def choose_frequency(t: TickArrays, present: bool) -> int:
+    """Frequency law: that of the loop, or the plan's; returns the telemetry flag of a loop at its window."""
+    law, loop = t.law[0], t.loop[0]
+    if loop.drive == WAVEFORM:
+        loop.omega = TWO_PI / (t.waveforms.shape[1] * law.dt_s)
+    elif loop.drive == TONE:
+        loop.omega = t.progress[0].omega
+    elif present:
+        loop.omega, loop.phase_integral = proportional_integral(
+            loop.error,
+            loop.phase_integral,
+            law.kp,
+            law.ki,
+            law.dt_s,
+            law.centre_rad_s,
+            law.lowest_rad_s,
+            law.highest_rad_s,
+        )
+        if loop.omega == law.lowest_rad_s or loop.omega == law.highest_rad_s:
+            return FREQUENCY_CLAMPED
+    return 0
+
+
+@kernel
+def oscillate(t: TickArrays, amplitude: float) -> float:
+    """The output (V) of this sample, and the oscillator one sample on; a waveform is played by its number of the sample."""
+    loop = t.loop[0]
+    if loop.drive == WAVEFORM:
+        period = t.waveforms.shape[1]
+        output = amplitude * t.waveforms[loop.waveform, loop.play]
+        loop.play = loop.play + 1 if loop.play + 1 < period else 0
+        theta = TWO_PI * loop.play / period
+    else:
+        output = amplitude * math.cos(loop.theta)
+        theta = advance_phase(loop.theta, loop.omega, t.law[0].dt_s)
+    if not math.isfinite(output):
+        shut_down(t.guard[0], NON_FINITE_OUTPUT, -1, output, loop.sample, True)
+        output = 0.0
+    sent = t.history[loop.sample % t.history.size]
+    sent.theta = loop.theta
+    sent.omega = loop.omega
+    sent.amplitude_v = amplitude
+    sent.output_v = output
+    loop.theta = theta
+    loop.sample += 1
+    return float(output)
+
+
+@kernel
 def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) -> float:
     """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``."""
     law, loop, guard, progress = t.law[0], t.loop[0], t.guard[0], t.progress[0]
@@ -144,7 +225,8 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
     force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
     size_f, size_a = size(force), size(drive)
     present = size_f >= t.thresholds[0].smallest_force_n and size_a >= t.thresholds[0].smallest_response
-    loop.error = phase_error(t, force, drive) if present else 0.0
+    closed = present and loop.drive == LOOP_DRIVE
+    loop.error = phase_error(t, force, drive) if closed else 0.0
 
     if theta_in < loop.theta_in:
         loop.cycles += 1
@@ -158,51 +240,46 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
     cycle = loop.cycles + theta_in / TWO_PI
     advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.lock[0], guard, cycle, now)
     running = guard.mode == ARMED and progress.finished == 0
-    loop.held = 1 if running and progress.entered == 1 and t.segments[progress.segment].kind != RAMP else 0
+    loop.held = 0
+    if running and progress.entered == 1:
+        segment = t.segments[progress.segment]
+        loop.held = 1 if segment.kind != RAMP else 0
+        loop.drive = segment.drive
+        loop.waveform = segment.waveform
     flags |= HELD if loop.held == 1 else 0
 
     demanded = 0.0
     if running:
-        if present:
-            loop.omega, loop.phase_integral = proportional_integral(
-                loop.error,
-                loop.phase_integral,
-                law.kp,
-                law.ki,
-                law.dt_s,
-                law.centre_rad_s,
-                law.lowest_rad_s,
-                law.highest_rad_s,
-            )
-            if loop.omega == law.lowest_rad_s or loop.omega == law.highest_rad_s:
-                flags |= FREQUENCY_CLAMPED
+        flags |= choose_frequency(t, present)
+        if loop.drive != WAVEFORM:
+            watch_frequency(guard, t.limits[0], loop.omega, now)
         demanded = demanded_amplitude(t, size_f)
         flags |= SATURATED if loop.saturated == 1 else 0
     amplitude = permitted_amplitude(guard, t.limits[0], demanded, now)
     loop.held_back = 1 if abs(amplitude - demanded) > HELD_BACK * abs(demanded) else 0
-    output = amplitude * math.cos(loop.theta)
-    if not math.isfinite(output):
-        shut_down(guard, NON_FINITE_OUTPUT, -1, output, now, True)
-        output = 0.0
+    output = oscillate(t, amplitude)
 
-    sent = t.history[slot]
-    sent.theta = loop.theta
-    sent.omega = loop.omega
-    sent.amplitude_v = amplitude
-    sent.output_v = output
-    loop.theta = advance_phase(loop.theta, loop.omega, law.dt_s)
-    loop.sample = now + 1
-
-    row.phase_error_rad = loop.error if present else math.nan
+    row.phase_error_rad = loop.error if closed else math.nan
     row.flags = flags
     row.segment = progress.segment if running and progress.segment < progress.segments else -1
     row.lock = t.lock[0].state
     row.guard = guard.mode
-    return float(output)
+    return output
 
 
 @kernel
-def tick_block(t: TickArrays, volts: np.ndarray, readings: np.ndarray, rows: np.ndarray, outputs: np.ndarray) -> None:
-    """A block of samples: ``volts`` (float64[n, n_channels]) in, ``outputs`` (float64[n]) for the next block out."""
+def tick_block(
+    t: TickArrays,
+    volts: np.ndarray,
+    flags: np.ndarray,
+    readings: np.ndarray,
+    rows: np.ndarray,
+    outputs: np.ndarray,
+) -> None:
+    """A block of samples: ``volts`` (float64[n, n_channels]) and the device's ``flags`` (uint16[n]) in, voltages out.
+
+    ``outputs`` (float64[n]) are for the next block.
+    """
     for index in range(outputs.size):
         outputs[index] = tick(t, volts[index], readings[index], rows[index])
+        rows[index].flags |= np.uint32(flags[index]) << np.uint32(DEVICE_SHIFT)

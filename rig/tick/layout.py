@@ -31,6 +31,9 @@ LOOP = np.dtype(
         ("sum_samples", "i8"),
         ("saturated", "i8"),
         ("held_back", "i8"),
+        ("drive", "i8"),
+        ("waveform", "i8"),
+        ("play", "i8"),
     ]
 )
 """State of oscillator and laws (one record)."""
@@ -57,6 +60,7 @@ SATURATED = 1
 FREQUENCY_CLAMPED = 2
 SENSOR_AT_RANGE = 4
 HELD = 8
+DEVICE_SHIFT = 16
 
 ROW_COLUMNS: tuple[dict[str, str], ...] = (
     {"name": "inputs", "unit": "SI unit of each channel", "description": "inputs in SI units, one column a channel"},
@@ -67,13 +71,13 @@ ROW_COLUMNS: tuple[dict[str, str], ...] = (
     {
         "name": "phase_error_rad",
         "unit": "rad",
-        "description": "wanted minus measured phase lag, as the detector sees it; NaN while searching",
+        "description": "wanted minus measured phase lag, as the detector sees it; NaN while searching and in open loop",
     },
     {
         "name": "flags",
         "unit": "1",
         "description": "bits: 1 output at its voltage limit, 2 frequency at its window, 4 sensor near its range, "
-        "8 level held",
+        "8 level held; from 65536 (bit 16) on the device's own, named in its counters",
     },
     {"name": "segment", "unit": "1", "description": "number of the plan's segment; -1 while coming down"},
     {"name": "lock", "unit": "1", "description": "0 searching, 1 acquiring, 2 locked, 3 lost"},
@@ -88,7 +92,10 @@ def recorded_row(n_channels: int) -> np.dtype[Any]:
 
 
 class TickArrays(NamedTuple):
-    """Everything the tick reads and writes. The first six are constants of the run, the rest is its state."""
+    """Everything the tick reads and writes. The first seven are constants of the run, the rest is its state.
+
+    ``waveforms`` [n, period]: periodic waveforms of unit peak that segments may play; [1, 1] without any.
+    """
 
     law: np.ndarray
     thresholds: np.ndarray
@@ -96,6 +103,7 @@ class TickArrays(NamedTuple):
     limits: np.ndarray
     inputs: np.ndarray
     segments: np.ndarray
+    waveforms: np.ndarray
     loop: np.ndarray
     lock: np.ndarray
     guard: np.ndarray

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from controller.law import Law
 from controller.layout import LOCK, AmplitudeLaw
-from controller.pll import PhaseLockedLoop
 from rig.bench import Bench
 from rig.errors import ConfigurationError
 from rig.safety.kernels import is_over
@@ -24,7 +24,8 @@ class Tick:
     """The control state of a run.
 
     ``lead_samples`` is the way from an output computed by the tick to the input that shows it: the block plus the
-    device's latency, with its fraction. ``armed`` false keeps the output at 0 V. ``first_sample`` numbers the first row.
+    device's latency, with its fraction. ``waveforms`` [n, period] are those of unit peak that segments play. ``armed`` false
+    keeps the output at 0 V.
 
     Raises `ConfigurationError` where the law does not fit the bench.
     """
@@ -32,12 +33,13 @@ class Tick:
     def __init__(
         self,
         bench: Bench,
-        law: PhaseLockedLoop,
+        law: Law,
         amplitude_law: AmplitudeLaw,
         settle: SettleRule,
         segments: Sequence[Segment],
         lead_samples: float,
         *,
+        waveforms: np.ndarray | None = None,
         armed: bool = True,
     ) -> None:
         try:
@@ -48,15 +50,18 @@ class Tick:
             raise ConfigurationError(
                 f"lead_samples = {lead_samples:g}: an output shows at the next sample at the earliest"
             )
-        table, outcomes = segment_table(segments)
+        table, outcomes = segment_table(segments, bench.sample_rate_hz)
         force, drive = bench.index_of("force"), bench.index_of("drive")
         smallest = [SMALLEST_BITS * c.resolution_v / abs(c.sensitivity_v_per_unit) for c in bench.channels]
         loop = np.zeros(1, LOOP)
         loop["lead_whole"] = math.floor(lead_samples)
         loop["lead_fraction"] = lead_samples - math.floor(lead_samples)
         loop["force_channel"], loop["drive_channel"] = force, drive
-        loop["omega"] = law_record["centre_rad_s"]
+        first = segments[0].excitation if segments else None
+        loop["omega"] = law_record["centre_rad_s"] if first is None else 2.0 * math.pi * first.frequency_hz
         progress = np.zeros(1, PROGRESS)
+        progress["omega"] = loop["omega"]
+        loop["drive"] = table["drive"][:1]
         progress["segments"] = len(segments)
         self.bench = bench
         self.arrays = TickArrays(
@@ -66,6 +71,7 @@ class Tick:
             limits=limits_record(bench),
             inputs=input_records(bench),
             segments=table,
+            waveforms=np.zeros((1, 1)) if waveforms is None else np.ascontiguousarray(waveforms, float),
             loop=loop,
             lock=np.zeros(1, LOCK),
             guard=guard_record(armed),

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from simulators.elements import Element
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.plant.sites import Place, element_places, exciter_places
-from simulators.structure import BeamStructure, ModalStructure
+from simulators.structure import Structure
 
 __all__ = ["LinearPlant", "assemble"]
 
@@ -73,9 +73,9 @@ class LinearPlant:
 
 
 def assemble(
-    structure: BeamStructure | ModalStructure,
+    structure: Structure,
     elements: Sequence[Element],
-    joints: Sequence[JenkinsSite],
+    joints: Sequence[FrictionSite],
     exciter: Exciter,
     stinger: Stinger,
 ) -> LinearPlant:

@@ -1,17 +1,20 @@
 """The arrays of a virtual rig from its parts."""
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulators.elements import Element
 from simulators.exciter import Exciter
-from simulators.friction import JenkinsSite
+from simulators.friction import FrictionSite
 from simulators.layout import CHANNEL, CONVERTER, PLANT, RigArrays, RigState
 from simulators.plant.assembly import LinearPlant
 from simulators.plant.discretise import aligned, pad, round_up, step_columns
 from simulators.plant.sites import local_sites
+from simulators.sensing.filters import channel_sections, output_sections, ring_size, skew_taps
 from simulators.sensing.parts import Converter, Sensor
 from vibrolock.lanes.kernels import WIDTH
 
@@ -23,7 +26,7 @@ Matrix = NDArray[np.float64]
 def rig_arrays(
     plant: LinearPlant,
     elements: Sequence[Element],
-    joints: Sequence[JenkinsSite],
+    joints: Sequence[FrictionSite],
     exciter: Exciter,
     outputs: Sequence[Matrix],
     sensors: Sequence[Sensor],
@@ -35,8 +38,10 @@ def rig_arrays(
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
     step = step_columns(plant, len(joints), 1.0 / (converter.sample_rate_hz * converter.substeps))
     jenkins = jenkins_elements(joints)
-    n_pair = (len(sensors) + 1) // 2
-    sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), converter.substeps, exciter.input_limit_v)
+    substeps = converter.substeps // converter.oversampling
+    sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
+    delays, taps = skew_taps(sensors, converter)
+    channels = [_channel(*pair, converter, noise_scale) for pair in zip(sensors, delays, strict=True)]
     return RigArrays(
         plant=np.array([sizes], PLANT),
         step=step.predictor,
@@ -45,15 +50,16 @@ def rig_arrays(
         elements=jenkins,
         stuck=jenkins[0].sum(axis=0),
         sense=pad(np.array(outputs).T),
-        channels=np.array([_channel(sensor, converter, noise_scale) for sensor in sensors], CHANNEL),
-        converter=np.array(
-            [(converter.adc_step_v, converter.adc_range_v, converter.dac_step_v, converter.dac_range_v)], CONVERTER
-        ),
-        noise_keys=np.random.SeedSequence(seed).generate_state(n_pair, np.uint64).astype(np.uint64),
+        channels=np.array(channels, CHANNEL),
+        converter=_converter(converter),
+        noise_keys=np.random.SeedSequence(seed).generate_state(1 + len(sensors), np.uint64).astype(np.uint64),
+        sections=channel_sections(sensors, converter),
+        reconstruction=output_sections(converter),
+        taps=taps,
     )
 
 
-def jenkins_elements(joints: Sequence[JenkinsSite]) -> Matrix:
+def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:
     """Stiffness and slip force of every element [2, n_element, n_joint], padded with elements without stiffness."""
     n_element = max((len(joint.stiffness) for joint in joints), default=0)
     table = aligned((2, n_element, round_up(len(joints))))
@@ -73,6 +79,10 @@ def at_rest(rig: RigArrays) -> RigState:
         friction=aligned(rig.elements.shape[1:]),
         filters=np.zeros((2, rig.channels.size)),
         counter=np.zeros(1, np.int64),
+        memory=np.zeros((rig.sections.shape[0], 2, rig.sections.shape[2])),
+        output_memory=np.zeros((rig.reconstruction.shape[0], 2, 1)),
+        history=np.zeros((ring_size(rig.channels["delay"], rig.taps), rig.channels.size)),
+        output_v=np.zeros(1),
         rows=aligned(n_row + WIDTH),  # the last vector of x may reach beyond
         forces=np.zeros(rig.sites.size),
         joints=aligned(rig.stuck.size),
@@ -82,12 +92,30 @@ def at_rest(rig: RigArrays) -> RigState:
 
 
 def _channel(
-    sensor: Sensor, converter: Converter, noise_scale: float
-) -> tuple[float, float, float, float, float, float]:
-    """Low-pass ``y' = w_c (value - y)``, exact for a value that changes linearly from one sample to the next."""
-    x = 2.0 * np.pi * sensor.high_pass_hz / converter.sample_rate_hz
+    sensor: Sensor, delay: int, converter: Converter, noise_scale: float
+) -> tuple[float, float, float, float, float, float, int]:
+    """Low-pass ``y' = w_c (value - y)``, exact for a value that changes linearly from one internal instant to the next."""
+    x = 2.0 * np.pi * sensor.high_pass_hz / converter.internal_rate_hz
     hold = float(np.exp(-x))
     held_1 = -float(np.expm1(-x))
     new = 1.0 - held_1 / x if x > 0.0 else 0.0
-    noise = sensor.noise_rms * noise_scale
-    return (hold, held_1 - new, new, noise, sensor.sensitivity_v_per_unit, sensor.range_v)
+    noise_v = math.hypot(noise_scale * sensor.noise_rms * sensor.sensitivity_v_per_unit, converter.adc_noise_v)
+    return (hold, held_1 - new, new, noise_v, sensor.sensitivity_v_per_unit, sensor.range_v, delay)
+
+
+def _converter(converter: Converter) -> NDArray[Any]:
+    """The one record of the converter."""
+    return np.array(
+        [
+            (
+                converter.oversampling,
+                converter.adc_step_v,
+                1.0 / converter.adc_step_v if converter.adc_bits else 0.0,
+                converter.adc_range_v,
+                converter.dac_step_v,
+                converter.dac_range_v,
+                converter.dac_noise_v,
+            )
+        ],
+        CONVERTER,
+    )

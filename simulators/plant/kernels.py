@@ -28,7 +28,7 @@ from simulators.layout import (
     RigArrays,
     RigState,
 )
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.lanes.kernels import WIDTH, greatest, least, load, spread, store
 
 ir: Any = import_module("llvmlite.ir")  # it has no types
@@ -156,7 +156,7 @@ def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
             store(deflection, s, z)
 
 
-@kernel
+@inner_kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
     """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE, AMPLIFIER_CLIPPED or 0, or-ed."""
     inputs, rows, forces, joints, changes = state.inputs, state.rows, state.forces, state.joints, state.changes

@@ -10,7 +10,7 @@ from simulators.elements import Clearance, Cubic, Element, Magnet
 from simulators.exciter import Exciter
 from simulators.functions import loaded
 from simulators.layout import SITE, SiteKind
-from simulators.structure import BeamStructure, ModalStructure
+from simulators.structure import Structure
 
 __all__ = ["Place", "element_places", "exciter_places", "local_sites"]
 
@@ -28,14 +28,12 @@ class Place(NamedTuple):
     """Linear stiffness on its coordinate that the linear plant takes over."""
 
 
-def element_places(
-    structure: BeamStructure | ModalStructure, elements: Sequence[Element], signs: Matrix
-) -> list[Place]:
+def element_places(structure: Structure, elements: Sequence[Element], signs: Matrix) -> list[Place]:
     """One place per element; ``signs`` [n_mode] turn the shapes."""
     return [_element_place(structure, element, signs) for element in elements]
 
 
-def _element_place(structure: BeamStructure | ModalStructure, element: Element, signs: Matrix) -> Place:
+def _element_place(structure: Structure, element: Element, signs: Matrix) -> Place:
     shape = signs * structure.shape(element.at)
     if element.to is not None:
         shape = shape - signs * structure.shape(element.to)

@@ -1,7 +1,7 @@
 """Compiled sensors and converters: from SI values to the volts that a converter reads, and back.
 
-Noise is drawn by counter: a sample's noise is a function of seed, channel and sample index alone, so that a run gives
-the same samples however it is cut into blocks, and adding a channel leaves the noise of the others as it was.
+Sensors and filters run at the internal rate, ``oversampling`` times that of the converter; every so many instants one
+of them is converted. Noise is drawn by counter (`simulators.sensing.noise`).
 """
 
 import math
@@ -10,32 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.layout import DIVERGED, SENSOR_CLIPPED
-from vibrolock.compiled import Record, kernel
-
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-_MIX_2 = np.uint64(0x94D049BB133111EB)
-_30, _27, _31, _32 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(32)
-_LOW = np.uint64(0xFFFFFFFF)
-_UNIT = 2.0**-32
-
-
-@kernel
-def mix(value: np.uint64) -> np.uint64:
-    """A well-mixed 64-bit hash: the output function of SplitMix64 (Steele, Lea & Flood 2014)."""
-    value = (value ^ (value >> _30)) * _MIX_1
-    value = (value ^ (value >> _27)) * _MIX_2
-    return value ^ (value >> _31)
-
-
-@kernel
-def normal_pair(key: np.uint64, sample: int) -> tuple[float, float]:
-    """Two independent standard normal numbers for one key and sample index (Box & Muller 1958), at most 6.7 in size."""
-    bits = mix(key + np.uint64(sample) * _GOLDEN)
-    radius = math.sqrt(-2.0 * math.log((float(bits >> _32) + 0.5) * _UNIT))
-    angle = 2.0 * math.pi * _UNIT * float(bits & _LOW)
-    return radius * math.cos(angle), radius * math.sin(angle)
+from simulators.layout import DAC_CLIPPED, SENSOR_CLIPPED
+from simulators.sensing.noise.kernels import normal
+from vibrolock.compiled import Record, inner_kernel, kernel
 
 
 @kernel
@@ -47,47 +24,129 @@ def quantise(volts: float, step_v: float, range_v: float) -> float:
 
 
 @kernel
-def read_channel(channel: Record, converter: Record, value: float) -> tuple[float, bool]:
-    """Volts of one channel for a sensed value (SI), and whether sensor or converter are at their limit."""
-    sensed = value * channel.sensitivity
-    volts = min(max(sensed, -channel.range_v), channel.range_v)
-    clipped = volts != sensed or abs(volts) > converter.adc_range_v
-    return quantise(volts, converter.adc_step_v, converter.adc_range_v), clipped
+def filter_channels(sections: NDArray[np.float64], memory: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """Filter ``values`` [n_channel] in place by second-order sections ``[n_section, 5, n_channel]``: b_0 b_1 b_2 a_1 a_2.
 
-
-@kernel
-def measure(
-    channels: NDArray[Any],
-    converters: NDArray[Any],
-    noise_keys: NDArray[np.uint64],
-    filters: NDArray[np.float64],
-    values: NDArray[np.float64],
-    sample: int,
-    out_v: NDArray[np.float64],
-) -> int:
-    """Volts of every channel for the SI ``values`` at a sample index; returns SENSOR_CLIPPED, DIVERGED or 0.
-
-    Each sensor is AC-coupled: a first-order high-pass, exact for values that change linearly between samples. Two
-    neighbouring channels share a pair of random numbers.
+    Transposed direct form II, with ``memory`` [n_section, 2, n_channel]; the inner loop runs over the channels.
     """
-    flags = 0
-    second = 0.0
+    for s in range(sections.shape[0]):
+        for c in range(sections.shape[2]):
+            x = values[c]
+            y = sections[s, 0, c] * x + memory[s, 0, c]
+            memory[s, 0, c] = (sections[s, 1, c] * x - sections[s, 3, c] * y) + memory[s, 1, c]
+            memory[s, 1, c] = sections[s, 2, c] * x - sections[s, 4, c] * y
+            values[c] = y
+
+
+@inner_kernel
+def sense(columns: NDArray[np.float64], weights: NDArray[np.float64], values: NDArray[np.float64]) -> bool:
+    """``values = sum_j weights[j] columns[j]``, what every sensor senses (SI); False where one of them is not finite.
+
+    Both lengths are multiples of four. Four channels and two columns at a time, so that the sums stay in registers.
+    """
+    finite = True
+    for c in range(0, columns.shape[1], 4):
+        a_0, a_1, a_2, a_3 = 0.0, 0.0, 0.0, 0.0
+        b_0, b_1, b_2, b_3 = 0.0, 0.0, 0.0, 0.0
+        for j in range(0, columns.shape[0], 2):
+            a, b = weights[j], weights[j + 1]
+            a_0 += a * columns[j, c]
+            a_1 += a * columns[j, c + 1]
+            a_2 += a * columns[j, c + 2]
+            a_3 += a * columns[j, c + 3]
+            b_0 += b * columns[j + 1, c]
+            b_1 += b * columns[j + 1, c + 1]
+            b_2 += b * columns[j + 1, c + 2]
+            b_3 += b * columns[j + 1, c + 3]
+        values[c], values[c + 1], values[c + 2], values[c + 3] = a_0 + b_0, a_1 + b_1, a_2 + b_2, a_3 + b_3
+        finite &= math.isfinite((values[c] + values[c + 1]) + (values[c + 2] + values[c + 3]))
+    return finite
+
+
+@inner_kernel
+def condition(channels: NDArray[Any], filters: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """Turn sensed ``values`` [n_channel] (SI) into volts, in place.
+
+    Each sensor is AC-coupled by a first-order high-pass, exact for values that change linearly between internal
+    instants; ``filters`` [2, n_channel] holds its low-passed and its last value.
+    """
     for c in range(channels.size):
         channel = channels[c]
         value = values[c]
-        if not math.isfinite(value):
-            flags |= DIVERGED
         low = channel.hold * filters[0, c] + channel.old * filters[1, c] + channel.new * value
         filters[0, c] = low
         filters[1, c] = value
-        noise = second
-        if c % 2 == 0:
-            noise, second = normal_pair(noise_keys[c // 2], sample)
-        out_v[c], clipped = read_channel(channel, converters[0], value - low + channel.noise_rms * noise)
-        if clipped:
-            flags |= SENSOR_CLIPPED
-    if flags & DIVERGED:
-        for c in range(channels.size):
-            out_v[c] = math.nan
-        return DIVERGED
+        values[c] = (value - low) * channel.sensitivity
+
+
+@kernel
+def anti_alias(
+    channels: NDArray[Any], sections: NDArray[np.float64], memory: NDArray[np.float64], values: NDArray[np.float64]
+) -> int:
+    """Clip the conditioned volts at each sensor's range and filter them, in place; returns SENSOR_CLIPPED or 0."""
+    flags = 0
+    for c in range(channels.size):
+        range_v = channels[c].range_v
+        if abs(values[c]) > range_v:
+            flags = SENSOR_CLIPPED
+            values[c] = min(max(values[c], -range_v), range_v)
+    filter_channels(sections, memory, values)
     return flags
+
+
+@kernel
+def delay(
+    channels: NDArray[Any],
+    taps: NDArray[np.float64],
+    history: NDArray[np.float64],
+    instant: int,
+    values: NDArray[np.float64],
+) -> None:
+    """Replace each channel's volts by those of as many internal instants ago as its skew says, by Lagrange's polynomial."""
+    mask = history.shape[0] - 1
+    for c in range(channels.size):
+        first = instant - channels[c].delay
+        volts = 0.0
+        for k in range(taps.shape[1]):
+            volts += taps[c, k] * history[(first - k) & mask, c]
+        values[c] = volts
+
+
+@inner_kernel
+def convert(
+    channels: NDArray[Any],
+    converter: Record,
+    noise_keys: NDArray[np.uint64],
+    sample: int,
+    values: NDArray[np.float64],
+    out_v: NDArray[np.float64],
+) -> int:
+    """Convert the conditioned volts into ``out_v`` [n_channel].
+
+    Noise of sensor and converter is added, the sensor's range, then the converter's range and step are kept. Returns
+    SENSOR_CLIPPED or 0.
+    """
+    step_v, range_v, codes_per_v = converter.adc_step_v, converter.adc_range_v, converter.adc_codes_per_v
+    flags = 0
+    for c in range(channels.size):
+        channel = channels[c]
+        sensed = values[c]
+        if channel.noise_v > 0.0:
+            sensed += channel.noise_v * normal(noise_keys[1 + c], sample)
+        volts = min(max(sensed, -channel.range_v), channel.range_v)
+        if volts != sensed or abs(volts) > range_v:
+            flags = SENSOR_CLIPPED
+        if step_v > 0.0:
+            volts = step_v * np.rint(volts * codes_per_v)
+        out_v[c] = min(max(volts, -range_v), range_v - step_v)
+    return flags
+
+
+@inner_kernel
+def hold(converter: Record, noise_key: np.uint64, voltage: float, sample: int) -> tuple[float, int]:
+    """What the digital-to-analogue converter makes of a voltage, noise included, and DAC_CLIPPED or 0."""
+    flags = 0 if abs(voltage) <= converter.dac_range_v else DAC_CLIPPED
+    held_v = 0.0 if math.isnan(voltage) else quantise(voltage, converter.dac_step_v, converter.dac_range_v)
+    if converter.dac_noise_v > 0.0:
+        held_v += converter.dac_noise_v * normal(noise_key, sample)
+    return held_v, flags

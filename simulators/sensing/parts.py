@@ -1,21 +1,28 @@
 """Sensors and converters as they are configured."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive
 
-__all__ = ["Converter", "Sensor"]
+__all__ = ["LOWEST_INTERNAL_RATE_HZ", "TAPS", "Converter", "Sensor"]
+
+TAPS = 6
+"""Values that a skewed channel is interpolated from."""
+LOWEST_INTERNAL_RATE_HZ = 4000.0
+"""What an anti-alias or reconstruction filter needs: below, the stairs of the held output alias into what it reads."""
 
 NotNegative = Annotated[float, Field(ge=0.0)]
 Bits = Annotated[int, Field(ge=0, le=32)]
+Order = Annotated[int, Field(ge=1, le=8)]
 
 
 class Sensor(Part):
     """A piezo sensor and its conditioner.
 
-    Not modelled: resonance of the sensor, drift, cross-axis sensitivity, skew between channels.
+    Not modelled: resonance of the sensor, drift, cross-axis sensitivity.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -29,9 +36,13 @@ class Sensor(Part):
     range_v: Positive
     """Largest voltage it can put out; beyond, it clips and is flagged."""
     noise_rms: NotNegative = 0.0
-    """RMS of its white noise, in N or m/s^2."""
+    """RMS of its noise in N or m/s^2, white and of this size in the readings, whatever filter stands before them."""
     high_pass_hz: NotNegative = 0.3
     """Corner of its first-order high-pass; 0 for none."""
+    low_pass_hz: NotNegative = 0.0
+    """Corner of its first-order low-pass; 0 for none."""
+    skew_samples: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Delay of its readings behind those of the other channels, in samples of the converter."""
 
     @model_validator(mode="after")
     def _placed(self) -> "Sensor":
@@ -45,21 +56,61 @@ class Sensor(Part):
 class Converter(Part):
     """Sampling, and the converters on either side.
 
-    Not modelled: anti-alias and reconstruction filters, converter noise, queues of a bus (those are the DAQ's).
+    With ``oversampling`` the rig runs ``oversampling`` internal instants per sample: filters run at that rate, and one
+    instant in so many is converted. Not modelled: queues of a bus (those are the DAQ's), nonlinearity of the converters.
     """
 
     sample_rate_hz: Annotated[float, Field(ge=100.0, le=1e6)] = 5000.0
     """Samples per second."""
-    substeps: Annotated[int, Field(ge=1, le=64)] = 2
-    """Integration steps per sample."""
+    substeps: Annotated[int, Field(ge=1, le=1024)] = 2
+    """Integration steps per sample; a multiple of ``oversampling``."""
+    oversampling: Annotated[int, Field(ge=1, le=256)] = 1
+    """Internal instants per sample, at which sensors and filters run."""
+    anti_alias_hz: NotNegative = 0.0
+    """Corner of the anti-alias filter of every input, a Butterworth low-pass; 0 for none."""
+    anti_alias_order: Order = 6
+    """Its order; with a corner at 0.4 of the rate, 6 leaves 0.05 % of the images of the output's stairs, 4 leaves 0.25 %."""
+    reconstruction_hz: NotNegative = 0.0
+    """Corner of the filter that smooths the stairs of the output, a Butterworth low-pass; 0 for none."""
+    reconstruction_order: Order = 2
+    """Its order."""
     adc_bits: Bits = 16
     """Bits of the inputs; 0 for no quantisation."""
     adc_range_v: Positive = 10.0
     """Inputs reach from minus to plus this voltage."""
+    adc_noise_v: NotNegative = 0.0
+    """RMS of the white noise of each input."""
     dac_bits: Bits = 16
     """Bits of the output; 0 for no quantisation."""
     dac_range_v: Positive = 10.0
     """The output reaches from minus to plus this voltage."""
+    dac_noise_v: NotNegative = 0.0
+    """RMS of the white noise of the output, one value per sample."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Converter":
+        if self.substeps % self.oversampling:
+            raise ValueError(f"substeps = {self.substeps}: allowed is a multiple of oversampling = {self.oversampling}")
+        if self.anti_alias_hz >= 0.5 * self.sample_rate_hz:
+            half_hz = 0.5 * self.sample_rate_hz
+            raise ValueError(f"anti_alias_hz = {self.anti_alias_hz:g}: allowed is below {half_hz:g}, half the rate")
+        if self.reconstruction_hz >= 0.5 * self.internal_rate_hz:
+            half_hz = 0.5 * self.internal_rate_hz
+            raise ValueError(
+                f"reconstruction_hz = {self.reconstruction_hz:g}: allowed is below {half_hz:g}, half the internal rate"
+            )
+        needed = max(2, math.ceil(LOWEST_INTERNAL_RATE_HZ / self.sample_rate_hz))
+        if (self.anti_alias_hz or self.reconstruction_hz) and self.oversampling < needed:
+            raise ValueError(
+                f"oversampling = {self.oversampling}: allowed is at least {needed} with a filter, which has to run faster "
+                f"than the converter and at {LOWEST_INTERNAL_RATE_HZ:g} Hz or more"
+            )
+        return self
+
+    @property
+    def internal_rate_hz(self) -> float:
+        """Rate of sensors and filters."""
+        return self.sample_rate_hz * self.oversampling
 
     @property
     def adc_step_v(self) -> float:

@@ -39,7 +39,7 @@ def _exchanged(block, **options):
         voltages, chunks = np.zeros(block), []
         for _ in range(SAMPLES // block):
             readings, rows = tick.buffers(block)
-            tick_block(tick.arrays, daq.exchange(voltages), readings, rows, voltages)
+            tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
             chunks.append(tick.joined(readings, rows))
         return np.concatenate(chunks), tick
 

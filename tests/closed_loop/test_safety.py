@@ -33,7 +33,7 @@ class Running:
             if spoil is not None:
                 spoil(inputs[0])
             readings, rows = self.tick.buffers(1)
-            tick_block(self.tick.arrays, inputs, readings, rows, self.voltages)
+            tick_block(self.tick.arrays, inputs, self.daq.flags, readings, rows, self.voltages)
             self.rows.append((float(rows["frequency_hz"][0]), float(self.voltages[0]), int(rows["guard"][0])))
         return self
 

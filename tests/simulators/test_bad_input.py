@@ -14,12 +14,15 @@ def table(**changes: Any) -> dict[str, Any]:
     return full
 
 
-JOINT = {"at": "clamp", "quantity": "curvature", "relative_to_mode_1": True}
+JOINT = {"kind": "jenkins", "at": "clamp", "quantity": "curvature", "relative_to_mode_1": True}
 MAGNET = {"kind": "magnet-one-sided", "at": "magnet", "strength_n_m4": 1e-8, "gap_m": 0.011}
 MODAL = {"kind": "modal", "frequency_hz": [20.0, 30.0], "damping_ratio": [0.01, 0.01]}
 
 BAD: list[tuple[dict[str, Any], str]] = [
-    ({"specimen": "magnet-beem"}, "specimen = 'magnet-beem': allowed is one of magnet-beam, magnet-beam-symmetric"),
+    (
+        {"specimen": "magnet-beem"},
+        "specimen = 'magnet-beem': allowed is one of friction-beam, magnet-beam, magnet-beam-symmetric",
+    ),
     ({"specimen": "magnet-beam", "voltage": 1}, "voltage"),
     ({"specimen": "magnet-beam", "exciter": {"armature_mass": 0.2}}, "exciter.armature_mass\n"),
     ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": -0.2}}, "greater than 0"),
@@ -30,7 +33,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"specimen": "magnet-beam", "structure": {"length_m": 0.4}},
         "points_m.acc_magnet = 0.40065: allowed is 0 to length_m = 0.4",
     ),
-    ({"specimen": "magnet-beam", "structure": {"boundary": "pinned"}}, "'clamped-free' or 'free-free'"),
+    ({"specimen": "magnet-beam", "structure": {"boundary": "pinned"}}, "'clamped-free', 'clamped-pinned'"),
     ({"specimen": "magnet-beam", "structure": {"damping_ratio": []}}, "at least 1 item"),
     (
         {"specimen": "magnet-beam", "structure": {"lumped_masses": [{"at": "x", "mass_kg": 1.0}]}},

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simulators.beam import BeamModes, Boundary, Quantity, beam_modes
+from simulators.beam import BeamModes, Boundary, Lump, Quantity, Spring, beam_modes
 
 LENGTH_M, STIFFNESS, MASS = 0.55, 184.0, 1.3
 CLAMPED_FREE = (1.8751040687, 4.6940911330, 7.8547574382, 10.9955407349)
@@ -12,8 +12,9 @@ FREE_FREE = (4.7300407449, 7.8532046241, 10.9956078380)
 def beam(
     n_element: int = 40,
     boundary: Boundary = "clamped-free",
-    lumped: tuple[tuple[float, float], ...] = (),
+    lumps: tuple[Lump, ...] = (),
     n_mode: int = 4,
+    springs: tuple[Spring, ...] = (),
 ) -> BeamModes:
     return beam_modes(
         length_m=LENGTH_M,
@@ -22,7 +23,8 @@ def beam(
         n_element=n_element,
         n_mode=n_mode,
         boundary=boundary,
-        lumped=lumped,
+        lumps=lumps,
+        springs=springs,
     )
 
 
@@ -82,19 +84,21 @@ def test_mass_at_the_tip_lowers_the_frequency_as_in_the_closed_form() -> None:
         return 1 + np.cos(x) * np.cosh(x) + ratio * x * (np.cos(x) * np.sinh(x) - np.sin(x) * np.cosh(x))
 
     beta_l = (brentq(characteristic, 1.0, 1.8751), brentq(characteristic, 3.5, 4.6941))
-    modes = beam(80, lumped=((LENGTH_M, ratio * MASS * LENGTH_M),))
+    modes = beam(80, lumps=(Lump(LENGTH_M, ratio * MASS * LENGTH_M),))
     assert modes.omega_rad_s[:2] == pytest.approx(omega_rad_s(beta_l), rel=1e-6)
 
 
 def test_modes_are_mass_normalised_and_orthogonal_with_lumped_masses_anywhere() -> None:
-    lumped = ((0.2111, 0.05), (0.55, 0.1))
-    modes = beam(40, lumped=lumped)
+    lumps = (Lump(0.2111, 0.05, 1e-4), Lump(0.55, 0.1))
+    modes = beam(40, lumps=lumps)
     nodes, weights = np.polynomial.legendre.leggauss(5)
     size = LENGTH_M / 40
     positions = (np.arange(40)[:, None] + (nodes + 1) / 2) * size
     shapes = np.array([modes.shape(x) for x in positions.ravel()])
     mass = MASS * size / 2 * (shapes.T * np.tile(weights, 40)) @ shapes
-    mass += sum(m * np.outer(modes.shape(x), modes.shape(x)) for x, m in lumped)
+    for x, kg, inertia in lumps:
+        deflection, slope = modes.shape(x), modes.shape(x, "slope")
+        mass += kg * np.outer(deflection, deflection) + inertia * np.outer(slope, slope)
     assert mass == pytest.approx(np.eye(4), abs=1e-9)
 
 

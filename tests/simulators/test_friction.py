@@ -17,7 +17,7 @@ SLIP = np.array([0.1, 0.25, 0.5, 0.9, 1.6])
 
 def imposed_joint() -> tuple[RigArrays, RigState]:
     """One friction joint whose coordinate is the voltage: its deflection is imposed."""
-    joint = JenkinsSite(at="joint", stiffness=tuple(STIFFNESS), slip=tuple(SLIP))
+    joint = JenkinsSite(kind="jenkins", at="joint", stiffness=tuple(STIFFNESS), slip=tuple(SLIP))
     elements = jenkins_elements([joint])
     step = np.zeros((8, 8))
     step[1, 0] = 1.0
@@ -31,7 +31,10 @@ def imposed_joint() -> tuple[RigArrays, RigState]:
         sense=np.zeros((8, 8)),
         channels=np.zeros(1, CHANNEL),
         converter=np.zeros(1, CONVERTER),
-        noise_keys=np.zeros(1, np.uint64),
+        noise_keys=np.zeros(2, np.uint64),
+        sections=np.zeros((0, 5, 1)),
+        reconstruction=np.zeros((0, 5, 1)),
+        taps=np.zeros((1, 1)),
     )
     return rig, at_rest(rig)
 

@@ -4,37 +4,89 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import stats
+from scipy import integrate, stats
 
-from simulators.kernels import run_open_loop
-from simulators.layout import RigState
-from simulators.sensing.kernels import normal_pair
+from simulators.kernels import run_open_loop, sample
+from simulators.layout import RigArrays, RigState
+from simulators.plant.compilation import at_rest
+from simulators.sensing.noise.kernels import EDGES, HEIGHTS, TAIL, normal
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal
 
-N = 40_000
+N = 400_000
+KEYS = (0, 1, 2, 2**63 + 12345)
 
 
 @pytest.fixture(scope="module")
-def pairs() -> np.ndarray:
-    return np.array([[*normal_pair(np.uint64(key), k)] for key in (1, 2) for k in range(N)]).reshape(2, N, 2)
+def numbers() -> np.ndarray:
+    """Four keys [4, N], drawn sample by sample."""
+    out = np.empty((4, N, 1))
+    for key, column in zip(KEYS, out, strict=True):
+        rig, state = _noise_alone(key)
+        run_open_loop(rig, state, np.zeros(N), column)
+    return out[..., 0]
 
 
-def test_noise_is_standard_normal(pairs: np.ndarray) -> None:
-    for numbers in (pairs[0, :, 0], pairs[0, :, 1], pairs[1, :, 0], pairs[1, :, 1]):
-        assert abs(numbers.mean()) < 4 / np.sqrt(N)
-        assert abs(numbers.var() - 1.0) < 4 * np.sqrt(2 / N)
-        assert stats.kstest(numbers, "norm").pvalue > 1e-3
+def _noise_alone(key: int) -> tuple[RigArrays, RigState]:
+    """A rig whose one reading is the standard normal numbers of a key."""
+    sensor = _noisy()[0] | {"noise_rms": 1.0}
+    rig, _ = ideal(sensors=[sensor], friction=()).build()
+    rig.noise_keys[1] = key
+    return rig, at_rest(rig)
 
 
-def test_noise_is_independent_between_channels_pairs_and_samples(pairs: np.ndarray) -> None:
-    columns = np.column_stack([pairs[0], pairs[1]])
-    shifted = np.column_stack([columns[1:], columns[:-1]])
-    correlation = np.corrcoef(shifted, rowvar=False) - np.eye(8)
-    # The same samples stand in both halves of the table, shifted by one: 28 numbers, five standard deviations.
-    assert np.max(np.abs(correlation)) < 5 / np.sqrt(N)
-    squares = np.corrcoef(columns**2, rowvar=False) - np.eye(4)
-    assert np.max(np.abs(squares)) < 5 / np.sqrt(N)
+def test_layers_of_the_ziggurat_have_one_area_and_end_at_the_top_of_the_density() -> None:
+    area, _ = integrate.quad(lambda x: np.exp(-0.5 * x * x), TAIL, np.inf, epsabs=1e-15)
+    area += TAIL * np.exp(-0.5 * TAIL**2)
+    assert EDGES[:-1] * np.diff(np.concatenate([[0.0], HEIGHTS[1:]])) == pytest.approx(area, rel=1e-9)
+    assert HEIGHTS[-1] == 1.0
+
+
+def test_noise_has_the_moments_of_a_standard_normal(numbers: np.ndarray) -> None:
+    for x in numbers:
+        assert abs(x.mean()) < 4 / np.sqrt(N)
+        assert abs(x.var() - 1.0) < 4 * np.sqrt(2 / N)
+        assert abs(stats.skew(x)) < 4 * np.sqrt(6 / N)
+        assert abs(stats.kurtosis(x)) < 4 * np.sqrt(24 / N)
+
+
+def test_noise_has_the_distribution_of_a_standard_normal(numbers: np.ndarray) -> None:
+    for x in numbers:
+        assert stats.kstest(x, "norm").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("beyond", [2.0, 3.0, TAIL, 4.0])
+def test_tails_of_the_noise_are_as_heavy_as_they_should_be(numbers: np.ndarray, beyond: float) -> None:
+    for side in (numbers, -numbers):
+        expected = numbers.size * stats.norm.sf(beyond)
+        assert abs(np.sum(side > beyond) - expected) < 4 * np.sqrt(expected)
+
+
+def test_tail_itself_has_the_distribution_of_a_normal_tail(numbers: np.ndarray) -> None:
+    tail = np.abs(numbers[np.abs(numbers) > TAIL])
+    assert stats.kstest(stats.norm.sf(tail) / stats.norm.sf(TAIL), "uniform").pvalue > 1e-3
+
+
+def test_noise_is_independent_between_channels_and_samples(numbers: np.ndarray) -> None:
+    columns = np.vstack([numbers[:, 2:], numbers[:, 1:-1], numbers[:, :-2]])
+    for power in (1, 2):
+        correlation = np.corrcoef(columns**power) - np.eye(12)
+        # 66 numbers: five standard deviations are beyond chance.
+        assert np.max(np.abs(correlation)) < 5 / np.sqrt(N)
+
+
+def test_noise_is_white(numbers: np.ndarray) -> None:
+    for x in numbers:
+        power = np.abs(np.fft.rfft(x))[1:-1] ** 2 / N
+        in_bands = power[: power.size // 100 * 100].reshape(100, -1).mean(axis=1)
+        assert np.max(np.abs(in_bands - 1.0)) < 5 / np.sqrt(power.size / 100)
+
+
+def test_number_depends_on_key_and_sample_alone() -> None:
+    forward = [normal(np.uint64(7), k) for k in range(3000)]
+    backward = [normal(np.uint64(7), k) for k in reversed(range(3000))]
+    assert forward == backward[::-1]
+    assert len(set(forward)) == 3000
 
 
 def test_readings_of_a_rig_at_rest_have_the_noise_that_was_asked_for() -> None:
@@ -94,3 +146,21 @@ def test_noise_scale_multiplies_the_noise() -> None:
 
 def _noisy() -> list[dict[str, object]]:
     return [sensor.model_dump() | {"noise_rms": 1.0} for sensor in ideal().sensors]
+
+
+def test_noise_of_sensor_and_converter_add_up_in_power() -> None:
+    sensors = [_noisy()[0] | {"noise_rms": 3.0, "sensitivity_v_per_unit": 2.0}]
+    rig, state = ideal(sensors=sensors, converter={"adc_noise_v": 8.0}).build(3)
+    out_v = np.empty((20_000, 1))
+    run_open_loop(rig, state, np.zeros(20_000), out_v)
+    assert out_v.std() == pytest.approx(10.0, rel=4 / np.sqrt(40_000))
+
+
+def test_noise_of_the_output_is_on_the_held_voltage() -> None:
+    rig, state = ideal(converter={"dac_noise_v": 0.5}).build(3)
+    held_v = []
+    for _ in range(4000):
+        sample(rig, state, 2.0, np.empty(4))
+        held_v.append(state.inputs[rig.plant["n_state"][0]])
+    assert np.mean(held_v) == pytest.approx(2.0, abs=4 * 0.5 / np.sqrt(4000))
+    assert np.std(held_v) == pytest.approx(0.5, rel=4 / np.sqrt(8000))

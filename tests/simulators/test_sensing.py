@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from simulators.kernels import run_open_loop, sample
 from simulators.layout import CHANNEL, CONVERTER, Flag
-from simulators.sensing.kernels import measure, quantise
+from simulators.sensing.kernels import condition, quantise
 from simulators.sensing.parts import Sensor
 from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
@@ -38,12 +38,11 @@ def test_sensors_are_coupled_by_the_high_pass_that_was_asked_for(frequency_hz: f
     corner_hz, rate_hz, n = 0.3, 5000.0, 150_000
     rig, _ = ideal(sensors=[_force_sensor() | {"high_pass_hz": corner_hz}]).build()
     omega = 2 * np.pi * frequency_hz / rate_hz
-    filters, out_v, readings = np.zeros((2, 1)), np.empty(1), np.empty(n)
+    filters, readings = np.zeros((2, 1)), np.cos(omega * np.arange(n))[:, np.newaxis]
     for k in range(n):
-        measure(rig.channels, rig.converter, rig.noise_keys, filters, np.array([math.cos(omega * k)]), k, out_v)
-        readings[k] = out_v[0]
+        condition(rig.channels, filters, readings[k])
     settled = slice(n - 50_000, n)
-    phasor = 2 * np.mean(readings[settled] * np.exp(-1j * omega * np.arange(n)[settled]))
+    phasor = 2 * np.mean(readings[settled, 0] * np.exp(-1j * omega * np.arange(n)[settled]))
     analogue = 1j * frequency_hz / (1j * frequency_hz + corner_hz)
     # A polygon has the spectrum of its sine but for (omega dt)^2 / 12.
     assert abs(phasor - analogue) < 1e-6 + omega**2 / 12 * corner_hz / frequency_hz

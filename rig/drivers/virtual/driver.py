@@ -12,12 +12,13 @@ from rig.drivers.virtual.kernels import exchange_block, fused
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from simulators.layout import Flag
+from simulators.sensing.parts import LOWEST_INTERNAL_RATE_HZ
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["VirtualDAQ"]
 
 FACT_TOLERANCE = 1e-3
-LOWEST_CLEAN_RATE_HZ = 4000.0  # 5 % of error in damping at 1 kHz, below 0.1 % at 5 kHz
+SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 
 
@@ -74,16 +75,23 @@ class VirtualDAQ(DAQ):
     def remarks(self) -> tuple[str, ...]:
         """Where the bench's facts differ from what the virtual rig is made of."""
         out = []
-        if self.sample_rate_hz < LOWEST_CLEAN_RATE_HZ:
+        if self.sample_rate_hz < LOWEST_INTERNAL_RATE_HZ and not self.rig.converter.anti_alias_hz:
             out.append(
                 f"sample_rate_hz = {self.sample_rate_hz:g}: the stairs of the held output alias into the readings below "
-                f"about {LOWEST_CLEAN_RATE_HZ:g} Hz, for the virtual device has no filters"
+                f"about {LOWEST_INTERNAL_RATE_HZ:g} Hz, for the virtual device has no anti-alias filter "
+                "(driver.options.converter: oversampling, anti_alias_hz)"
             )
-        for channel, sensor in zip(self.channels, self.rig.sensors, strict=True):
+        delays = self.rig.channel_delays_samples
+        for channel, sensor, delay in zip(self.channels, self.rig.sensors, delays, strict=True):
             if channel.sensitivity_v_per_unit != sensor.sensitivity_v_per_unit:
                 out.append(
                     f"channel {channel.name}: the bench says {channel.sensitivity_v_per_unit:g} V per {channel.unit}, "
                     f"the virtual sensor has {sensor.sensitivity_v_per_unit:g}"
+                )
+            if abs(channel.skew_samples - delay) > SKEW_TOLERANCE:
+                out.append(
+                    f"channel {channel.name}: the bench says skew_samples = {channel.skew_samples:g}, "
+                    f"the virtual sensor is {delay:.4g} samples late"
                 )
         modes, facts = self.rig.linear_modes, self._specimen
         mode = int(np.argmin(np.abs(modes.frequency_hz - facts.linear_frequency_hz)))
@@ -111,8 +119,8 @@ class VirtualDAQ(DAQ):
 
     @property
     def latency_samples(self) -> float:
-        """Queue and half a sample of hold."""
-        return self.queue_samples + HOLD_SAMPLES
+        """Queue, half a sample of hold, and the delay of the converter's filters at low frequency."""
+        return self.queue_samples + HOLD_SAMPLES + self.rig.filter_delay_samples
 
     @property
     def counters(self) -> dict[str, int]:
@@ -130,7 +138,7 @@ class VirtualDAQ(DAQ):
         self._first = 0
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        exchange_block(self._arrays, self._state, self._queue, self._first, voltages, inputs, self._counts)
+        exchange_block(self._arrays, self._state, self._queue, self._first, voltages, inputs, self.flags, self._counts)
         self._first += voltages.size
 
     def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
@@ -141,7 +149,7 @@ class VirtualDAQ(DAQ):
         lead = int(t.loop["lead_whole"][0])
         if lead != math.floor(self.block + self.latency_samples):
             raise DaqRefused(
-                f"the tick expects a lead of {lead} samples, this device has {self.block + self.queue_samples}"
+                f"the tick expects a lead of {lead} samples, this device has {math.floor(self.block + self.latency_samples)}"
             )
         volts = np.empty(len(self.channels))
         return fused(t, self._arrays, self._state, self._under_way, volts, readings, rows, self._counts)

@@ -4,7 +4,7 @@ import numpy as np
 
 from rig.safety.kernels import is_over
 from rig.tick.kernels import tick
-from rig.tick.layout import TickArrays
+from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from simulators.kernels import sample
 from simulators.layout import RigArrays, RigState
 from vibrolock.compiled import kernel
@@ -18,9 +18,10 @@ def exchange_block(
     first: int,
     voltages: np.ndarray,
     inputs: np.ndarray,
+    flags: np.ndarray,
     counts: np.ndarray,
 ) -> None:
-    """Swap one block with the rig.
+    """Swap one block with the rig; ``flags`` (uint16[n]) are the rig's for each sample.
 
     ``queue`` (float64[d], d may be 0) holds the outputs that the device still keeps back; ``first`` is the number of
     the block's first sample; ``counts`` (int64[bits]) counts the samples at which each flag of the rig was up.
@@ -32,7 +33,8 @@ def exchange_block(
             slot = (first + index) % delay
             voltage = queue[slot]
             queue[slot] = voltages[index]
-        count_flags(sample(rig, state, voltage, inputs[index]), counts)
+        flags[index] = sample(rig, state, voltage, inputs[index])
+        count_flags(flags[index], counts)
 
 
 @kernel
@@ -62,8 +64,10 @@ def fused(
     delay = queue.size
     for index in range(rows.size):
         slot = t.loop[0].sample % delay
-        count_flags(sample(rig, state, queue[slot], volts), counts)
+        flags = sample(rig, state, queue[slot], volts)
+        count_flags(flags, counts)
         queue[slot] = tick(t, volts, readings[index], rows[index])
+        rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
         if is_over(t.guard[0], t.loop[0].lead_whole):
             return index + 1
     return int(rows.size)

@@ -6,7 +6,6 @@ from controller import preset
 from rig.bench import shipped_benches
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.plans import bench_of, load_plan, shipped_plans
-from rig.campaigns.runner import check
 from rig.sequencer.layout import SegmentKind
 
 
@@ -26,12 +25,12 @@ def test_the_levels_are_sorted_by_the_direction(direction, levels):
 
 
 def test_every_point_is_ramped_settled_and_recorded():
-    kinds = [segment.kind for segment in _plan().segments()]
+    kinds = [segment.kind for segment in _plan().segments(5000.0)]
     assert kinds == [SegmentKind.RAMP, SegmentKind.SETTLE, SegmentKind.RECORD] * 3
 
 
 def test_a_resumed_point_is_approached_from_the_level_before():
-    segments = _plan().segments(done=frozenset({0, 1}))
+    segments = _plan().segments(5000.0, done=frozenset({0, 1}))
     assert [(s.kind, s.level) for s in segments[:3]] == [
         (SegmentKind.RAMP, 0.4),
         (SegmentKind.HOLD, 0.4),
@@ -41,22 +40,29 @@ def test_a_resumed_point_is_approached_from_the_level_before():
 
 
 def test_a_resumed_point_on_the_way_down_is_approached_from_above():
-    segments = _plan(direction="up-down").segments(done=frozenset({0, 1, 2, 3}))
+    segments = _plan(direction="up-down").segments(5000.0, done=frozenset({0, 1, 2, 3}))
     assert [s.level for s in segments if s.kind is SegmentKind.RAMP] == [0.4, 0.2]
 
 
 def test_a_finished_plan_has_no_segments_left():
-    assert _plan().segments(done=frozenset({0, 1, 2})) == ()
+    assert _plan().segments(5000.0, done=frozenset({0, 1, 2})) == ()
 
 
 @pytest.mark.parametrize("name", shipped_plans())
-def test_a_shipped_plan_fits_its_bench_and_holds_the_gains_of_the_paper(name):
+def test_a_shipped_plan_fits_its_bench(name):
     plan = load_plan(name)
     bench = bench_of(plan, name)
-    check(plan, bench)
+    plan.check(bench)
     assert name.split("/")[0] == bench.name
     assert bench.name in shipped_benches()
-    paper = preset("magnet-beam", "backbone", "A" if "sign" in name else "B")
+    assert plan.description
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_plans() if "/backbone" in name])
+def test_a_shipped_backbone_holds_the_gains_of_the_paper(name):
+    plan = load_plan(name)
+    specimen = "friction-beam" if name.startswith("friction-beam") else "magnet-beam"
+    paper = preset(specimen, "backbone", "A" if "sign" in name else "B")
     for gain in ("detector", "low_pass_rad_s", "k1", "k2", "centre_frequency_hz", "phase_lag_deg", "lock"):
         assert getattr(plan.controller, gain) == getattr(paper, gain)
     assert plan.controller.frequency_window_hz == pytest.approx(paper.frequency_window_hz)

@@ -17,11 +17,13 @@ from rig.sequencer.segments import Segment, SettleRule, segment_table
 RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)
 
 
-def _judge(periods, locked=True, wanted_force=0.0, saturated=False):
+def _judge(periods, locked=True, wanted_force=0.0, saturated=False, open_loop=False):
     settling = np.zeros(1, SETTLING)
     rule = RULE.build()
     for error_deg, response, force in periods:
-        judge_period(settling[0], rule[0], locked, math.radians(error_deg), response, force, wanted_force, saturated)
+        judge_period(
+            settling[0], rule[0], locked, math.radians(error_deg), response, force, wanted_force, saturated, open_loop
+        )
     return settling[0]
 
 
@@ -65,7 +67,7 @@ class Walk:
     """A sequencer without a rig: cycles are dealt out by hand."""
 
     def __init__(self, *segments):
-        self.table, self.outcomes = segment_table(segments)
+        self.table, self.outcomes = segment_table(segments, 5000.0)
         self.progress = np.zeros(1, PROGRESS)
         self.progress["segments"] = len(segments)
         self.settling, self.lock, self.guard = np.zeros(1, SETTLING), np.zeros(1, LOCK), guard_record(True)

@@ -1,0 +1,56 @@
+"""Momentary frequency and magnitude of a force from its zero crossings, as the founding paper took them.
+
+Scheel et al., prediction of transients under swept sine: the frequency from the time between successive zero crossings,
+the magnitude as the largest value between them. Both suffer where harmonics or noise make a good part of the signal, as
+they do in the force near resonance: then `identification.demodulate` is the better choice.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+
+__all__ = ["HalfPeriods", "zero_crossings"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HalfPeriods:
+    """What lies between successive zero crossings of a signal.
+
+    Parameters
+    ----------
+    time_s
+        float[n], middle between two crossings, from the first sample on.
+    frequency_hz
+        float[n], half of one over the time between them.
+    magnitude
+        float[n], largest absolute sample between them, in the unit of the signal.
+    """
+
+    time_s: Float
+    frequency_hz: Float
+    magnitude: Float
+
+
+def zero_crossings(signal: ArrayLike, *, sample_rate_hz: float) -> HalfPeriods:
+    """Half periods of ``signal``, float[n]; a crossing lies on the straight line between the samples around it.
+
+    Raises `IdentificationError` on NaN or inf, or fewer than two crossings.
+    """
+    values = finite_array("signal", signal, np.float64, 1)
+    rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
+    before = np.flatnonzero(np.diff(values >= 0.0))
+    if before.size < 2:
+        raise IdentificationError(f"signal: has {before.size} zero crossings, needs at least 2")
+    crossing_s = (before + values[before] / (values[before] - values[before + 1])) / rate_hz
+    largest = np.maximum.reduceat(np.abs(values), before + 1)[:-1]
+    return HalfPeriods(
+        time_s=0.5 * (crossing_s[1:] + crossing_s[:-1]),
+        frequency_hz=0.5 / np.diff(crossing_s),
+        magnitude=largest,
+    )

@@ -1,0 +1,167 @@
+"""Multisines: periodic signals with given amplitudes and random phases on chosen lines of the frequency grid.
+
+Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapter 5. The signal of a period of
+N samples is ``u(n) = sum_k A_k cos(2 pi k n / N + phi_k)`` with ``phi_k`` even over the circle; its RMS is ``sqrt(sum A_k^2
+/ 2)``. The converter's hold weakens line f by ``sinc(f / sample rate)``; the design does not make up for that.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+
+__all__ = ["Grid", "MultisineDesign"]
+
+Float = NDArray[np.float64]
+Grid = Literal["full", "odd"]
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class MultisineDesign:
+    """A multisine up to its phases.
+
+    Parameters
+    ----------
+    sample_rate_hz
+        Samples per second.
+    period_samples
+        Samples N of a period; lines lie ``sample_rate_hz / N`` apart.
+    lowest_hz, highest_hz
+        Band of the excited lines, both ends included.
+    grid
+        ``full`` excites every line of the band, ``odd`` the odd multiples of the resolution only.
+    rms
+        RMS of `realisation`, in the unit of whatever is played.
+    relative_amplitudes
+        Amplitudes of the excited lines against each other; None for a flat spectrum.
+
+    Raises
+    ------
+    IdentificationError
+        On a band without a line or at half the sample rate and above, and on numbers that are not usable.
+    """
+
+    sample_rate_hz: float
+    period_samples: int
+    lowest_hz: float
+    highest_hz: float
+    grid: Grid = "full"
+    rms: float = 1.0
+    relative_amplitudes: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("sample_rate_hz", "lowest_hz", "highest_hz"):
+            positive(name, getattr(self, name), "Hz")
+        positive("rms", self.rms)
+        if self.period_samples < 3:
+            raise IdentificationError(f"period_samples: is {self.period_samples}, needs at least 3")
+        if self.grid not in get_args(Grid):
+            raise IdentificationError(f"grid: is '{self.grid}', allowed are {', '.join(get_args(Grid))}")
+        if self.highest_hz < self.lowest_hz:
+            raise IdentificationError(f"highest_hz: is {self.highest_hz:g} Hz, needs lowest_hz = {self.lowest_hz:g} Hz")
+        if self.highest_hz >= 0.5 * self.sample_rate_hz:
+            raise IdentificationError(
+                f"highest_hz: is {self.highest_hz:g} Hz, must be below half the sample rate, "
+                f"{0.5 * self.sample_rate_hz:g} Hz"
+            )
+        if not self.lines.size:
+            raise IdentificationError(
+                f"lowest_hz, highest_hz: no line of the {self.grid} grid in {self.lowest_hz:g} to {self.highest_hz:g} Hz; "
+                f"lines are {self.resolution_hz:g} Hz apart"
+            )
+        if self.relative_amplitudes is not None:
+            self._check_amplitudes(self.relative_amplitudes)
+
+    def _check_amplitudes(self, relative: tuple[float, ...]) -> None:
+        object.__setattr__(self, "relative_amplitudes", tuple(relative))
+        values = finite_array("relative_amplitudes", relative, np.float64, 1)
+        if values.size != self.lines.size:
+            raise IdentificationError(f"relative_amplitudes: has {values.size} values for {self.lines.size} lines")
+        if np.any(values < 0.0) or not np.any(values):
+            raise IdentificationError(
+                f"relative_amplitudes: lowest is {values.min():g}, highest {values.max():g}; "
+                "needs none below zero, one above"
+            )
+
+    @classmethod
+    def with_resolution(
+        cls,
+        *,
+        sample_rate_hz: float,
+        resolution_hz: float,
+        lowest_hz: float,
+        highest_hz: float,
+        grid: Grid = "full",
+        rms: float = 1.0,
+    ) -> "MultisineDesign":
+        """A design by the distance of its lines; refused where a period is not a whole number of samples."""
+        samples = positive("sample_rate_hz", sample_rate_hz, "Hz") / positive("resolution_hz", resolution_hz, "Hz")
+        if abs(samples - round(samples)) > 1e-6:
+            raise IdentificationError(
+                f"resolution_hz: is {resolution_hz:g} Hz, a period has {samples:.4f} samples at {sample_rate_hz:g} Hz; "
+                f"needs a whole number, such as {sample_rate_hz / round(samples):.9g} Hz gives"
+            )
+        return cls(sample_rate_hz, round(samples), lowest_hz, highest_hz, grid, rms)
+
+    @property
+    def resolution_hz(self) -> float:
+        """Distance of neighbouring lines."""
+        return self.sample_rate_hz / self.period_samples
+
+    @property
+    def period_s(self) -> float:
+        """Length of a period."""
+        return self.period_samples / self.sample_rate_hz
+
+    @cached_property
+    def band_lines(self) -> NDArray[np.int64]:
+        """int[n]: every line of the band, excited or not, as a multiple of the resolution."""
+        first = int(np.ceil(self.lowest_hz / self.resolution_hz * (1.0 - _ROUNDING)))
+        last = int(np.floor(self.highest_hz / self.resolution_hz * (1.0 + _ROUNDING)))
+        return np.arange(first, last + 1)
+
+    @cached_property
+    def lines(self) -> NDArray[np.int64]:
+        """int[n_lines]: the excited lines, as multiples of the resolution."""
+        return self.band_lines[self.band_lines % 2 == 1] if self.grid == "odd" else self.band_lines
+
+    @property
+    def frequency_hz(self) -> Float:
+        """float[n_lines]: frequencies of the excited lines."""
+        return np.asarray(self.lines * self.resolution_hz)
+
+    @property
+    def amplitudes(self) -> Float:
+        """float[n_lines]: peak amplitude A_k of every excited line, in the unit of ``rms``."""
+        relative = np.ones(self.lines.size) if self.relative_amplitudes is None else np.array(self.relative_amplitudes)
+        return np.asarray(relative * self.rms * np.sqrt(2.0 / np.sum(relative**2)))
+
+    def realisation(self, seed: int, index: int) -> Float:
+        """float[period_samples]: one period with RMS ``rms``; the same for the same seed and index, always.
+
+        Realisations of one seed are independent of each other, and none depends on how many are drawn.
+        """
+        for name, value in (("seed", seed), ("index", index)):
+            if value < 0:
+                raise IdentificationError(f"{name}: is {value}, needs zero or more")
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
+        spectrum = np.zeros(self.period_samples // 2 + 1, dtype=np.complex128)
+        phases = random.uniform(0.0, 2.0 * np.pi, self.lines.size)
+        spectrum[self.lines] = 0.5 * self.period_samples * self.amplitudes * np.exp(1j * phases)
+        return np.fft.irfft(spectrum, self.period_samples)
+
+    def unit_peak(self, seed: int, index: int) -> Float:
+        """float[period_samples]: the same period scaled to a largest absolute value of one."""
+        signal = self.realisation(seed, index)
+        return np.asarray(signal / np.max(np.abs(signal)))
+
+    def crest_factor(self, seed: int, index: int) -> float:
+        """Largest absolute value over RMS: ``unit_peak`` times ``crest_factor * rms`` is ``realisation``."""
+        return float(np.max(np.abs(self.realisation(seed, index)))) / self.rms

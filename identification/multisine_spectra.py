@@ -1,0 +1,206 @@
+"""Spectra of multisine recordings period by period, and the frequency response with the voltage as instrument.
+
+Near resonance the structure makes most of the force, so that noise and harmonics in the force correlate with the response
+and ``H1 = S_yF / S_FF`` is biased. The voltage is known without noise and drives both: ``H = S_yV / S_FV`` is not
+(Pintelon and Schoukens, 2nd ed., section 2.6: instrumental variables). What differs from period to period is noise; what
+differs from realisation to realisation is noise and nonlinear distortion.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import Channel, find_role
+from identification.errors import IdentificationError
+from identification.multisine import MultisineDesign
+from identification.validation import finite_array
+
+__all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentResponse:
+    """Frequency response between two channels at the excited lines.
+
+    Parameters
+    ----------
+    frequency_hz
+        float[n_lines].
+    value
+        complex[n_lines], output over input, in the units of the channels.
+    noise_std
+        float[n_lines], standard deviation of ``value`` from noise: ``sqrt(E|value - E value|^2)``; NaN with one period.
+    total_std
+        float[n_lines], the same from the scatter over realisations, nonlinear distortion included; NaN with one
+        realisation.
+    unit
+        Unit of ``value``.
+    """
+
+    frequency_hz: Float
+    value: Complex
+    noise_std: Float
+    total_std: Float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicSpectra:
+    """Spectra of every channel in every settled period of every realisation.
+
+    Parameters
+    ----------
+    channels
+        Exactly one of role ``force``; the voltage is a channel of role ``monitor``.
+    frequency_hz
+        float[n_lines], every line of the band, excited or not.
+    excited
+        bool[n_lines], whether the design excites the line.
+    spectra
+        complex[n_realisations, n_periods, n_channels, n_lines], peak, in the unit of each channel: ``y = Re sum Y_k
+        exp(2 pi i f_k t)`` with t from the start of the period.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, or shapes that do not agree.
+    """
+
+    channels: tuple[Channel, ...]
+    frequency_hz: Float
+    excited: NDArray[np.bool_]
+    spectra: Complex
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        find_role(self.channels, "force")
+        object.__setattr__(self, "frequency_hz", finite_array("frequency_hz", self.frequency_hz, np.float64, 1))
+        object.__setattr__(self, "excited", finite_array("excited", self.excited, np.bool_, 1))
+        object.__setattr__(self, "spectra", finite_array("spectra", self.spectra, np.complex128, 4))
+        expected = (len(self.channels), self.frequency_hz.size)
+        if self.spectra.shape[2:] != expected or not self.spectra.size or self.excited.size != self.frequency_hz.size:
+            raise IdentificationError(
+                f"spectra: shape {self.spectra.shape} with {self.excited.size} values of excited, needs (realisations, "
+                f"periods, {expected[0]} channels, {expected[1]} lines)"
+            )
+
+    def index(self, name: str) -> int:
+        """Row of the channel called ``name``."""
+        for index, channel in enumerate(self.channels):
+            if channel.name == name:
+                return index
+        raise IdentificationError(f"no channel '{name}'; channels: {', '.join(c.name for c in self.channels)}")
+
+    @property
+    def mean(self) -> Complex:
+        """complex[n_realisations, n_channels, n_lines]: mean over periods."""
+        return np.asarray(self.spectra.mean(axis=1))
+
+    @property
+    def noise_variance(self) -> Float:
+        """float[n_realisations, n_channels, n_lines]: variance of one period about the mean; NaN with one period."""
+        periods = self.spectra.shape[1]
+        scatter = np.sum(np.abs(self.spectra - self.mean[:, None]) ** 2, axis=1)
+        return np.asarray(scatter / (periods - 1) if periods > 1 else np.full(scatter.shape, np.nan))
+
+    @property
+    def amplitude(self) -> Float:
+        """float[n_channels, n_lines]: root of the mean square, over realisations, of the mean's peak amplitude."""
+        return np.asarray(np.sqrt(np.mean(np.abs(self.mean) ** 2, axis=0)))
+
+    @property
+    def noise_std(self) -> Float:
+        """float[n_channels, n_lines]: standard deviation that noise leaves in the mean over periods of one realisation."""
+        return np.asarray(np.sqrt(self.noise_variance.mean(axis=0) / self.spectra.shape[1]))
+
+    def rms(self, name: str) -> float:
+        """RMS of a channel within the band, over all periods and realisations."""
+        power = np.abs(self.spectra[:, :, self.index(name)]) ** 2
+        return float(np.sqrt(0.5 * power.sum(axis=-1).mean()))
+
+    def frequency_response(
+        self, output: str, input: str | None = None, *, instrument: str = "voltage"
+    ) -> InstrumentResponse:
+        """Frequency response from ``input`` (the force if None) to ``output`` by ``S_yV / S_FV``.
+
+        The deviations are those of ``Y - H F`` to first order, so that noise common to both is counted rightly.
+        Raises `IdentificationError` where a channel is missing or the instrument does not move the input at a line.
+        """
+        force = self.index(input) if input is not None else find_role(self.channels, "force")
+        rows = [self.index(output), force, self.index(instrument)]
+        y, f, v = np.moveaxis(self.spectra[:, :, rows][..., self.excited], 2, 0)
+        reference = np.conj(v.mean(axis=1))
+        cross = np.sum(f.mean(axis=1) * reference, axis=0)
+        if np.any(cross == 0.0):
+            where = self.frequency_hz[self.excited][int(np.argmax(cross == 0.0))]
+            raise IdentificationError(f"instrument '{instrument}': gives no input at {where:g} Hz")
+        value = np.sum(y.mean(axis=1) * reference, axis=0) / cross
+        residual = (y - value * f) * reference[:, None]
+        realisations, periods = residual.shape[:2]
+        means = residual.mean(axis=1)
+        noise = np.sum(np.abs(residual - means[:, None]) ** 2, axis=(0, 1)) / (periods * max(periods - 1, 1))
+        total = np.sum(np.abs(means) ** 2, axis=0) * realisations / max(realisations - 1, 1)
+        unknown = np.full(value.size, np.nan)
+        return InstrumentResponse(
+            frequency_hz=self.frequency_hz[self.excited],
+            value=value,
+            noise_std=np.sqrt(noise) / np.abs(cross) if periods > 1 else unknown,
+            total_std=np.sqrt(total) / np.abs(cross) if realisations > 1 else unknown,
+            unit=f"{self.channels[rows[0]].unit}/{self.channels[force].unit}",
+        )
+
+
+def periodic_spectra(
+    records: Sequence[ArrayLike], channels: Sequence[Channel], design: MultisineDesign, *, transient_periods: int = 0
+) -> PeriodicSpectra:
+    """Spectra of a multisine recording.
+
+    Parameters
+    ----------
+    records
+        One per realisation, float[n_channels, n], SI, all of the same whole number of periods.
+    channels
+        The channels, one per row.
+    design
+        What was played.
+    transient_periods
+        Periods at the beginning of every record that had not settled and are left out.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, on records that are not whole periods, or of which nothing is left.
+    """
+    if not len(records):
+        raise IdentificationError("records: is empty, needs at least one realisation")
+    if transient_periods < 0:
+        raise IdentificationError(f"transient_periods: is {transient_periods}, needs zero or more")
+    size, spectra = design.period_samples, []
+    for number, record in enumerate(records):
+        data = finite_array(f"records[{number}]", record, np.float64, 2)
+        periods, left = divmod(data.shape[1], size)
+        if data.shape[0] != len(channels) or left:
+            raise IdentificationError(
+                f"records[{number}]: shape {data.shape}, needs {len(channels)} channels by whole periods of {size} samples"
+            )
+        if periods <= transient_periods:
+            raise IdentificationError(
+                f"records[{number}]: has {periods} periods, needs more than transient_periods = {transient_periods}"
+            )
+        kept = data.reshape(len(channels), periods, size)[:, transient_periods:]
+        lines = np.fft.rfft(kept, axis=-1)[..., design.band_lines] * (2.0 / size)
+        spectra.append(np.moveaxis(lines, 0, 1))
+    if len({spectrum.shape for spectrum in spectra}) > 1:
+        counts = ", ".join(str(spectrum.shape[0]) for spectrum in spectra)
+        raise IdentificationError(f"records: have {counts} settled periods, need the same number")
+    return PeriodicSpectra(
+        channels=tuple(channels),
+        frequency_hz=np.asarray(design.band_lines * design.resolution_hz, dtype=np.float64),
+        excited=np.isin(design.band_lines, design.lines),
+        spectra=np.array(spectra),
+    )

@@ -1,0 +1,150 @@
+"""What an uncontrolled sweep through resonance says: how far the force drops, how far it overshoots, how far it moves.
+
+A shaker that is driven with a constant voltage gives way to a resonant structure: the fundamental of the force falls to a
+few per cent and, where the sweep is fast, overshoots afterwards. Both are told as fractions of the force off resonance,
+which is not one number: the mass of the armature and the suspension make it rise or fall over the band. Which part of the
+sweep counts as off resonance is therefore part of the result.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER, find_role
+from identification.errors import IdentificationError
+from identification.transients import Transient
+
+__all__ = ["ForceDropOut", "force_drop_out"]
+
+Float = NDArray[np.float64]
+Band = tuple[float, float]
+
+_BEFORE = 0.15
+
+
+@dataclass(frozen=True)
+class ForceDropOut:
+    """Drop-out of the fundamental of the force in one sweep through one resonance; all amplitudes are peak values.
+
+    Parameters
+    ----------
+    off_resonance_n
+        Force off resonance: median over each of ``off_resonance_hz``, and the mean of these.
+    off_resonance_hz
+        Frequency bands that count as off resonance.
+    minimum_n, minimum_time_s, minimum_frequency_hz
+        Smallest force, and where.
+    overshoot_n, overshoot_time_s, overshoot_frequency_hz
+        Largest force after that, and where.
+    peak, peak_channel, peak_unit
+        Largest fundamental of the response channel in its unit; its name.
+    peak_m
+        The same as a displacement, m.
+    peak_time_s, peak_frequency_hz
+        Where.
+    window_periods
+        What the fundamentals were smoothed over: a wider window sees a shallower minimum in a fast sweep.
+    """
+
+    off_resonance_n: float
+    off_resonance_hz: tuple[Band, ...]
+    minimum_n: float
+    minimum_time_s: float
+    minimum_frequency_hz: float
+    overshoot_n: float
+    overshoot_time_s: float
+    overshoot_frequency_hz: float
+    peak: float
+    peak_m: float
+    peak_time_s: float
+    peak_frequency_hz: float
+    peak_channel: str
+    peak_unit: str
+    window_periods: int
+
+    @property
+    def minimum_ratio(self) -> float:
+        """Smallest force over the one off resonance."""
+        return self.minimum_n / self.off_resonance_n
+
+    @property
+    def overshoot_ratio(self) -> float:
+        """Largest force after the minimum over the one off resonance."""
+        return self.overshoot_n / self.off_resonance_n
+
+
+def force_drop_out(
+    sweep: Transient,
+    *,
+    response: str | None = None,
+    off_resonance_hz: Sequence[Band] | None = None,
+    resonance_hz: Band | None = None,
+) -> ForceDropOut:
+    """Drop-out of the force in a sweep.
+
+    Parameters
+    ----------
+    sweep
+        Fundamentals of the sweep.
+    response
+        Channel whose largest fundamental is looked for; the one of role ``drive`` if None.
+    off_resonance_hz
+        Bands of the momentary frequency that count as off resonance. If None: the first 15 % of the sweep's range, that
+        is before the resonance for a sweep upwards.
+    resonance_hz
+        Band in which minimum and peak are looked for; everything beyond the first and the last 15 % if None.
+
+    Raises
+    ------
+    IdentificationError
+        For a band without values, no such channel, a force that is zero off resonance.
+    """
+    frequency, force = sweep.frequency_hz, np.abs(sweep.force)
+    start, end = float(frequency[0]), float(frequency[-1])
+    edge = _BEFORE * (end - start)
+    bands = tuple(off_resonance_hz) if off_resonance_hz is not None else (_sorted(start, start + edge),)
+    searched = resonance_hz if resonance_hz is not None else _sorted(start + edge, end - edge)
+    off = float(np.mean([np.median(force[_within(frequency, band, "off_resonance_hz")]) for band in bands]))
+    if not off > 0.0:
+        raise IdentificationError(f"force: is {off:g} N off resonance, must be above zero")
+    near = np.flatnonzero(_within(frequency, searched, "resonance_hz"))
+    lowest = int(near[np.argmin(force[near])])
+    largest = lowest + int(np.argmax(force[lowest:]))
+    row = sweep.index(response) if response is not None else find_role(sweep.channels, "drive")
+    channel = sweep.channels[row]
+    amplitude = np.abs(sweep.fundamentals[row])
+    top = int(near[np.argmax(amplitude[near])])
+    peak = float(amplitude[top])
+    return ForceDropOut(
+        off_resonance_n=off,
+        off_resonance_hz=bands,
+        minimum_n=float(force[lowest]),
+        minimum_time_s=float(sweep.time_s[lowest]),
+        minimum_frequency_hz=float(frequency[lowest]),
+        overshoot_n=float(force[largest]),
+        overshoot_time_s=float(sweep.time_s[largest]),
+        overshoot_frequency_hz=float(frequency[largest]),
+        peak=peak,
+        peak_m=peak / float(2.0 * np.pi * frequency[top]) ** MOTION_ORDER[channel.motion],
+        peak_time_s=float(sweep.time_s[top]),
+        peak_frequency_hz=float(frequency[top]),
+        peak_channel=channel.name,
+        peak_unit=channel.unit,
+        window_periods=sweep.window_periods,
+    )
+
+
+def _sorted(one: float, other: float) -> Band:
+    return min(one, other), max(one, other)
+
+
+def _within(frequency: Float, band: Band, name: str) -> NDArray[np.bool_]:
+    """Which instants lie in ``band``; refuses one without any."""
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    if not inside.any():
+        raise IdentificationError(
+            f"{name}: is {band[0]:g} to {band[1]:g} Hz, the sweep covers {frequency.min():.4g} to {frequency.max():.4g} Hz"
+        )
+    return np.asarray(inside)

@@ -1,0 +1,198 @@
+"""Fundamentals of a transient over time, by complex demodulation with the phase of the oscillator itself.
+
+The signal is ``y(t) = Re sum_h Y_h(t) exp(i h theta(t))`` with coefficients that change slowly against the period. Times
+``2 exp(-i theta)`` the fundamental stands still and everything else turns at least once per period. A mean over whole
+periods of the phase takes that away: the static part and the harmonics vanish from it where their coefficients are
+constant, whatever the frequency does. The mean is taken twice, which squares what is left of them: the weight is a
+triangle, centred in phase, so that nothing is delayed. The bandwidth follows the frequency f: with means over P periods, a
+modulation at m Hz passes with ``sinc(P m / f)^2``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import Channel, find_role
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+
+__all__ = ["Transient", "demodulate"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_MIN_SAMPLES_PER_PERIOD = 8.0
+_POINTS_PER_PERIOD = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Transient:
+    """Fundamentals of every channel over time.
+
+    Parameters
+    ----------
+    channels
+        One per row of ``fundamentals``; exactly one of role ``force``. A voltage is a channel of role ``monitor``.
+    time_s
+        float[n], rising; from the first sample of the record on.
+    frequency_hz
+        float[n], momentary frequency of the oscillator: mean over the period around each instant.
+    fundamentals
+        complex[n_channels, n], peak, in the unit of each channel, against the phase of the oscillator.
+    window_periods
+        Length of the triangle that each value is a weighted mean over, in periods.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, shapes that do not agree, no single force channel, times that do not rise.
+    """
+
+    channels: tuple[Channel, ...]
+    time_s: Float
+    frequency_hz: Float
+    fundamentals: Complex
+    window_periods: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        find_role(self.channels, "force")
+        for name in ("time_s", "frequency_hz"):
+            object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, 1))
+        object.__setattr__(self, "fundamentals", finite_array("fundamentals", self.fundamentals, np.complex128, 2))
+        if self.frequency_hz.shape != self.time_s.shape:
+            raise IdentificationError(f"frequency_hz: {self.frequency_hz.size} values for {self.time_s.size} instants")
+        if self.fundamentals.shape != (len(self.channels), self.time_s.size):
+            raise IdentificationError(
+                f"fundamentals: shape {self.fundamentals.shape}, needs ({len(self.channels)}, {self.time_s.size})"
+            )
+        if not self.time_s.size or np.any(np.diff(self.time_s) <= 0.0):
+            raise IdentificationError(f"time_s: {self.time_s.size} instants, needs at least one, and rising ones")
+
+    def index(self, name: str) -> int:
+        """Row of the channel called ``name``."""
+        for index, channel in enumerate(self.channels):
+            if channel.name == name:
+                return index
+        raise IdentificationError(f"no channel '{name}'; channels: {', '.join(c.name for c in self.channels)}")
+
+    def fundamental(self, name: str) -> Complex:
+        """complex[n]: fundamental of the channel called ``name``, peak, in its unit."""
+        return np.asarray(self.fundamentals[self.index(name)])
+
+    @property
+    def force(self) -> Complex:
+        """complex[n]: fundamental of the force, peak, N."""
+        return np.asarray(self.fundamentals[find_role(self.channels, "force")])
+
+
+def demodulate(
+    theta_rad: ArrayLike,
+    samples: ArrayLike,
+    channels: Sequence[Channel],
+    *,
+    sample_rate_hz: float,
+    periods: int = 1,
+    every: int | None = None,
+) -> Transient:
+    """Fundamentals over time of a record whose oscillator's phase is known.
+
+    Parameters
+    ----------
+    theta_rad
+        float[n], phase of the oscillator at the instant that each sample was measured, rising; wrapped or not.
+    samples
+        float[n_channels, n], in the unit of each channel, SI.
+    channels
+        The channels, one per row of ``samples``; exactly one of role ``force``.
+    sample_rate_hz
+        Samples per second.
+    periods
+        Periods P that each of the two means is taken over. One shows fast changes best; more leave less noise, and fill
+        up a narrow minimum that is passed fast.
+    every
+        Spacing of the result in samples; about sixteen values per shortest period if None.
+
+    Returns
+    -------
+    Transient
+        Without the first P and the last P periods, where the window would not be whole.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, unequal lengths, a phase that falls, fewer than 8 samples per period, a record that is too short.
+    """
+    theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
+    data = finite_array("samples", samples, np.float64, 2)
+    rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
+    if data.shape != (len(channels), theta.size):
+        raise IdentificationError(
+            f"samples: shape {data.shape}, needs ({len(channels)}, {theta.size}): channels by samples of theta_rad"
+        )
+    if periods < 1:
+        raise IdentificationError(f"periods: is {periods}, needs at least 1")
+    shortest = 2.0 * np.pi / _largest_step(theta, periods)
+    stride = max(1, int(shortest / _POINTS_PER_PERIOD)) if every is None else every
+    if stride < 1:
+        raise IdentificationError(f"every: is {every}, needs at least 1")
+    reach = np.pi * periods
+    once = _whole_windows(theta, slice(0, theta.size), reach)
+    twice = _whole_windows(theta, once, reach)
+    at = np.arange(twice.start, twice.stop, stride)
+    return Transient(
+        channels=tuple(channels),
+        time_s=at / rate_hz,
+        frequency_hz=_momentary_frequency_hz(theta, at, rate_hz),
+        fundamentals=np.array([_fundamental(theta, row, once, at, reach) for row in data]),
+        window_periods=2 * periods,
+    )
+
+
+def _largest_step(theta: Float, periods: int) -> float:
+    """Largest advance of the phase from one sample to the next, rad; refuses phases that are of no use."""
+    steps = np.diff(theta)
+    if np.any(steps <= 0.0):
+        where = int(np.argmax(steps <= 0.0))
+        raise IdentificationError(f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time")
+    covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
+    needed = 2 * periods + 1
+    if covered < needed:
+        raise IdentificationError(f"theta_rad: covers {covered:.2f} periods, needs {needed} with periods = {periods}")
+    per_period = 2.0 * np.pi / float(steps.max())
+    if per_period < _MIN_SAMPLES_PER_PERIOD:
+        raise IdentificationError(
+            f"theta_rad: {per_period:.2f} samples in the shortest period, needs at least {_MIN_SAMPLES_PER_PERIOD:g}"
+        )
+    return float(steps.max())
+
+
+def _whole_windows(theta: Float, known: slice, reach: float) -> slice:
+    """The samples whose window, ``reach`` of phase to either side, lies within the samples ``known``."""
+    first = int(np.searchsorted(theta, theta[known.start] + reach))
+    end = int(np.searchsorted(theta, theta[known.stop - 1] - reach, side="right"))
+    return slice(first, end)
+
+
+def _fundamental(theta: Float, signal: Float, once: slice, at: NDArray[np.intp], reach: float) -> Complex:
+    """complex[len(at)]: fundamental of ``signal`` at the samples ``at``; ``once`` are those that the first mean reaches.
+
+    A mean is a difference of the antiderivative of an interpolating spline: windows end between samples, as seldom a
+    whole number of them makes a period.
+    """
+    from scipy.interpolate import CubicSpline  # a third of a second, for sweeps alone
+
+    integral = CubicSpline(theta, 2.0 * np.exp(-1j * theta) * signal).antiderivative()
+    mean = (integral(theta[once] + reach) - integral(theta[once] - reach)) / (2.0 * reach)
+    again = CubicSpline(theta[once], mean).antiderivative()
+    return np.asarray((again(theta[at] + reach) - again(theta[at] - reach)) / (2.0 * reach))
+
+
+def _momentary_frequency_hz(theta: Float, at: NDArray[np.intp], rate_hz: float) -> Float:
+    """float[len(at)]: mean frequency over the period around each sample; exact where the frequency rises evenly."""
+    half = np.pi / np.gradient(theta)[at]  # half a period, in samples
+    here = np.arange(theta.size)
+    advance = np.interp(at + half, here, theta) - np.interp(at - half, here, theta)
+    return np.asarray(advance / half * rate_hz / (4.0 * np.pi))

@@ -1,0 +1,37 @@
+"""The kinds of campaigns: for each its plan, how a point is measured, and what of a point is shown."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.backbone_points import BACKBONE_COLUMNS, measure_backbone_point
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import MULTISINE_COLUMNS, measure_multisine_point
+from rig.campaigns.plan import Column, Plan
+from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS, measure_stepped_sine_point
+from rig.campaigns.sweep import SweepPlan
+from rig.campaigns.sweep_points import SWEEP_COLUMNS, measure_sweep
+
+__all__ = ["KINDS", "Campaign"]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What makes a kind of campaign."""
+
+    plan: type[Plan]
+    """Model of its plans."""
+    measure: Callable[..., dict[str, Any]]
+    """``(bench, plan, target, rows, settling) -> point``: the result of a recorded point, with its own quality."""
+    columns: tuple[Column, ...]
+    """What is shown of a point."""
+
+
+KINDS = {
+    "backbone": Campaign(BackbonePlan, measure_backbone_point, BACKBONE_COLUMNS),
+    "stepped-sine": Campaign(SteppedSinePlan, measure_stepped_sine_point, STEPPED_SINE_COLUMNS),
+    "sweep": Campaign(SweepPlan, measure_sweep, SWEEP_COLUMNS),
+    "multisine": Campaign(MultisinePlan, measure_multisine_point, MULTISINE_COLUMNS),
+}

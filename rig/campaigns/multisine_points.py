@@ -1,0 +1,87 @@
+"""From the recorded rows of a multisine's realisation to its result, and from recordings to spectra in memory."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from identification import Channel, IdentificationError, PeriodicSpectra, periodic_spectra
+from rig.bench import Bench
+from rig.campaigns.evaluate import channels_of, head
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.plan import Column, Target
+
+__all__ = ["MULTISINE_COLUMNS", "VOLTAGE", "measure_multisine_point", "spectra_of"]
+
+MULTISINE_COLUMNS = (
+    Column("realisation", "realisation", "", ".0f"),
+    Column("force_rms_n", "force", "N RMS", ".4f", plain=True),
+    Column("drive_rms_m_s2", "drive", "m/s^2 RMS", ".4f", plain=True),
+    Column("voltage_peak_v", "peak", "V", ".3f"),
+    Column("change", "change over the periods", "%", ".3f", 100.0),
+)
+
+VOLTAGE = Channel("voltage", "monitor", "V")
+"""The output on the converter, as a channel beside the inputs."""
+
+
+def measure_multisine_point(
+    bench: Bench, plan: MultisinePlan, target: Target, rows: np.ndarray, settling: np.void
+) -> dict[str, Any]:
+    """The result of a recorded realisation, with its own quality."""
+    point = head(plan, target)
+    try:
+        spectra = spectra_of(bench, plan, {target.realisation or 0: rows})
+    except (IdentificationError, ArithmeticError) as error:
+        return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+    roles = {channel.role: channel.name for channel in bench.channels}
+    change = max(_change(spectra, roles[role]) for role in ("force", "drive")) if plan.periods > 1 else math.nan
+    reason = ""
+    if change > plan.accepted_change:
+        reason = (
+            f"force or drive of the first period differs by {100.0 * change:.1f} % from the others, accepted up to "
+            f"{100.0 * plan.accepted_change:g} %: more transient_periods, or less noise"
+        )
+    return {
+        **point,
+        "settled": not reason,
+        "accepted": not reason,
+        "reason": reason,
+        "force_rms_n": spectra.rms(roles["force"]),
+        "drive_rms_m_s2": spectra.rms(roles["drive"]),
+        "voltage_rms_v": spectra.rms(VOLTAGE.name),
+        "voltage_peak_v": float(np.abs(rows["output_v"]).max()),
+        "change": None if math.isnan(change) else change,
+        "periods": plan.periods,
+        "warnings": [] if plan.periods > 1 else ["one period only: neither noise nor a transient can be told"],
+    }
+
+
+def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
+    """Spectra of recorded rows, by the number of the realisation; every period is turned to begin where the signal does."""
+    design = plan.design(bench.sample_rate_hz)
+    size = design.period_samples
+    turned = []
+    for index, rows in records.items():
+        if rows.size < plan.periods * size:
+            raise IdentificationError(f"record: has {rows.size} samples, needs {plan.periods * size}")
+        rows = rows[: plan.periods * size]
+        begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
+        signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
+        periods = signals.reshape(signals.shape[0], plan.periods, size)
+        turned.append(np.roll(periods, begun, axis=2).reshape(signals.shape))
+    return periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
+
+
+def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:
+    """By how many samples the one period of ``output`` lies behind the beginning of the ``period`` it plays."""
+    match = np.fft.irfft(np.conj(np.fft.rfft(output)) * np.fft.rfft(period), period.size)
+    return int(np.argmax(match))
+
+
+def _change(spectra: PeriodicSpectra, name: str) -> float:
+    """Difference between the first period and the mean of the others, RMS over the band, relative."""
+    periods = spectra.spectra[0, :, spectra.index(name)]
+    others = periods[1:].mean(axis=0)
+    return float(np.linalg.norm(periods[0] - others) / np.linalg.norm(others))

@@ -1,0 +1,177 @@
+"""Equations of the harmonic balance of the coupled rig, their Jacobian, and Newton's method for them.
+
+Unknowns are the harmonics of the site coordinates, the angular frequency W and the voltage U of ``u = U cos(theta)``.
+With T the transfer of the linear part and F(Z) the site forces (alternating frequency-time), harmonic by harmonic
+``Z = T_zf F(Z) + T_zu U``. Two closing equations hold the level, force or voltage, and lag or frequency: the phase lag
+is itself a path parameter, along which folds of the frequency are passed without arc length.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.analysis.condensed import CondensedRig
+from simulators.analysis.errors import NotConvergedError
+from simulators.analysis.series import Series
+from simulators.analysis.site_forces import SiteForces
+from simulators.virtual_rig import VirtualRig
+
+__all__ = ["Balance", "Conditions", "Solution"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_TOLERANCE = 1e-9
+"""Largest residual, over the sizes of the contributions that balance."""
+_ITERATIONS = 20
+_HALVINGS = 4
+_LARGEST_FREQUENCY_STEP = 0.05
+"""Largest change of the frequency in one iteration, relative."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What closes the equations: a level of force or voltage, and a phase lag or a frequency."""
+
+    held: Literal["force", "voltage"]
+    """Peak of the fundamental stinger force (N), or amplitude of the voltage (V)."""
+    level: float
+    """Its value."""
+    at: Literal["lag", "frequency"]
+    """Lag ``arg F_1 - arg A_1`` of the drive-point acceleration behind the force (rad), or frequency (rad/s)."""
+    value: float
+    """Its value."""
+
+    def halfway_to(self, goal: "Conditions") -> "Conditions":
+        """Geometric mean of the levels, arithmetic of lag or frequency."""
+        middle = float(np.sqrt(self.level * goal.level))
+        return replace(self, level=middle, value=0.5 * (self.value + goal.value))
+
+    def __str__(self) -> str:
+        at = f"{np.degrees(self.value):g} deg" if self.at == "lag" else f"{self.value / (2.0 * np.pi):g} Hz"
+        return f"{self.held} {self.level:g} {'N' if self.held == 'force' else 'V'}, {self.at} {at}"
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A periodic vibration: unknowns and Jacobian there, and the conditions that it meets."""
+
+    unknowns: Real
+    jacobian: Real
+    conditions: Conditions
+
+    def tangent(self, level: float = 0.0, value: float = 0.0) -> Real:
+        """Change of the unknowns per relative change of the level, or per change of lag or frequency."""
+        change = np.zeros(self.unknowns.size)
+        change[-1] = level
+        change[-2] = value if self.conditions.at == "lag" else value / self.conditions.value
+        return np.asarray(np.linalg.solve(self.jacobian, change), dtype=np.float64)
+
+
+class Balance:
+    """Residual and Jacobian over ``y = [coefficients of every site coordinate, W, U]``."""
+
+    def __init__(self, rig: VirtualRig, harmonics: int, samples: int) -> None:
+        self.linear = CondensedRig(rig)
+        self.sites = SiteForces(rig)
+        self.series = Series(harmonics, samples)
+        self.n_site = self.linear.n_site
+
+    def coefficients(self, unknowns: Real) -> Real:
+        """Coefficients of the site coordinates [n_site, P]."""
+        return unknowns[:-2].reshape(self.n_site, self.series.size)
+
+    def responses(self, unknowns: Real) -> tuple[Complex, Complex, Real]:
+        """Site coordinates, force and drive displacement that the site forces cause [n_site + 2, H + 1].
+
+        Also their Jacobian [n_site + 2, H + 1, len(y)], and the sizes of the contributions that they are sums of
+        [n_site + 2].
+        """
+        series, n = self.series, self.n_site
+        omega, voltage = unknowns[-2], unknowns[-1]
+        transfer, by_omega = self.linear.transfer(omega, series.orders)
+        waves = self.sites(series, self.coefficients(unknowns))
+        inputs = np.zeros((n + 1, series.orders.size), np.complex128)
+        inputs[:n] = series.to_complex(waves.forces @ series.projection.T)
+        inputs[n, 1] = voltage
+        slopes = np.zeros((n + 1, series.orders.size, unknowns.size), np.complex128)
+        slopes[:n, :, :-2] = series.to_complex(waves.jacobian.reshape(n, series.size, n * series.size))
+        slopes[n, 1, -1] = 1.0
+        jacobian = np.transpose(transfer @ np.transpose(slopes, (1, 0, 2)), (1, 0, 2))
+        jacobian[:, :, -2] += np.einsum("hoi,ih->oh", by_omega, inputs)
+        response = np.einsum("hoi,ih->oh", transfer, inputs)
+        sizes = np.max(np.einsum("hoi,ih->oh", np.abs(transfer), np.abs(inputs)), axis=1, initial=0.0)
+        return response, jacobian, sizes
+
+    def residual(self, unknowns: Real, conditions: Conditions) -> tuple[Real, Real, Real]:
+        """Residual [len(y)], its Jacobian, and the size of each equation's terms."""
+        series, n = self.series, self.n_site
+        response, slopes, sizes = self.responses(unknowns)
+        value, jacobian = np.empty_like(unknowns), np.zeros((unknowns.size, unknowns.size))
+        value[:-2] = unknowns[:-2] - series.to_real(response[:n]).ravel()
+        jacobian[:-2] = -series.to_real(slopes[:n]).reshape(n * series.size, unknowns.size)
+        jacobian[:-2, :-2] += np.eye(unknowns.size - 2)
+        force, drive = response[n, 1], response[n + 1, 1]
+        by_force, by_drive = slopes[n, 1] / force, slopes[n + 1, 1] / drive
+        if conditions.at == "lag":
+            # The acceleration is minus W^2 times the displacement.
+            value[-2] = np.angle(-force / drive * np.exp(-1j * conditions.value))
+            jacobian[-2] = np.imag(by_force - by_drive)
+        else:
+            value[-2] = unknowns[-2] / conditions.value - 1.0
+            jacobian[-2, -2] = 1.0 / conditions.value
+        if conditions.held == "force":
+            value[-1] = np.log(abs(force) / conditions.level)
+            jacobian[-1] = np.real(by_force)
+        else:
+            value[-1] = unknowns[-1] / conditions.level - 1.0
+            jacobian[-1, -1] = 1.0 / conditions.level
+        scale = np.append(np.repeat(np.where(sizes[:n] > 0.0, sizes[:n], 1.0), series.size), [1.0, 1.0])
+        return value, jacobian, scale
+
+    def solve(self, start: Real, conditions: Conditions) -> Solution:
+        """Newton's method with steps halved until the residual falls; `NotConvergedError` where it does not arrive."""
+        y = start
+        value, jacobian, scale = self.residual(y, conditions)
+        for _ in range(_ITERATIONS):
+            size = _size(value / scale)
+            if size < _TOLERANCE:
+                return self._checked(Solution(y, jacobian, conditions))
+            columns = np.append(scale[:-2], y[-2:])
+            try:
+                step = columns * np.linalg.solve(jacobian * columns / scale[:, None], -value / scale)
+            except np.linalg.LinAlgError:
+                break
+            share = min(1.0, _LARGEST_FREQUENCY_STEP * y[-2] / max(abs(step[-2]), 1e-300))
+            for _ in range(_HALVINGS):
+                trial = self.residual(y + share * step, conditions)
+                if _size(trial[0] / scale) < size:
+                    break
+                share *= 0.5
+            y = y + share * step
+            value, jacobian, scale = trial
+            if not np.all(np.isfinite(value)):
+                break
+        raise NotConvergedError(f"no periodic vibration found at {conditions}")
+
+    def _checked(self, solution: Solution) -> Solution:
+        """Refuse the same vibration half a period later, and what is none."""
+        omega, voltage = solution.unknowns[-2:]
+        if omega > 0.0 and voltage > 0.0:
+            return solution
+        raise NotConvergedError(f"no periodic vibration with a positive voltage found at {solution.conditions}")
+
+    def linear_start(self, conditions: Conditions, omega_rad_s: float) -> Real:
+        """Vibration of the linear part alone at W, at the level asked for."""
+        transfer = self.linear.transfer(omega_rad_s, self.series.orders)[0][1, :, -1]
+        force = abs(transfer[self.n_site])
+        voltage = conditions.level if conditions.held == "voltage" else conditions.level / force
+        harmonics = np.zeros((self.n_site, self.series.orders.size), np.complex128)
+        harmonics[:, 1] = voltage * transfer[: self.n_site]
+        return np.append(self.series.to_real(harmonics).ravel(), [omega_rad_s, voltage])
+
+
+def _size(scaled: Real) -> float:
+    return float(np.max(np.abs(scaled)))

@@ -1,0 +1,99 @@
+"""Frequency responses of the linear rig: elements at their linear stiffness, joints stuck."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simulators.analysis.inputs import positive
+from simulators.plant.assembly import LinearPlant
+from simulators.plant.discretise import phi_matrices
+from simulators.virtual_rig import VirtualRig
+
+__all__ = ["FrequencyResponses", "frequency_response"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FrequencyResponses:
+    """Frequency responses of a rig, ``Y = H U`` for ``exp(i w t)``; of what sensors are exposed to, not of their signals."""
+
+    frequency_hz: Real
+    """Frequencies [n]."""
+    held: bool
+    """False: the plant itself, in continuous time. True: the voltage held between samples, outputs read at the samples."""
+    force_n_per_v: Complex
+    """Stinger force per voltage [n]."""
+    sensor_per_v: dict[str, Complex]
+    """What each sensor is exposed to per voltage, by channel name [n], N/V or m/s^2/V."""
+    displacement_m_per_v: dict[str, Complex]
+    """Displacement of each named point per voltage [n]."""
+    receptance_m_per_n: dict[str, Complex]
+    """Displacement of each named point per force at the drive point, structure alone, continuous time [n].
+
+    In continuous time the ratio of displacement to stinger force in the coupled rig is the same.
+    """
+
+    @property
+    def accelerance_per_kg(self) -> dict[str, Complex]:
+        """Acceleration of each named point per force at the drive point, structure alone [n] (m/s^2/N = 1/kg)."""
+        omega = 2.0 * np.pi * self.frequency_hz
+        return {at: -(omega**2) * receptance for at, receptance in self.receptance_m_per_n.items()}
+
+
+def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool = False) -> FrequencyResponses:
+    """Linear frequency responses at the given frequencies [n].
+
+    With ``held`` as the converter has it: every image of the held voltage above half the sample rate that a sampled
+    output folds back is in it. Near a lightly damped resonance the force is so small that these images tell.
+
+    Raises
+    ------
+    ValueError
+        On frequencies that are not above 0, or, held, not below half the sample rate.
+    """
+    frequencies = positive("frequencies_hz", frequencies_hz)
+    plant, points, rate_hz = rig.plant, rig.structure.points, rig.converter.sample_rate_hz
+    if held and np.max(frequencies) >= 0.5 * rate_hz:
+        raise ValueError(
+            f"frequencies_hz = {np.max(frequencies):g}: allowed is below {0.5 * rate_hz:g}, half the sample rate"
+        )
+    s = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
+    states = _held_states(plant, s, 1.0 / rate_hz) if held else _states(plant.dynamics, plant.voltage_column, s)
+    n = plant.dynamics.shape[0]
+    shapes = {at: rig.shape(at) for at in points}
+
+    def output(row: Real) -> Complex:
+        return np.asarray(states @ row[:n] + row[n])
+
+    return FrequencyResponses(
+        frequency_hz=frequencies,
+        held=held,
+        force_n_per_v=output(plant.force_row()),
+        sensor_per_v={sensor.name: output(rig.output_row(sensor)) for sensor in rig.sensors},
+        displacement_m_per_v={at: output(plant.displacement_row(shape)) for at, shape in shapes.items()},
+        receptance_m_per_n=_receptances(plant, shapes, s),
+    )
+
+
+def _states(transition: Real, column: Real, z: Complex) -> Complex:
+    """``(z - A)^-1 b`` for every z [n_frequency, n]."""
+    left = z[:, None, None] * np.eye(column.size) - transition
+    return np.asarray(np.linalg.solve(left, np.broadcast_to(column[:, None], (z.size, column.size, 1)))[..., 0])
+
+
+def _held_states(plant: LinearPlant, s: Complex, step_s: float) -> Complex:
+    """``(e^{sT} - e^{AT})^-1 Gamma``: the state at the samples under a voltage held in between [n_frequency, n]."""
+    phi = phi_matrices(plant.dynamics, plant.voltage_column[:, None], step_s)
+    return _states(phi.transition, phi.held[:, 0], np.exp(s * step_s))
+
+
+def _receptances(plant: LinearPlant, shapes: dict[str, Real], s: Complex) -> dict[str, Complex]:
+    """``phi_p (s^2 + s C + K)^-1 phi_d`` of every point p."""
+    m = plant.n_mode
+    left = s[:, None, None] * np.diag(plant.modal_damping) + plant.modal_stiffness + (s**2)[:, None, None] * np.eye(m)
+    drive = np.broadcast_to(plant.drive_shape[:, None], (s.size, m, 1))
+    modal = np.linalg.solve(left, drive)[..., 0]
+    return {at: np.asarray(modal @ shape) for at, shape in shapes.items()}

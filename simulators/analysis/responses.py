@@ -1,0 +1,85 @@
+"""Periodic vibrations of a coupled rig as data: arrays with one entry per point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["HysteresisLoop", "PeriodicResponses"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PeriodicResponses:
+    """Periodic vibrations under ``u = U cos(theta)``; every harmonic Y_h is that of ``y = Re sum_h Y_h exp(i h theta)``.
+
+    All values are the true ones of the rig in continuous time: without sensors' high-pass, noise, and the hold of the
+    converter (which costs the fundamental of the voltage ``sin(x)/x, x = pi f / sample_rate``).
+    """
+
+    frequency_hz: Real
+    """Frequency of the vibration [n]."""
+    voltage_v: Real
+    """Amplitude U [n] of the voltage."""
+    force_n: Real
+    """Peak of the fundamental of the stinger force [n]."""
+    amplitude_m: Real
+    """Peak of the fundamental of the drive point's displacement [n]."""
+    phase_lag_deg: Real
+    """Lag ``arg F_1 - arg A_1`` of the drive point's acceleration behind the force [n], -180 to 180; -90 is resonance."""
+    modal_frequency_hz: Real
+    """Modal frequency w of the one-mode equation ``(w^2 - W^2 + 2 i W w z) q = phi_d F`` [n], as identification has it."""
+    modal_amplitude: Real
+    """q = ``|X_d1| / phi_d`` [n] (kg^1/2 m), phi_d of the followed linear mode at the drive point."""
+    damping_ratio: Real
+    """Active power of the fundamental ``P_1 = 1/2 Re(F_1 conj(i W X_d1))`` as ``P_1 / (W^2 w q^2)`` [n]."""
+    damping_ratio_total_power: Real
+    """The same with the active power of all harmonics [n]."""
+    force_harmonics_n: Complex
+    """Stinger force [n, H + 1]."""
+    drive_harmonics_m: Complex
+    """Displacement of the drive point [n, H + 1]."""
+    sensor_harmonics: dict[str, Complex]
+    """What each sensor is exposed to, by channel name [n, H + 1], N or m/s^2."""
+    point_harmonics_m: dict[str, Complex]
+    """Displacement of each named point of the structure [n, H + 1]."""
+    site_harmonics: Complex
+    """Coordinate of each nonlinear site [n, n_site, H + 1], in the order of ``rig.plant.site_rows``."""
+    site_force_harmonics: Complex
+    """Force of each nonlinear site [n, n_site, H + 1], minus the linear part that the linear plant holds."""
+    neglected_share: Real
+    """What was left out [n]: RMS of the force harmonics H + 1 to 2 H + 1 that the motion causes, over the fundamental."""
+    flags: NDArray[np.int64]
+    """`simulators.layout.Flag` bits [n]: site out of its range, sensor or output clipped (neither clips here)."""
+    stable: NDArray[np.bool_] | None = None
+    """Under constant force and frequency, by the folds of the curve [n]; None where it was not looked at."""
+
+    @property
+    def frequency_shift(self) -> float:
+        """Modal frequency at the largest amplitude over that at the smallest, minus one."""
+        smallest, largest = int(np.argmin(self.amplitude_m)), int(np.argmax(self.amplitude_m))
+        return float(self.modal_frequency_hz[largest] / self.modal_frequency_hz[smallest] - 1.0)
+
+    def force_harmonic_ratio(self, harmonic: int) -> Real:
+        """``|F_h / F_1|`` [n]; `ValueError` beyond the harmonics there are."""
+        highest = self.force_harmonics_n.shape[1] - 1
+        if not 0 <= harmonic <= highest:
+            raise ValueError(f"harmonic = {harmonic}: allowed is 0 to {highest}")
+        return np.asarray(np.abs(self.force_harmonics_n[:, harmonic] / self.force_harmonics_n[:, 1]))
+
+
+@dataclass(frozen=True, eq=False)
+class HysteresisLoop:
+    """Restoring force of one friction joint over its coordinate, one closed period."""
+
+    coordinate: Real
+    """Coordinate of the joint [N + 1]: m, or modal (kg^1/2 m) where the joint is relative to mode 1."""
+    force: Real
+    """Sum of the forces of its elements [N + 1], linear part included: N, or the force that belongs to the coordinate."""
+
+    @property
+    def dissipated_j(self) -> float:
+        """Energy lost per period (J): the area of the loop."""
+        return float(np.sum(0.5 * (self.force[1:] + self.force[:-1]) * np.diff(self.coordinate)))

@@ -1,0 +1,107 @@
+"""What every beam that is made from its geometry has: material, section, named points, attachments, damping."""
+
+from abc import abstractmethod
+from typing import Annotated, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from simulators.attachments import LumpedMass, Support
+from simulators.beam import Lump, Quantity, Spring
+from simulators.part import Part, Positive, Several
+
+__all__ = ["MeshedBeam"]
+
+Matrix = NDArray[np.float64]
+
+
+class Modes(Protocol):
+    """Mass-normalised modes that can be read anywhere along a beam."""
+
+    @property
+    def omega_rad_s(self) -> Matrix:
+        """Angular natural frequencies [n_mode]."""
+
+    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
+        """Mode shapes [n_mode] at a position."""
+
+
+class MeshedBeam(Part):
+    """A beam of rectangular section; subclasses say what it is made of and compute its `modes`."""
+
+    length_m: Positive
+    """Length; positions count from 0, the clamped end where there is one."""
+    width_m: Positive
+    """Width of the rectangular section."""
+    thickness_m: Positive
+    """Thickness of the section, in the direction of vibration."""
+    youngs_modulus_pa: Positive
+    """Young's modulus."""
+    density_kg_m3: Positive
+    """Density."""
+    damping_ratio: Annotated[Several[Annotated[float, Field(ge=0.0, lt=1.0)]], Field(min_length=1)]
+    """Viscous modal damping ratios, lowest mode first; their number is the number of modes kept."""
+    frequency_hz: Several[Positive] | None = None
+    """Measured frequencies that replace the computed ones, one per mode kept; the shapes stay as computed."""
+    points_m: dict[str, float]
+    """Named positions along the beam, which sensors, magnets, joints and the stinger refer to."""
+    lumped_masses: Several[LumpedMass] = ()
+    """Masses on the beam, part of its modes."""
+    supports: Several[Support] = ()
+    """Springs between points of the beam and the ground."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> "MeshedBeam":
+        for name, position_m in self.points_m.items():
+            if not 0.0 <= position_m <= self.length_m:
+                raise ValueError(f"points_m.{name} = {position_m!r}: allowed is 0 to length_m = {self.length_m!r}")
+        attached = {f"lumped_masses[{index}]": lumped.at for index, lumped in enumerate(self.lumped_masses)}
+        attached |= {f"supports[{index}]": support.at for index, support in enumerate(self.supports)}
+        for path, at in attached.items():
+            if at not in self.points_m:
+                allowed = ", ".join(self.points_m) or "(no points are named)"
+                raise ValueError(f"{path}.at = {at!r}: allowed is one of {allowed}")
+        n_mode, most = len(self.damping_ratio), self._most_modes()
+        if n_mode > most:
+            raise ValueError(f"damping_ratio: has {n_mode} modes, allowed is 1 to {most}")
+        if self.frequency_hz is not None and len(self.frequency_hz) != n_mode:
+            raise ValueError(
+                f"frequency_hz: has {len(self.frequency_hz)} values, allowed is {n_mode}, one per damping_ratio"
+            )
+        return self
+
+    @property
+    @abstractmethod
+    def modes(self) -> Modes:
+        """Mass-normalised modes from the geometry, with computed frequencies."""
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names that a shape may be asked for at."""
+        return tuple(self.points_m)
+
+    @property
+    def lumps(self) -> list[Lump]:
+        """Lumped masses with their positions."""
+        return [Lump(self.points_m[one.at], one.mass_kg, one.inertia_kg_m2) for one in self.lumped_masses]
+
+    @property
+    def springs(self) -> list[Spring]:
+        """Supports with their positions."""
+        return [
+            Spring(self.points_m[one.at], one.stiffness_n_m, one.rotational_stiffness_n_m_rad) for one in self.supports
+        ]
+
+    @property
+    def omega_rad_s(self) -> Matrix:
+        """Angular natural frequencies [n_mode]: the measured ones where they are given."""
+        return self.modes.omega_rad_s if self.frequency_hz is None else 2.0 * np.pi * np.array(self.frequency_hz)
+
+    def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
+        """Mode shapes [n_mode] at a named point."""
+        return self.modes.shape(self.points_m[at], quantity)
+
+    @abstractmethod
+    def _most_modes(self) -> int:
+        """Largest number of modes that the mesh has."""

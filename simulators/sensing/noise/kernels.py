@@ -1,0 +1,97 @@
+"""Compiled normal random numbers by counter: a function of key and sample index alone.
+
+A run therefore gives the same samples however it is cut into blocks, and one channel knows nothing of another. The
+numbers come from a ziggurat of 256 layers (Marsaglia & Tsang 2000, with 53 bits that do not serve as layer number too,
+as Doornik 2005 asks for): exact, and 99 % of them cost one hash, one table look-up and one comparison.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrolock.compiled import inner_kernel, kernel
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX_2 = np.uint64(0x94D049BB133111EB)
+_30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+_LAYER = np.uint64(255)
+
+LAYERS = 256
+TAIL = 3.6541528853610088
+"""Where the tail begins: with it, all layers have the same area and the last one ends at the top of the density."""
+
+
+def _edges() -> NDArray[np.float64]:
+    """Right edges of the layers [LAYERS + 1], the base first, for the density ``exp(-x^2 / 2)``."""
+    area = TAIL * math.exp(-0.5 * TAIL**2) + math.sqrt(0.5 * math.pi) * math.erfc(TAIL / math.sqrt(2.0))
+    edges = np.zeros(LAYERS + 1)
+    edges[0] = area * math.exp(0.5 * TAIL**2)  # a rectangle with the area of the base and its tail
+    edges[1] = TAIL
+    for layer in range(1, LAYERS - 1):
+        edges[layer + 1] = math.sqrt(-2.0 * math.log(area / edges[layer] + math.exp(-0.5 * edges[layer] ** 2)))
+    return edges
+
+
+EDGES = _edges()
+HEIGHTS = np.exp(-0.5 * EDGES**2)
+"""Density at the edges; the heights between which a layer lies."""
+
+
+@kernel
+def mix(value: np.uint64) -> np.uint64:
+    """A well-mixed 64-bit hash: the output function of SplitMix64 (Steele, Lea & Flood 2014)."""
+    value = (value ^ (value >> _30)) * _MIX_1
+    value = (value ^ (value >> _27)) * _MIX_2
+    return value ^ (value >> _31)
+
+
+@kernel
+def unit(bits: np.uint64) -> float:
+    """A number within (0, 1) from the upper 53 bits."""
+    return float((float(bits >> _11) + 0.5) * 2.0**-53)
+
+
+@kernel
+def rejected(bits: np.uint64, layer: np.int64, x: float) -> tuple[float, np.uint64, bool]:
+    """What becomes of a number beyond the part of its layer that lies wholly under the density.
+
+    Returns the number, the last bits used, and whether it is to be taken: in the tail by Marsaglia's exponential method,
+    elsewhere where a height drawn within the layer is under the density.
+    """
+    bits = mix(bits + _GOLDEN)
+    if layer > 0:
+        height = HEIGHTS[layer] + unit(bits) * (HEIGHTS[layer + 1] - HEIGHTS[layer])
+        return x, bits, height < math.exp(-0.5 * x * x)
+    while True:
+        beyond = -math.log(unit(bits)) / TAIL
+        bits = mix(bits + _GOLDEN)
+        if -2.0 * math.log(unit(bits)) > beyond * beyond:
+            return (TAIL + beyond if x > 0.0 else -TAIL - beyond), bits, True
+        bits = mix(bits + _GOLDEN)
+
+
+@kernel
+def normal_beyond(bits: np.uint64, layer: np.int64, x: float) -> float:
+    """The number that comes of a first one which `rejected` has to judge."""
+    while True:
+        x, bits, taken = rejected(bits, layer, x)
+        if taken:
+            return float(x)
+        bits = mix(bits + _GOLDEN)
+        layer = np.int64(bits & _LAYER)
+        x = float(np.int64(bits) >> 11) * 2.0**-52 * EDGES[layer]
+        if abs(x) < EDGES[layer + 1]:
+            return float(x)
+
+
+@inner_kernel
+def normal(key: np.uint64, sample: int) -> float:
+    """A standard normal number for a key and a sample index."""
+    bits = mix(key + np.uint64(sample) * _GOLDEN)
+    layer = np.int64(bits & _LAYER)
+    x = float(np.int64(bits) >> 11) * 2.0**-52 * EDGES[layer]
+    if abs(x) < EDGES[layer + 1]:
+        return float(x)
+    return normal_beyond(bits, layer, x)

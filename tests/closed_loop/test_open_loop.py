@@ -1,0 +1,247 @@
+"""Excitation without feedback, through the same tick: what goes out, and what comes back against harmonic balance."""
+
+import numpy as np
+import pytest
+
+import rig
+from rig.campaigns.execution import Silent
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.sweep import SweepPlan
+from rig.errors import ConfigurationError
+from rig.measurements import point_rows
+from rig.summary import summarise_recording as show
+from simulators.virtual_rig import VirtualRig
+from tests.reference.harmonic_balance import response_to_voltage
+from tests.reference.parameters import ONE_SIDED
+from tests.rig.rigs import bench_with
+
+QUIET = {"noise_scale": 0.0, "converter": {"adc_bits": 0, "dac_bits": 0}}
+
+
+def _plan(**changes):
+    return SteppedSinePlan.model_validate({"bench": "magnet-beam", "levels_v": (1.0,), **changes})
+
+
+@pytest.fixture(scope="module")
+def stepped():
+    plan = _plan(frequencies_hz=(22.0, 24.0, 26.0), levels_v=(0.3, 1.5))
+    with rig.run(plan, bench=bench_with(**QUIET)) as run:
+        yield run
+
+
+def test_stepped_sines_find_what_harmonic_balance_finds(stepped):
+    assert stepped.complete
+    for point in stepped.recording.points:
+        truth = response_to_voltage(ONE_SIDED, [0.1, point["level"]], point["frequency_hz"])[-1]
+        assert point["frequency_hz"] == pytest.approx(point["asked_frequency_hz"], rel=1e-6)
+        assert point["force_n"] == pytest.approx(truth.force_amplitude_n, rel=1e-3)
+        assert point["phase_lag_deg"] - 180.0 == pytest.approx(truth.lag_deg, abs=0.1)  # displacement, acceleration
+
+
+def test_stepped_sines_are_handed_out_as_one_frequency_response_per_level(stepped):
+    responses = stepped.frequency_responses()
+    assert [response.level for response in responses] == [0.3, 1.5]
+    for response in responses:
+        points = [point for point in stepped.recording.points if point["level"] == response.level]
+        np.testing.assert_allclose(response.force_n, [point["force_n"] for point in points])
+        np.testing.assert_allclose(response.amplitude_m, [point["amplitude_m"] for point in points])
+        np.testing.assert_allclose(response.phase_lag_deg, [point["phase_lag_deg"] for point in points], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({}, "exactly one"),
+        ({"frequencies_hz": (24.0,), "start_hz": 22.0, "stop_hz": 25.0}, "exactly one"),
+        ({"start_hz": 22.0}, "exactly one"),
+        ({"frequencies_hz": (24.0, -1.0)}, r"frequencies_hz\[1\] = -1"),
+        ({"frequencies_hz": ()}, "at least one"),
+        ({"frequencies_hz": (24.0,), "levels_v": ()}, "levels_v"),
+    ],
+)
+def test_a_stepped_sine_plan_that_makes_no_sense_is_refused(changes, fault):
+    with pytest.raises(ValueError, match=fault):
+        _plan(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"frequencies_hz": (24.0, 3000.0)}, "highest frequency = 3000 Hz"),
+        ({"frequencies_hz": (24.0, 0.1)}, "lowest frequency = 0.1 Hz"),
+        ({"frequencies_hz": (24.0,), "levels_v": (1.0, 50.0)}, r"levels_v\[1\] = 50 V"),
+        ({"frequencies_hz": (24.0,), "levels_v": (0.0,)}, r"levels_v\[0\] = 0 V"),
+    ],
+)
+def test_what_the_bench_cannot_do_is_refused_before_anything_moves(changes, fault):
+    with pytest.raises(ConfigurationError, match=fault):
+        rig.run(_plan(**changes))
+
+
+def _sweep(**changes):
+    table = {"bench": "magnet-beam", "levels_v": (0.2,), "start_hz": 22.0, "stop_hz": 27.0, "rate_hz_per_s": 5.0}
+    return SweepPlan.model_validate(table | changes)
+
+
+def _swept_phase(plan):
+    with rig.run(plan, bench=bench_with(**QUIET)) as run:
+        assert run.complete
+        rows = point_rows(run.recording, 0)
+    theta = np.unwrap(rows["theta_rad"].astype(float))
+    return np.arange(theta.size) / 5000.0, theta - theta[0], rows
+
+
+@pytest.mark.parametrize(("start_hz", "stop_hz"), [(22.0, 27.0), (27.0, 22.0)])
+def test_a_linear_sweep_has_the_phase_of_a_chirp(start_hz, stop_hz):
+    t, theta, rows = _swept_phase(_sweep(start_hz=start_hz, stop_hz=stop_hz))
+    assert t[-1] == pytest.approx(1.0, abs=2e-3)
+    way = 5.0 if stop_hz > start_hz else -5.0
+    before = int(np.argmax(rows["frequency_hz"] != np.float32(start_hz)))  # what was sent out before still shows first
+    t = t - (before + 0.5) / 5000.0  # a row has the phase of the middle of the interval before its instant
+    lead = theta[before]
+    np.testing.assert_allclose(
+        theta[before:] - lead, 2.0 * np.pi * (start_hz * (t - t[before]) + 0.5 * way * t**2)[before:], atol=1e-4
+    )
+    held = rows["theta_rad"] + np.pi * rows["frequency_hz"] / 5000.0  # the recorded phase is that of the hold's middle
+    np.testing.assert_allclose(rows["output_v"], 0.2 * np.cos(held.astype(float)), atol=1e-6)
+
+
+def test_a_logarithmic_sweep_takes_its_time_by_the_octave():
+    plan = _sweep(start_hz=20.5, stop_hz=29.0, rate_hz_per_s=None, rate_octaves_per_min=30.0)
+    t, _, rows = _swept_phase(plan)
+    assert t[-1] == pytest.approx(plan.duration_s, abs=2e-3) == pytest.approx(np.log2(29.0 / 20.5) * 2.0, abs=2e-3)
+    middle = t.size // 2
+    assert rows["frequency_hz"][middle] == pytest.approx(np.sqrt(20.5 * 29.0), rel=2e-4)
+
+
+def test_every_sweep_of_a_plan_begins_from_rest_at_its_first_frequency():
+    plan = _sweep(levels_v=(0.1, 0.3), hold_periods=5)
+    with rig.run(plan, bench=bench_with(**QUIET)) as run:
+        assert run.complete
+        first, second = point_rows(run.recording, 0), point_rows(run.recording, 1)
+        transients = run.sweeps()
+    assert first["frequency_hz"][0] == second["frequency_hz"][0] == pytest.approx(22.0)
+    assert np.abs(second["command_v"]).max() == pytest.approx(0.3)
+    assert set(transients) == {0, 1}
+
+
+MULTISINE = MultisinePlan(
+    bench="magnet-beam",
+    levels_rms_v=(0.05,),
+    lowest_hz=21.0,
+    highest_hz=29.0,
+    resolution_hz=0.5,
+    realisations=2,
+    periods=2,
+    transient_periods=3,
+)
+
+
+@pytest.fixture(scope="module")
+def multisine():
+    with rig.run(MULTISINE, bench=bench_with(**QUIET)) as run:
+        yield run
+
+
+def test_a_multisine_is_put_out_as_it_was_designed(multisine):
+    assert multisine.complete
+    design = MULTISINE.design(5000.0)
+    for point in multisine.recording.points:
+        rows = point_rows(multisine.recording, point["number"])
+        turns = rows["theta_rad"].astype(float) / (2.0 * np.pi)  # the recorded phase is that of the hold's middle
+        played = np.round(turns * design.period_samples + 0.5).astype(int)
+        wanted = 0.05 * design.realisation(0, point["realisation"])[played % design.period_samples]
+        np.testing.assert_allclose(rows["output_v"], wanted, atol=1e-6)
+        assert point["voltage_rms_v"] == pytest.approx(0.05, rel=1e-4)
+        phases = np.angle(np.fft.rfft(design.realisation(0, point["realisation"]))[design.lines])
+        spectra = multisine.spectra()[0.05]
+        recorded = spectra.mean[point["realisation"], spectra.index("voltage")][spectra.excited]
+        np.testing.assert_allclose(np.angle(recorded * np.exp(-1j * phases)), 0.0, atol=1e-4)
+
+
+def test_a_multisine_at_low_level_measures_the_linear_response_of_the_structure(multisine):
+    spectra = multisine.spectra()[0.05]
+    response = spectra.frequency_response("drive")
+    modes = VirtualRig.shipped("magnet-beam").linear_modes
+    omega = 2.0 * np.pi * response.frequency_hz[:, None]
+    own, damping = 2.0 * np.pi * modes.frequency_hz, modes.damping_ratio
+    linear = (-(omega**2) * modes.drive_shape**2 / (own**2 - omega**2 + 2j * damping * own * omega)).sum(axis=1)
+    np.testing.assert_allclose(response.value, linear, rtol=0.02)
+
+
+def test_a_multisine_that_is_not_settled_is_not_accepted():
+    changes = {"transient_periods": 0, "realisations": 1, "ramp_s": 0.02, "accepted_change": 1e-4}
+    hasty = MULTISINE.model_copy(update=changes)
+    with rig.run(hasty, bench=bench_with(**QUIET)) as run:
+        point = run.recording.points[0]
+    assert not run.complete
+    assert not point["accepted"]
+    assert "transient_periods" in point["reason"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"resolution_hz": 0.3}, "resolution_hz"),
+        ({"highest_hz": 4000.0}, "highest_hz = 4000"),
+        ({"levels_rms_v": (3.0,)}, r"levels_rms_v\[0\] = 3 V: peaks reach"),
+        ({"lowest_hz": 25.1, "highest_hz": 25.2}, "no line"),
+    ],
+)
+def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
+    with pytest.raises(ConfigurationError, match=fault):
+        rig.run(MULTISINE.model_copy(update=changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"rate_octaves_per_min": 1.0}, "exactly one"),
+        ({"rate_hz_per_s": None}, "exactly one"),
+        ({"stop_hz": 22.0}, "anything but start_hz"),
+        ({"rate_hz_per_s": -1.0}, "rate_hz_per_s"),
+    ],
+)
+def test_a_sweep_that_makes_no_sense_is_refused(changes, fault):
+    with pytest.raises(ValueError, match=fault):
+        _sweep(**changes)
+
+
+class StopAfterOne(Silent):
+    """Asks for a stop as soon as the first point is done."""
+
+    def __init__(self):
+        self.done = 0
+
+    def point(self, point, number, total):
+        self.done = number
+
+    def advance(self, rows, tick):
+        if self.done == 1:
+            tick.request_stop()
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        _plan(frequencies_hz=(22.0, 23.0, 24.0)),
+        _sweep(levels_v=(0.1, 0.2), hold_periods=5, rate_hz_per_s=1.0),
+        MULTISINE.model_copy(update={"transient_periods": 1}),
+    ],
+    ids=lambda plan: plan.kind,
+)
+def test_an_interrupted_open_loop_test_is_ramped_down_and_resumed(plan, tmp_path):
+    output = tmp_path / "out.h5"
+    with rig.run(plan, output=output, progress=StopAfterOne()) as run:
+        assert not run.complete
+        assert sum(point["accepted"] for point in run.recording.points) == 1
+        part = run.recording.parts[0]
+        assert part.rows("output_v")[-1] == 0.0
+        assert np.abs(np.diff(np.abs(part.rows("command_v")))).max() < 0.03
+    with rig.resume(output) as run:
+        assert run.complete
+        numbers = {point["number"] for point in run.recording.points if point["accepted"]}
+        assert numbers == {target.number for target in plan.targets()}
+        assert len(run.recording.parts) == 2
+        assert show(run.recording)["complete"]

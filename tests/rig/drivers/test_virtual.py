@@ -1,0 +1,81 @@
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rig
+from identification import nonlinear_mode
+from rig.bench import Bench
+from rig.drivers import make_daq
+from rig.loop import Loop
+from tests.rig.rigs import bench_with, tick_for
+
+SLOW_AND_FILTERED = {"oversampling": 10, "substeps": 20, "anti_alias_hz": 320.0}
+
+
+def slow_bench(**converter: Any) -> Bench:
+    return bench_with({"sample_rate_hz": 800.0}, converter={"sample_rate_hz": 800.0} | converter)
+
+
+def skewed_bench(declared: float, real: float) -> Bench:
+    """The drive channel late by ``real`` samples, and what the bench knows of it."""
+    plain = make_daq(bench_with()).rig
+    sensors = [sensor.model_dump() for sensor in plain.sensors]
+    sensors[1]["skew_samples"] = real
+    channels = [channel.model_dump() for channel in bench_with().channels]
+    channels[1]["skew_samples"] = declared
+    return bench_with({"channels": channels}, sensors=sensors)
+
+
+def last_damping(bench: Bench) -> np.ndarray:
+    with rig.run("magnet-beam/backbone", bench=bench) as run:
+        assert run.complete
+        return nonlinear_mode(run.backbone()).damping_ratio
+
+
+def test_slow_bench_with_filters_reads_the_damping_of_a_fast_one() -> None:
+    fast, slow = last_damping(bench_with()), last_damping(slow_bench(**SLOW_AND_FILTERED))
+    assert slow == pytest.approx(fast, rel=2e-3)
+
+
+def test_slow_bench_without_filters_reads_it_wrong_and_says_so() -> None:
+    bench = slow_bench(substeps=20)
+    assert any("sample_rate_hz = 800" in remark and "anti_alias_hz" in remark for remark in make_daq(bench).remarks)
+    assert last_damping(bench)[0] > 1.1 * last_damping(bench_with())[0]
+
+
+def test_slow_bench_with_filters_gives_no_remark() -> None:
+    assert make_daq(slow_bench(**SLOW_AND_FILTERED)).remarks == ()
+
+
+def test_skew_that_the_bench_does_not_know_is_remarked() -> None:
+    (remark,) = make_daq(skewed_bench(declared=0.0, real=2.5)).remarks
+    assert remark == "channel drive: the bench says skew_samples = 0, the virtual sensor is 2.5 samples late"
+    assert make_daq(skewed_bench(declared=2.5, real=2.5)).remarks == ()
+
+
+def test_declared_skew_is_taken_out_of_the_points() -> None:
+    plain, skewed = last_damping(bench_with()), last_damping(skewed_bench(declared=2.5, real=2.5))
+    assert skewed == pytest.approx(plain, rel=2e-3)
+
+
+def test_latency_holds_the_delay_of_the_filters() -> None:
+    with make_daq(slow_bench(**SLOW_AND_FILTERED)) as daq:
+        daq.start(1)
+        # A Butterworth low-pass of sixth order is late by 3.864 / w_c; 0.5 for the hold.
+        assert daq.latency_samples == pytest.approx(0.5 + 3.8637 / (2 * np.pi * 320.0) * 800.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("block", [1, 4])
+def test_fused_and_exchanged_runs_agree_with_filters(block: int) -> None:
+    bench = slow_bench(**SLOW_AND_FILTERED, reconstruction_hz=300.0, dac_noise_v=1e-3)
+    rows = []
+    for fused in (True, False):
+        with make_daq(bench) as daq:
+            daq.start(block)
+            tick = tick_for(bench, block + daq.latency_samples, 0.3)
+            rows.append(np.concatenate([*Loop(daq, tick, fused=fused).run()]))
+    shortest = min(part.size for part in rows)
+    assert shortest > 800
+    for name in rows[0].dtype.names:
+        np.testing.assert_array_equal(rows[0][name][:shortest], rows[1][name][:shortest])

@@ -1,0 +1,74 @@
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simulators.analysis.errors import NotConvergedError
+from simulators.analysis.harmonic_balance import constant_force_response, forced_response, phase_resonance_backbone
+from simulators.analysis.hysteresis import hysteresis_loops
+from simulators.layout import Flag
+from tests.simulators.analysis.rigs import one_mode
+from tests.simulators.references import ideal
+
+BAD: list[tuple[Callable[..., Any], dict[str, Any], str]] = [
+    (phase_resonance_backbone, {"forces_n": [0.1, 0.0]}, "forces_n = 0: allowed is above 0"),
+    (phase_resonance_backbone, {"forces_n": [np.nan]}, "forces_n = nan: allowed is above 0"),
+    (phase_resonance_backbone, {"forces_n": []}, r"forces_n: shape \(0,\), allowed is one row"),
+    (phase_resonance_backbone, {"voltages_v": [-1.0]}, "voltages_v = -1: allowed is above 0"),
+    (phase_resonance_backbone, {}, "forces_n, voltages_v: both or neither given, allowed is one of them"),
+    (phase_resonance_backbone, {"forces_n": [0.1], "phase_lag_deg": 90.0}, "phase_lag_deg = 90: allowed is -179 to -1"),
+    (phase_resonance_backbone, {"forces_n": [0.1], "harmonics": 0}, "harmonics = 0: allowed is at least 1"),
+    (phase_resonance_backbone, {"forces_n": [0.1], "samples": 32}, "samples = 32: allowed is at least 64 for 15"),
+    (phase_resonance_backbone, {"forces_n": [0.1], "near_hz": 0.0}, "near_hz = 0: allowed is above 0"),
+    (constant_force_response, {"force_n": 0.0}, "force_n = 0: allowed is above 0"),
+    (constant_force_response, {"force_n": 1.0, "phase_lags_deg": [-20.0, -90.0]}, "phase_lags_deg: not rising"),
+    (forced_response, {"voltage_v": 0.0, "frequencies_hz": [10.0]}, "voltage_v = 0: allowed is above 0"),
+    (forced_response, {"voltage_v": 1.0, "frequencies_hz": [10.0, -1.0]}, "frequencies_hz = -1: allowed is above 0"),
+]
+
+
+@pytest.mark.parametrize(("analysis", "arguments", "message"), BAD)
+def test_bad_values_are_named(analysis: Callable[..., Any], arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        analysis(one_mode(), **arguments)
+
+
+def test_a_level_out_of_reach_is_named_and_the_points_before_it_are_kept() -> None:
+    softening = one_mode(elements=[{"kind": "cubic", "at": "drive", "stiffness_n_m3": -3e8}])
+    with pytest.raises(NotConvergedError, match=r"force .* N, lag -90 deg") as caught:
+        phase_resonance_backbone(softening, forces_n=[0.1, 0.5, 1000.0])
+    assert caught.value.found is not None
+    np.testing.assert_allclose(caught.value.found.force_n, [0.1, 0.5], rtol=1e-8)
+    with pytest.raises(NotConvergedError) as nothing:
+        phase_resonance_backbone(softening, forces_n=[1000.0])
+    assert nothing.value.found is None
+
+
+def test_what_a_run_would_flag_is_flagged() -> None:
+    narrow = {"dac_range_v": 1.0, "adc_range_v": 20.0}
+    found = phase_resonance_backbone(ideal(converter=narrow), forces_n=[0.1, 0.4, 3.0])
+    assert found.voltage_v[1] > 1.0 > found.voltage_v[0]
+    drive = np.abs(found.sensor_harmonics["drive"])
+    assert np.max(drive[1]) > 20.0 > drive[0].sum()
+    assert Flag(int(found.flags[0])) == Flag(0)
+    assert Flag(int(found.flags[1])) == Flag.DAC_CLIPPED | Flag.SENSOR_CLIPPED
+    assert Flag.MAGNET_RANGE in Flag(int(found.flags[2]))
+    assert np.abs(found.point_harmonics_m["magnet"][2]).sum() > 0.7 * 0.011
+
+
+def test_a_mode_is_chosen_by_its_frequency() -> None:
+    rig = ideal()
+    assert phase_resonance_backbone(rig, forces_n=[0.01]).frequency_hz[0] == pytest.approx(24.37, abs=0.01)
+    second = phase_resonance_backbone(rig, forces_n=[0.01], near_hz=130.0)
+    assert second.frequency_hz[0] == pytest.approx(134.06, abs=0.1)
+    assert second.damping_ratio[0] == pytest.approx(0.0007, rel=0.02)
+
+
+def test_points_and_harmonics_that_do_not_exist_are_named() -> None:
+    rig = ideal()
+    found = phase_resonance_backbone(rig, forces_n=[0.1], harmonics=3)
+    with pytest.raises(ValueError, match="harmonic = 4: allowed is 0 to 3"):
+        found.force_harmonic_ratio(4)
+    with pytest.raises(ValueError, match="point = 1: allowed is -1 to 0"):
+        hysteresis_loops(rig, found, 1)

@@ -1,0 +1,110 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from joblib import parallel_config
+
+from simulators.ensemble import VariantError, ensemble
+from simulators.simulation import Simulation
+from simulators.virtual_rig import VirtualRig
+
+
+def drive_rms(rig: VirtualRig) -> float:
+    return float(np.std(Simulation(rig).run(np.sin(0.03 * np.arange(500))).measured["drive"]))
+
+
+def square(value: float) -> float:
+    return value**2
+
+
+def reciprocal(value: float) -> float:
+    return 1.0 / value
+
+
+def process(_: int) -> int:
+    return os.getpid()
+
+
+def test_rigs_give_in_other_processes_what_they_give_here() -> None:
+    rigs = {f"seed {k}": VirtualRig.shipped("magnet-beam", seed=k, scatter={"frequency": 1e-3}) for k in range(6)}
+    parallel = list(ensemble(rigs, drive_rms, n_jobs=2))
+    assert parallel == [(name, drive_rms(rig)) for name, rig in rigs.items()]
+    assert len({result for _, result in parallel}) == 6
+
+
+def test_results_are_named_by_counting_where_no_names_are_given() -> None:
+    assert list(ensemble([3.0, 4.0], square)) == [("0", 9.0), ("1", 16.0)]
+
+
+def test_backend_of_the_user_is_honoured() -> None:
+    with parallel_config(backend="threading", n_jobs=2):
+        here = {result for _, result in ensemble(range(8), process)}
+    with parallel_config(backend="loky", n_jobs=2):
+        elsewhere = {result for _, result in ensemble(range(8), process)}
+    assert here == {os.getpid()}
+    assert os.getpid() not in elsewhere
+
+
+def test_variants_are_taken_as_workers_come_free_and_not_all_at_once() -> None:
+    taken = []
+
+    def counted() -> Iterator[float]:
+        for k in range(10_000):
+            taken.append(k)
+            yield float(k)
+
+    results = ensemble(counted(), square, n_jobs=1)
+    assert next(results) == ("0", 0.0)
+    assert len(taken) < 100
+    results.close()
+    assert len(taken) < 100
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_failing_variant_is_named(n_jobs: int) -> None:
+    with pytest.raises(VariantError, match="variant stiff: ZeroDivisionError: float division by zero"):
+        list(ensemble({"soft": 2.0, "stiff": 0.0}, reciprocal, n_jobs=n_jobs))
+
+
+SLEEPER = """
+import time
+from simulators.ensemble import ensemble
+
+def slow(value):
+    print("begun", flush=True)
+    time.sleep(60.0)
+
+if __name__ == "__main__":
+    list(ensemble(range(50), slow, n_jobs=2))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGINT for a group of processes")
+def test_interrupt_ends_it_and_leaves_no_worker(tmp_path: Path) -> None:
+    script = tmp_path / "sleeper.py"
+    script.write_text(SLEEPER)
+    with subprocess.Popen(
+        [sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as running:
+        assert running.stdout is not None
+        assert running.stdout.readline() == "begun\n"
+        os.killpg(running.pid, signal.SIGINT)
+        assert running.wait(timeout=20.0) != 0
+        deadline = time.monotonic() + 20.0
+        while _group_is_alive(running.pid) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not _group_is_alive(running.pid)
+
+
+def _group_is_alive(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
