@@ -109,7 +109,10 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
         )
         tag = detail["ctx"].get("tag")
         return f"{path}.{of} = {tag!r}: allowed is {allowed}" if tag is not None else f"{path}.{of}: is missing"
-    return f"{path} = {detail['input']!r}: allowed is {message}"
+    if detail["type"] in ("too_short", "too_long"):
+        bound, count = ("least", "min_length") if detail["type"] == "too_short" else ("most", "max_length")
+        message = f"at {bound} {detail['ctx'][count]} of them"
+    return f"{path} = {detail['input']!r}: allowed is {message}".replace("a valid tuple", "a list")
 
 
 def _keys(model: Any) -> set[str]:

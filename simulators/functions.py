@@ -63,5 +63,6 @@ def _imported(name: str) -> Any:
         sys.path.append(here)  # an installed command does not look there by itself
     try:
         return getattr(importlib.import_module(module), attribute)
-    except Exception as error:  # the user's module may fail in any way
-        raise ValueError(f"function = {name!r}: {error}; allowed is a function that can be imported") from None
+    except (Exception, SystemExit) as error:  # the user's module may fail in any way, and may end itself
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise ValueError(f"function = {name!r}: {reason}; allowed is a function that can be imported") from None

@@ -1,6 +1,8 @@
 """What every beam that is made from its geometry has: material, section, named points, attachments, damping."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Protocol
 
 import numpy as np
@@ -11,7 +13,7 @@ from simulators.attachments import LumpedMass, Support
 from simulators.beam import Lump, Quantity, Spring
 from simulators.part import Part, Positive, Several
 
-__all__ = ["MeshedBeam"]
+__all__ = ["MeshedBeam", "check_rising"]
 
 Matrix = NDArray[np.float64]
 
@@ -43,7 +45,7 @@ class MeshedBeam(Part):
     damping_ratio: Annotated[Several[Annotated[float, Field(ge=0.0, lt=1.0)]], Field(min_length=1)]
     """Viscous modal damping ratios, lowest mode first; their number is the number of modes kept."""
     frequency_hz: Several[Positive] | None = None
-    """Measured frequencies that replace the computed ones, one per mode kept; the shapes stay as computed."""
+    """Measured frequencies that replace the computed ones, lowest first, one per mode kept; the shapes stay as computed."""
     points_m: dict[str, float]
     """Named positions along the beam, which sensors, magnets, joints and the stinger refer to."""
     lumped_masses: Several[LumpedMass] = ()
@@ -69,6 +71,7 @@ class MeshedBeam(Part):
             raise ValueError(
                 f"frequency_hz: has {len(self.frequency_hz)} values, allowed is {n_mode}, one per damping_ratio"
             )
+        check_rising(self.frequency_hz or ())
         return self
 
     @property
@@ -105,3 +108,10 @@ class MeshedBeam(Part):
     @abstractmethod
     def _most_modes(self) -> int:
         """Largest number of modes that the mesh has."""
+
+
+def check_rising(frequencies_hz: Sequence[float]) -> None:
+    """`ValueError` where a frequency is below the one before it: shapes and damping would go with another mode."""
+    for index, (before_hz, next_hz) in enumerate(pairwise(frequencies_hz), start=1):
+        if next_hz < before_hz:
+            raise ValueError(f"frequency_hz[{index}] = {next_hz:g}: allowed is from {before_hz:g} on, lowest first")

@@ -9,6 +9,9 @@ from simulators.plant.assembly import LinearPlant
 
 __all__ = ["LinearModes", "coupled_modes", "structure_modes"]
 
+_FREE = 1e-6
+"""Share of the highest frequency up to which a frequency is that of a free motion, but for rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearModes:
@@ -26,6 +29,11 @@ class LinearModes:
     def at(self, shape: NDArray[np.float64]) -> NDArray[np.float64]:
         """Mass-normalised deflection [n_mode] (kg^-1/2) of a point, from ``VirtualRig.shape`` there; structure only."""
         return shape @ self.vectors
+
+    def nearest(self, near_hz: float) -> int:
+        """Index of the mode nearest to a frequency; motions that nothing holds (0 Hz) are none, unless there are no others."""
+        held = self.frequency_hz > _FREE * np.max(self.frequency_hz)
+        return int(np.argmin(np.where(held, np.abs(self.frequency_hz - near_hz), np.inf)))
 
 
 def structure_modes(plant: LinearPlant) -> LinearModes:

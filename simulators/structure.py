@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from simulators.beam import BeamModes, Boundary, Quantity, beam_modes
 from simulators.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
 from simulators.lap_mesh import LapMesh
-from simulators.meshed import MeshedBeam
+from simulators.meshed import MeshedBeam, check_rising
 from simulators.part import Part, Positive, Several
 
 __all__ = ["BeamStructure", "LapJointedBeam", "ModalStructure", "Structure"]
@@ -145,6 +145,7 @@ class ModalStructure(Part):
         for name, row in rows.items():
             if len(row) != n_mode:
                 raise ValueError(f"{name}: has {len(row)} values, allowed is {n_mode}, one per frequency_hz")
+        check_rising(self.frequency_hz)
         return self
 
     @property

@@ -204,4 +204,4 @@ class VirtualRig(Part):
 
     def drive_shape(self, near_hz: float) -> float:
         """Mass-normalised deflection (kg^-1/2) of the drive point in the mode of `linear_modes` nearest to a frequency."""
-        return float(self.linear_modes.drive_shape[np.argmin(np.abs(self.linear_modes.frequency_hz - near_hz))])
+        return float(self.linear_modes.drive_shape[self.linear_modes.nearest(near_hz)])

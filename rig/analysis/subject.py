@@ -54,7 +54,7 @@ class Subject:
     @cached_property
     def mode(self) -> int:
         """Index of the mode under test among the linear modes of the structure."""
-        return int(np.argmin(np.abs(self.rig.linear_modes.frequency_hz - self.near_hz)))
+        return self.rig.linear_modes.nearest(self.near_hz)
 
     @property
     def frequency_hz(self) -> float:

@@ -67,7 +67,10 @@ class Solution:
         change = np.zeros(self.unknowns.size)
         change[-1] = level
         change[-2] = value if self.conditions.at == "lag" else value / self.conditions.value
-        return np.asarray(np.linalg.solve(self.jacobian, change), dtype=np.float64)
+        try:
+            return np.asarray(np.linalg.solve(self.jacobian, change), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            raise NotConvergedError(f"the path has no direction at {self.conditions}") from None
 
 
 class Balance:
@@ -133,6 +136,10 @@ class Balance:
 
     def solve(self, start: Real, conditions: Conditions) -> Solution:
         """Newton's method with steps halved until the residual falls; `NotConvergedError` where it does not arrive."""
+        with np.errstate(all="ignore"):  # what is not finite is refused, and a trial may go far
+            return self._solve(start, conditions)
+
+    def _solve(self, start: Real, conditions: Conditions) -> Solution:
         y = start
         value, jacobian, scale = self.residual(y, conditions)
         for _ in range(_ITERATIONS):

@@ -195,7 +195,8 @@ class _Study:
             try:
                 here = self._next(here, goal)
             except NotConvergedError as failure:
-                return solutions, failure
+                asked, ended = str(goal), str(failure)
+                return solutions, failure if asked in ended else NotConvergedError(f"{asked}: {ended}")
             solutions.append(here)
         return solutions, None
 

@@ -47,6 +47,9 @@ def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Real:
 
 def checked_harmonics(harmonics: int, samples: int) -> tuple[int, int]:
     """Highest harmonic and samples per period, which must resolve it and the products of the sites."""
+    for name, value in (("harmonics", harmonics), ("samples", samples)):
+        if not isinstance(value, int | np.integer):
+            raise ValueError(f"{name} = {value!r}: allowed is a whole number")
     if harmonics < 1:
         raise ValueError(f"harmonics = {harmonics}: allowed is at least 1")
     if samples < _SAMPLES_PER_HARMONIC * (harmonics + 1):
@@ -60,8 +63,7 @@ def followed_mode(rig: VirtualRig, near_hz: float | None) -> int:
     """Index of the linear mode nearest to ``near_hz``; without it, of the lowest that moves a nonlinear site."""
     modes = rig.linear_modes
     if near_hz is not None:
-        near = float(positive("near_hz", [near_hz])[0])
-        return int(np.argmin(np.abs(modes.frequency_hz - near)))
+        return modes.nearest(float(positive("near_hz", [near_hz])[0]))
     m = rig.plant.n_mode
     moved = np.abs(np.vstack([rig.plant.site_rows[:, :m], rig.plant.site_rows[:, m : 2 * m]]) @ modes.vectors)
     largest = np.max(moved, axis=1, keepdims=True, initial=0.0)
@@ -72,7 +74,10 @@ def followed_mode(rig: VirtualRig, near_hz: float | None) -> int:
 
 
 def _row(name: str, values: ArrayLike) -> Real:
-    array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {values!r}: allowed is a number, or one row of numbers") from None
     if array.ndim != 1 or array.size == 0:
         raise ValueError(f"{name}: shape {array.shape}, allowed is one row of at least one number")
     return array

@@ -13,6 +13,8 @@ TAPS = 6
 """Values that a skewed channel is interpolated from."""
 LOWEST_INTERNAL_RATE_HZ = 4000.0
 """What an anti-alias or reconstruction filter needs: below, the stairs of the held output alias into what it reads."""
+LOWEST_CORNER = 0.001
+"""Lowest corner of a filter of the converter over the sample rate: it delays by about six hundred samples there."""
 
 NotNegative = Annotated[float, Field(ge=0.0)]
 Bits = Annotated[int, Field(ge=0, le=32)]
@@ -99,6 +101,12 @@ class Converter(Part):
             raise ValueError(
                 f"reconstruction_hz = {self.reconstruction_hz:g}: allowed is below {half_hz:g}, half the internal rate"
             )
+        lowest_hz = LOWEST_CORNER * self.sample_rate_hz
+        for name, corner_hz in (("anti_alias_hz", self.anti_alias_hz), ("reconstruction_hz", self.reconstruction_hz)):
+            if 0.0 < corner_hz < lowest_hz:
+                raise ValueError(
+                    f"{name} = {corner_hz:g}: allowed is 0, or from {lowest_hz:g} on, {LOWEST_CORNER} of the rate"
+                )
         needed = max(2, math.ceil(LOWEST_INTERNAL_RATE_HZ / self.sample_rate_hz))
         if (self.anti_alias_hz or self.reconstruction_hz) and self.oversampling < needed:
             raise ValueError(

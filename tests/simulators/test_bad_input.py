@@ -1,3 +1,4 @@
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -42,6 +43,22 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     ({"specimen": "magnet-beam", "stinger": {"at": "dive"}}, "stinger.at = 'dive': allowed is one of clamp, drive"),
     ({"specimen": "magnet-beam", "stinger": {"at": "clamp"}}, "stinger.at = 'clamp': allowed is a point that moves"),
+    (
+        {"specimen": "magnet-beam", "structure": {"damping_ratio": [0.01] * 3, "frequency_hz": [20.0, 130.0, 120.0]}},
+        r"frequency_hz\[2\] = 120: allowed is from 130 on, lowest first",
+    ),
+    (
+        table() | {"structure": MODAL | {"frequency_hz": [30.0, 20.0], "shapes": {"drive": [1.0, 1.0]}}},
+        r"frequency_hz\[1\] = 20: allowed is from 30 on, lowest first",
+    ),
+    (
+        {"specimen": "magnet-beam", "converter": {"oversampling": 2, "anti_alias_hz": 1e-4}},
+        "anti_alias_hz = 0.0001: allowed is 0, or from 5 on",
+    ),
+    (
+        {"specimen": "magnet-beam", "converter": {"oversampling": 2, "reconstruction_hz": 4.0}},
+        "reconstruction_hz = 4: allowed is 0, or from 5 on",
+    ),
     (table(sensors=[]), "at least 1 item"),
     (
         table(sensors=[{"name": "a", "kind": "force", "sensitivity_v_per_unit": 1.0, "range_v": 5.0}] * 2),
@@ -127,3 +144,19 @@ def test_a_step_that_is_called_long_enough_is_accepted() -> None:
 def test_a_stop_behind_a_one_sided_magnet_is_no_matter() -> None:
     stops = table(elements=[MAGNET, STOP | {"other_gap_m": 0.02}])
     assert len(VirtualRig.model_validate(stops).elements) == 2
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("import sys; sys.exit(3)", r"SystemExit: 3; allowed is a function that can be imported"),
+        ("raise RuntimeError('one\\ntwo')", r"RuntimeError: one two; allowed is a function that can be imported"),
+    ],
+)
+def test_a_module_that_fails_as_it_is_imported_is_named_in_one_line(
+    source: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "failing.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ValidationError, match=f"function = 'failing:f': {message}"):
+        VirtualRig.shipped("magnet-beam", elements=[{"kind": "user", "at": "tip", "function": "failing:f"}])

@@ -94,14 +94,14 @@ class VirtualDAQ(DAQ):
                     f"the virtual sensor is {delay:.4g} samples late"
                 )
         modes, facts = self.rig.linear_modes, self._specimen
-        mode = int(np.argmin(np.abs(modes.frequency_hz - facts.linear_frequency_hz)))
+        mode = modes.nearest(facts.linear_frequency_hz)
         shape, frequency_hz = float(modes.drive_shape[mode]), float(modes.frequency_hz[mode])
-        if facts.drive_mode_shape is not None and abs(facts.drive_mode_shape / shape - 1.0) > FACT_TOLERANCE:
+        if facts.drive_mode_shape is not None and abs(facts.drive_mode_shape - shape) > FACT_TOLERANCE * shape:
             out.append(
                 f"specimen.drive_mode_shape = {facts.drive_mode_shape:g}: the virtual specimen has {shape:.6g}; "
                 "the damping goes with its square"
             )
-        if abs(facts.linear_frequency_hz / frequency_hz - 1.0) > FACT_TOLERANCE:
+        if abs(facts.linear_frequency_hz - frequency_hz) > FACT_TOLERANCE * frequency_hz:
             out.append(
                 f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g}: the virtual specimen has {frequency_hz:.6g} Hz"
             )

@@ -82,3 +82,12 @@ def test_fused_and_exchanged_runs_agree_with_filters(block: int) -> None:
     assert shortest > 800
     for name in rows[0].dtype.names:
         np.testing.assert_array_equal(rows[0][name][:shortest], rows[1][name][:shortest])
+
+
+def test_facts_of_a_free_specimen_are_compared_with_a_mode_that_vibrates() -> None:
+    free = {"boundary": "free-free", "damping_ratio": [0.0, 0.0, 0.002]}
+    bench = bench_with(structure=free, friction=[], elements=[])
+    mode = make_daq(bench).rig.linear_modes
+    assert any(
+        f"the virtual specimen has {mode.frequency_hz[2]:.6g} Hz" in remark for remark in make_daq(bench).remarks
+    )

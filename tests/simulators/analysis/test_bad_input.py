@@ -1,6 +1,8 @@
+import math
 from collections.abc import Callable
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -8,8 +10,15 @@ from simulators.analysis.errors import NotConvergedError
 from simulators.analysis.harmonic_balance import constant_force_response, forced_response, phase_resonance_backbone
 from simulators.analysis.hysteresis import hysteresis_loops
 from simulators.layout import Flag
+from simulators.virtual_rig import VirtualRig
 from tests.simulators.analysis.rigs import one_mode
 from tests.simulators.references import ideal
+
+
+@numba.cfunc("float64(float64, CPointer(float64))")
+def nan_beyond_ten_micrometres(z: float, parameters: Any) -> float:
+    return math.nan if z > 1e-5 else 0.0
+
 
 BAD: list[tuple[Callable[..., Any], dict[str, Any], str]] = [
     (phase_resonance_backbone, {"forces_n": [0.1, 0.0]}, "forces_n = 0: allowed is above 0"),
@@ -21,6 +30,10 @@ BAD: list[tuple[Callable[..., Any], dict[str, Any], str]] = [
     (phase_resonance_backbone, {"forces_n": [0.1], "harmonics": 0}, "harmonics = 0: allowed is at least 1"),
     (phase_resonance_backbone, {"forces_n": [0.1], "samples": 32}, "samples = 32: allowed is at least 64 for 15"),
     (phase_resonance_backbone, {"forces_n": [0.1], "near_hz": 0.0}, "near_hz = 0: allowed is above 0"),
+    (phase_resonance_backbone, {"forces_n": ["a"]}, r"forces_n = \['a'\]: allowed is a number, or one row of numbers"),
+    (phase_resonance_backbone, {"forces_n": [1j]}, r"forces_n = \[1j\]: allowed is a number"),
+    (phase_resonance_backbone, {"forces_n": [0.1], "harmonics": 3.5}, "harmonics = 3.5: allowed is a whole number"),
+    (phase_resonance_backbone, {"forces_n": [0.1], "samples": 64.0}, "samples = 64.0: allowed is a whole number"),
     (constant_force_response, {"force_n": 0.0}, "force_n = 0: allowed is above 0"),
     (constant_force_response, {"force_n": 1.0, "phase_lags_deg": [-20.0, -90.0]}, "phase_lags_deg: not rising"),
     (forced_response, {"voltage_v": 0.0, "frequencies_hz": [10.0]}, "voltage_v = 0: allowed is above 0"),
@@ -72,3 +85,36 @@ def test_points_and_harmonics_that_do_not_exist_are_named() -> None:
         found.force_harmonic_ratio(4)
     with pytest.raises(ValueError, match="point = 1: allowed is -1 to 0"):
         hysteresis_loops(rig, found, 1)
+
+
+FREE = ideal(
+    structure={"boundary": "free-free", "damping_ratio": [0.0, 0.0, 0.002], "lumped_masses": []},
+    friction=[],
+    elements=[{"kind": "cubic", "at": "tip", "stiffness_n_m3": 1e6}],
+)
+
+
+def test_a_free_motion_that_a_site_pushes_is_refused_and_one_that_none_pushes_is_not() -> None:
+    with pytest.raises(ValueError, match="structure: has a motion that no stiffness holds"):
+        phase_resonance_backbone(FREE, forces_n=[0.1])
+    linear = FREE.model_copy(update={"elements": ()})
+    found = phase_resonance_backbone(VirtualRig.model_validate(linear.model_dump()), forces_n=[0.1])
+    assert found.damping_ratio[0] == pytest.approx(0.002, rel=1e-4)  # the free motions move along
+
+
+def test_the_mode_nearest_to_a_frequency_is_no_free_motion() -> None:
+    modes = FREE.linear_modes
+    assert modes.frequency_hz[1] < 1e-3
+    assert modes.nearest(1.0) == 2
+
+
+def test_the_level_that_was_asked_for_is_named_where_the_path_ends_before_it() -> None:
+    softening = one_mode(elements=[{"kind": "cubic", "at": "drive", "stiffness_n_m3": -3e8}])
+    with pytest.raises(NotConvergedError, match=r"^force 1000 N, lag -90 deg: no periodic vibration found at force "):
+        phase_resonance_backbone(softening, forces_n=[1000.0])
+
+
+def test_a_force_that_is_no_number_ends_the_path_without_a_warning() -> None:
+    broken = one_mode(elements=[{"kind": "user", "at": "drive", "function": nan_beyond_ten_micrometres}])
+    with pytest.raises(NotConvergedError):
+        phase_resonance_backbone(broken, forces_n=[1.0])
