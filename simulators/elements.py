@@ -6,9 +6,9 @@ its rate. The force on the structure is along z. What is linear in it belongs to
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_serializer, model_validator
+from pydantic import Field, field_serializer, field_validator, model_validator
 
-from simulators.functions import loaded, named
+from simulators.functions import loaded, named, portable
 from simulators.layout import N_PARAMETER
 from simulators.part import Part, Positive, Several
 
@@ -138,7 +138,7 @@ class User(LocalElement):
     kind: Literal["user"]
     """This kind of element."""
     function: Any
-    """The function: ``"module:name"``, or a numba ``cfunc`` or ctypes function object."""
+    """The function: ``"module:name"``, or a numba ``cfunc`` or ctypes function object, which becomes its name if it has one."""
     parameters: Annotated[Several[float], Field(max_length=N_PARAMETER)] = ()
     """Numbers that the function is given, at most eight; the rest of the eight are 0."""
     of: Literal["deflection", "velocity"] = "deflection"
@@ -147,6 +147,11 @@ class User(LocalElement):
     """Slope ``-df/dz`` at rest, which the linear plant then holds; any value is right, the true one integrates best."""
     largest_slope_n_m: Annotated[float, Field(ge=0.0)] = 0.0
     """Largest slope of the force to be expected (N/m, or N s/m); a step too long for it is refused. 0: not checked."""
+
+    @field_validator("function", mode="after")
+    @classmethod
+    def _by_name(cls, function: Any) -> Any:
+        return portable(function)
 
     @field_serializer("function")
     def _as_name(self, function: Any) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 from numba.core.ccallback import CFunc
 
-__all__ = ["Loaded", "loaded", "named"]
+__all__ = ["Loaded", "loaded", "named", "portable"]
 
 _ARGUMENTS = (ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 _PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, *_ARGUMENTS)
@@ -38,6 +38,16 @@ def named(function: Any) -> str:
     made_from = getattr(function, "__wrapped__", function)
     name = getattr(made_from, "__qualname__", None) or getattr(made_from, "__name__", None) or repr(made_from)
     return f"{getattr(made_from, '__module__', None) or type(made_from).__module__}:{name}"
+
+
+def portable(function: Any) -> Any:
+    """Its name where a function object can be imported under it, so that other processes find it; else as it is."""
+    if isinstance(function, str):
+        return function
+    name = named(function)
+    module, _, attribute = name.partition(":")
+    found = getattr(sys.modules.get(module), attribute, None)
+    return name if found is function and module != "__main__" else function
 
 
 def loaded(function: Any) -> Loaded:

@@ -5,7 +5,9 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from joblib import parallel_config
@@ -13,6 +15,11 @@ from joblib import parallel_config
 from simulators.ensemble import VariantError, ensemble
 from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
+
+
+@numba.cfunc("float64(float64, CPointer(float64))")
+def hardening(z: float, parameters: Any) -> float:
+    return float(-parameters[0] * z**3)
 
 
 def drive_rms(rig: VirtualRig) -> float:
@@ -108,3 +115,9 @@ def _group_is_alive(group: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+def test_a_function_that_was_given_as_an_object_is_found_in_other_processes() -> None:
+    element = {"kind": "user", "at": "tip", "function": hardening, "parameters": [1e9]}
+    rig = VirtualRig.shipped("magnet-beam", elements=[element])
+    assert [result for _, result in ensemble([rig, rig], drive_rms, n_jobs=2)] == [drive_rms(rig)] * 2
