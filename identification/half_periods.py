@@ -44,11 +44,14 @@ def zero_crossings(signal: ArrayLike, *, sample_rate_hz: float) -> HalfPeriods:
     """
     values = finite_array("signal", signal, np.float64, 1)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
-    before = np.flatnonzero(np.diff(values >= 0.0))
+    moved = np.flatnonzero(values)  # a sample of exactly zero neither is a crossing nor hides one
+    value = values[moved]
+    before = np.flatnonzero(np.diff(value > 0.0))
     if before.size < 2:
         raise IdentificationError(f"signal: has {before.size} zero crossings, needs at least 2")
-    crossing_s = (before + values[before] / (values[before] - values[before + 1])) / rate_hz
-    largest = np.maximum.reduceat(np.abs(values), before + 1)[:-1]
+    share = value[before] / (value[before] - value[before + 1])
+    crossing_s = (moved[before] + share * (moved[before + 1] - moved[before])) / rate_hz
+    largest = np.maximum.reduceat(np.abs(value), before + 1)[:-1]
     return HalfPeriods(
         time_s=0.5 * (crossing_s[1:] + crossing_s[:-1]),
         frequency_hz=0.5 / np.diff(crossing_s),

@@ -7,6 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
+from rig.cli_analyse import app as analyse_app
+from rig.cli_list import list_
+
 __all__ = ["app", "main"]
 
 app = typer.Typer(
@@ -14,6 +17,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+app.add_typer(analyse_app, name="analyse")
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
@@ -28,24 +33,7 @@ def _common(
     """Phase-locked nonlinear vibration tests on virtual and real rigs, and models from the recordings."""
 
 
-@app.command("list")
-def list_(json: Json = False) -> None:
-    """Shipped benches and plans, and the installed drivers."""
-    from rig.bench import load_bench, shipped_benches
-    from rig.campaigns.plans import load_plan, shipped_plans
-    from rig.console import print_json
-    from rig.drivers import driver_names
-
-    benches = [{"name": name, "description": load_bench(name).description} for name in shipped_benches()]
-    plans = [{"name": name, "description": load_plan(name).description} for name in shipped_plans()]
-    if json:
-        print_json({"benches": benches, "plans": plans, "drivers": driver_names()})
-        return
-    for heading, rows in (("benches", benches), ("plans", plans)):
-        print(f"{heading}:")
-        for row in rows:
-            print(f"  {row['name']:32} {' '.join(row['description'].split())}")
-    print(f"drivers:\n  {', '.join(driver_names())}")
+app.command("list")(list_)
 
 
 @app.command()

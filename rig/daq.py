@@ -129,6 +129,11 @@ class DAQ(ABC):
         """``u[i]`` shows at ``y[i + latency_samples]``: queue, hold, converter and filter delay; known once started."""
 
     @property
+    def filter_delay_samples(self) -> float:
+        """The part of the latency that is the mean delay of filters: an output begins to show that much earlier."""
+        return 0.0
+
+    @property
     def counters(self) -> dict[str, int]:
         """What went wrong so far, counted: lost samples, clipped outputs and inputs, and the like."""
         return {}

@@ -34,7 +34,7 @@ class VirtualRig(Part):
     """
 
     specimen: str | None = None
-    """Shipped specimen that the other tables change: magnet-beam or magnet-beam-symmetric."""
+    """Shipped specimen that the other tables change: magnet-beam, magnet-beam-symmetric or friction-beam."""
     provenance: dict[str, str] = Field(default_factory=dict)
     """Which of the numbers are published, calibrated, chosen, unverified; carried along, not used."""
     structure: Structure
@@ -202,7 +202,6 @@ class VirtualRig(Part):
         """Modes of the coupled rig from voltage: with exciter and stinger, not what a phase-resonant test finds."""
         return coupled_modes(self.plant)
 
-    @property
-    def drive_shape_mode_1(self) -> float:
-        """Mass-normalised deflection (kg^-1/2) of the drive point in mode 1 of `linear_modes`."""
-        return float(self.linear_modes.drive_shape[0])
+    def drive_shape(self, near_hz: float) -> float:
+        """Mass-normalised deflection (kg^-1/2) of the drive point in the mode of `linear_modes` nearest to a frequency."""
+        return float(self.linear_modes.drive_shape[np.argmin(np.abs(self.linear_modes.frequency_hz - near_hz))])

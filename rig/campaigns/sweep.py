@@ -34,6 +34,8 @@ class SweepPlan(TonePlan):
     """Length of the ramp to the level, and down from it, periods."""
     hold_periods: float = Field(20.0, ge=1, le=1e5)
     """Time at the first frequency before the sweep, periods."""
+    off_resonance_hz: tuple[tuple[float, float], ...] | None = None
+    """Bands in which the force counts as that off resonance (the mean of their medians); the first 15 % if not given."""
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
@@ -41,6 +43,12 @@ class SweepPlan(TonePlan):
             raise ValueError("rate_hz_per_s, rate_octaves_per_min: exactly one of the two is to be given")
         if self.start_hz == self.stop_hz:
             raise ValueError(f"stop_hz = {self.stop_hz:g}: allowed is anything but start_hz")
+        low, high = sorted((self.start_hz, self.stop_hz))
+        for index, band in enumerate(self.off_resonance_hz or ()):
+            if not low <= band[0] < band[1] <= high:
+                raise ValueError(
+                    f"off_resonance_hz[{index}] = {list(band)}: allowed is a band within {low:g} to {high:g} Hz"
+                )
         return self
 
     @property

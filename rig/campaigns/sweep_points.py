@@ -17,7 +17,7 @@ SWEEP_COLUMNS = (
     Column("off_resonance_n", "force off resonance", "N", ".4f"),
     Column("minimum_ratio", "smallest", "%", ".2f", 100.0),
     Column("minimum_frequency_hz", "at", "Hz", ".3f"),
-    Column("overshoot_ratio", "overshoot", "%", ".1f", 100.0),
+    Column("overshoot_ratio", "then up to", "%", ".1f", 100.0),
     Column("peak_m", "peak", "mm", ".4f", 1e3),
     Column("peak_frequency_hz", "at", "Hz", ".3f"),
 )
@@ -27,7 +27,7 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
     """The result of a recorded sweep: a transient vibration, that nothing was asked to settle in."""
     point = head(plan, target)
     try:
-        drop_out = force_drop_out(transient_of(bench, rows))
+        drop_out = force_drop_out(transient_of(bench, rows), off_resonance_hz=plan.off_resonance_hz)
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     return {

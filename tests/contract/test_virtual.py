@@ -6,6 +6,7 @@ import pytest
 from rig.conformance import DriverContract
 from rig.daq import DAQ
 from rig.drivers import make_daq
+from rig.drivers.virtual import VirtualDAQ
 from tests.rig.rigs import bench_with
 
 
@@ -52,6 +53,43 @@ def _drive_early(self, voltages, inputs):
 
 def _forget_to_close(self):
     raise RuntimeError("cannot close twice")
+
+
+class Boastful(VirtualDAQ):
+    """Claims to be later than it is, and, where it says so, that its filters make a part of that."""
+
+    filters = 0.0
+
+    @property
+    def latency_samples(self):
+        return 8.5
+
+    @property
+    def filter_delay_samples(self):
+        return self.filters
+
+
+@pytest.mark.parametrize("filters", [0.0, 5.0])
+def test_the_contract_catches_an_output_that_shows_before_its_latency(filters):
+    class Contract(DriverContract):
+        def make(self):
+            daq = Boastful(bench_with())
+            daq.filters = filters
+            return daq
+
+    with pytest.raises(AssertionError):
+        Contract().test_an_output_does_not_show_before_its_latency()
+
+
+def test_the_contract_catches_filters_that_are_later_than_the_whole_device():
+    class Contract(DriverContract):
+        def make(self):
+            daq = Boastful(bench_with())
+            daq.filters = 9.0
+            return daq
+
+    with pytest.raises(AssertionError):
+        Contract().test_the_latency_is_known_and_not_negative()
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,35 @@
-"""The guide's tables of keys say what the models say: every key, its default, its allowed range."""
+"""The pages' tables of keys say what the models say: every key, its default, its allowed range."""
 
 import re
-from typing import Any
+from typing import Any, get_args
 
 import annotated_types
 import pytest
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
+from controller import OpenLoop
 from controller.pll import LockRule, PhaseLockedLoop
 from rig.bench import Bench, DriverChoice, Limits, SpecimenFacts
 from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.sweep import SweepPlan
 from rig.daq import Channel
 from rig.drivers.virtual.driver import Queue
 from rig.sequencer.segments import SettleRule
+from rig.tick.layout import DEVICE_SHIFT
+from simulators.layout import Flag
+from simulators.virtual_rig import VirtualRig
 from tests.docs.pages import ROOT
+from tests.docs.tables import PAGE, PARTS, table_of, table_under
 
 MODELS = {
+    "Keys of a stepped-sine plan": SteppedSinePlan,
+    "Keys of `[demodulation]`": OpenLoop,
+    "Keys of a sweep plan": SweepPlan,
+    "Keys of a multisine plan": MultisinePlan,
     "Keys of a backbone plan": BackbonePlan,
     "Keys of `[controller]`": PhaseLockedLoop,
     "Keys of `[controller.lock]`": LockRule,
@@ -30,13 +43,20 @@ MODELS = {
 }
 
 
-def table_under(heading: str) -> dict[str, tuple[str, str]]:
-    """Default and allowed column of every key in the table below a heading of the guide."""
-    guide = (ROOT / "docs" / "user-guide.md").read_text(encoding="utf-8")
-    found = re.search(rf"^#+ {re.escape(heading)}$(.*?)(?=^#|\Z)", guide, re.MULTILINE | re.DOTALL)
-    assert found, f"no heading {heading!r}"
-    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", found.group(1), re.MULTILINE)
+def keys_under(heading: str) -> dict[str, tuple[str, str]]:
+    """Default and allowed column of every key in the table below a heading of the guide or of the page of campaigns."""
+    pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("user-guide.md", "campaigns.md")]
+    rows = re.findall(
+        r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table_under(heading, "\n".join(pages))["table"], re.MULTILINE
+    )
     return {key: (default.strip(), allowed.strip()) for key, default, allowed in rows}
+
+
+def parts_of(kind: Any) -> set[type[BaseModel]]:
+    """A model and all models that its fields may hold."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return {kind}.union(*(parts_of(field.annotation) for field in kind.model_fields.values()))
+    return set[type[BaseModel]]().union(*(parts_of(one) for one in get_args(kind)))
 
 
 def shown_number(value: float) -> str:
@@ -69,10 +89,31 @@ def shown_range(field: Any) -> str:
 
 @pytest.mark.parametrize("heading", MODELS)
 def test_every_key_is_in_the_guide_with_its_default_and_range(heading):
-    table, fields = table_under(heading), MODELS[heading].model_fields
+    table, fields = keys_under(heading), MODELS[heading].model_fields
     extra = {"further"} if MODELS[heading] is Queue else set()
     assert set(table) - extra == set(fields)
     for name, field in fields.items():
         default, allowed = table[name]
         assert default == shown_default(field), name
         assert allowed.startswith(shown_range(field)), f"{name}: {allowed!r}, the code says {shown_range(field)!r}"
+
+
+def test_every_kind_of_plan_has_its_table():
+    assert {campaign.plan for campaign in KINDS.values()} <= set(MODELS.values())
+
+
+@pytest.mark.parametrize("heading", PARTS)
+def test_every_part_of_a_virtual_rig_is_on_its_page_as_the_code_has_it(heading):
+    shown = table_under(heading, PAGE.read_text(encoding="utf-8"))["table"].splitlines()
+    assert shown == table_of(PARTS[heading]), "python -m tests.docs.tables writes the tables anew"
+
+
+def test_every_part_that_a_virtual_rig_can_have_is_on_the_page():
+    assert parts_of(VirtualRig) == set(PARTS.values())
+
+
+def test_every_flag_is_on_the_page_with_its_bit():
+    shown = re.findall(r"^\| `(\w+)` \| (\d+) \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert [(name, 1 << (int(bit) - DEVICE_SHIFT)) for name, bit in shown] == [
+        (str(flag.name).lower(), int(flag)) for flag in Flag
+    ]

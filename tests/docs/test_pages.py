@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 import rig
 from tests.docs.output import assert_shows
@@ -36,11 +37,14 @@ def name_of(page: Path) -> str:
 
 
 @pytest.fixture(autouse=True)
-def no_module_of_a_page_stays():
+def nothing_of_a_page_stays(tmp_path):
+    """Neither its modules nor worker processes, which would keep its folder and import path."""
+    get_reusable_executor().shutdown()
     before = set(sys.modules)
     yield
+    get_reusable_executor().shutdown()
     for name in set(sys.modules) - before:
-        if str(getattr(sys.modules[name], "__file__", None)).endswith("_driver.py"):
+        if str(getattr(sys.modules[name], "__file__", None)).startswith(str(tmp_path)):
             del sys.modules[name]
 
 

@@ -160,8 +160,8 @@ def test_a_full_disk_ends_the_run_safely_and_keeps_what_was_recorded(tmp_path):
 
 
 def test_a_level_beyond_the_voltage_limit_is_refused_before_anything_moves(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"levels_v\[3\] = 9 V: the bench magnet-beam allows up to 5 V"):
-        rig.run(plan_with(levels_v=(0.1, 0.2, 0.3, 9.0)), output=tmp_path / "run.h5")
+    with pytest.raises(ConfigurationError, match=r"levels_v\[3\] = 9.75 V: the bench magnet-beam allows up to 9.5 V"):
+        rig.run(plan_with(levels_v=(0.1, 0.2, 0.3, 9.75)), output=tmp_path / "run.h5")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -359,7 +359,7 @@ def test_a_trip_ends_the_run_and_the_file_names_channel_value_and_sample(tmp_pat
         end = recording.parts[0].end
         accepted = [point for point in recording.points if point["accepted"]]
     assert end["tripped"]
-    assert "displacement amplitude above its limit on channel" in end["text"]
+    assert "displacement above its limit on channel" in end["text"]
     assert "sample" in end["text"]
     assert 0 < len(accepted) < len(LEVELS)
 

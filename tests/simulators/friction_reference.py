@@ -44,7 +44,7 @@ class SlippingEquations:
         linear[2 * m, 2 * m + 1] = 1.0
         linear[2 * m + 1] = (armature - self.force_row) / e.armature_mass_kg
         linear[2 * m + 2, 2 * m + 1 :] = -e.force_factor_n_a / e.inductance_h, -e.resistance_ohm / e.inductance_h
-        self.linear, self.per_volt = linear, 1.0 / e.inductance_h
+        self.linear, self.per_volt = linear, e.amplifier_gain / e.inductance_h
 
     def __call__(self, y: np.ndarray, voltage: float) -> np.ndarray:
         m = self.n_mode

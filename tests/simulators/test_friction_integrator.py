@@ -15,7 +15,7 @@ ALLOWED = {1: 3.1e-2, 2: 9e-3, 4: 2.3e-3}
 
 @pytest.fixture(scope="module")
 def errors() -> dict[int, float]:
-    voltages = 10.0 * np.repeat(np.resize([1.0, -1.0], 8), 17)
+    voltages = 1.0 * np.repeat(np.resize([1.0, -1.0], 8), 17)
     rig = ideal("friction-beam", converter=NO_FILTER)
     equations = SlippingEquations(rig)
     states = equations.solve(voltages, DT_S)

@@ -120,7 +120,12 @@ class VirtualDAQ(DAQ):
     @property
     def latency_samples(self) -> float:
         """Queue, half a sample of hold, and the delay of the converter's filters at low frequency."""
-        return self.queue_samples + HOLD_SAMPLES + self.rig.filter_delay_samples
+        return self.queue_samples + HOLD_SAMPLES + self.filter_delay_samples
+
+    @property
+    def filter_delay_samples(self) -> float:
+        """Delay of the converter's filters at low frequency."""
+        return self.rig.filter_delay_samples
 
     @property
     def counters(self) -> dict[str, int]:

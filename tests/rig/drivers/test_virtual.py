@@ -14,7 +14,10 @@ SLOW_AND_FILTERED = {"oversampling": 10, "substeps": 20, "anti_alias_hz": 320.0}
 
 
 def slow_bench(**converter: Any) -> Bench:
-    return bench_with({"sample_rate_hz": 800.0}, converter={"sample_rate_hz": 800.0} | converter)
+    return bench_with(
+        {"sample_rate_hz": 800.0, "limits": {"frequency_hz": (20.0, 30.0)}},
+        converter={"sample_rate_hz": 800.0} | converter,
+    )
 
 
 def skewed_bench(declared: float, real: float) -> Bench:

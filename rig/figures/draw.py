@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification import IdentificationError, NonlinearMode, nonlinear_mode
+from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
-from rig.measurements import backbone
+from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, TRACE_BINS
+from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
+from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
 from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
 from rig.recording.arrays import kind_of
 from rig.recording.parts import Part
@@ -18,21 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["plot"]
-
-MAIN, SECOND, REJECTED = "#1f4e79", "#c0504d", "#9a9a9a"
-STYLE: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.grid": True,
-    "grid.color": "#e2e2e2",
-    "grid.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "lines.linewidth": 1.2,
-    "legend.frameon": False,
-    "savefig.dpi": 150,
-}
 
 
 def plot(source: Path, figure: Path) -> None:
@@ -54,7 +41,7 @@ def plot(source: Path, figure: Path) -> None:
             _draw_responses(page, source)
         else:
             with Recording(source) as recording:
-                _draw_recording(page, recording)
+                _DRAW[recording.kind](page, recording)
         try:
             page.savefig(figure)
         except OSError as error:
@@ -174,7 +161,7 @@ def _draw_responses(page: "Figure", source: Path) -> None:
     _title(page, f"{responses[0].specimen or 'specimen'}: stepped-sine responses, {len(responses)} levels")
 
 
-def _draw_recording(page: "Figure", recording: Recording) -> None:
+def _draw_backbone(page: "Figure", recording: Recording) -> None:
     axes = page.subplots(2, 2)
     try:
         mode: NonlinearMode | None = nonlinear_mode(backbone(recording))
@@ -188,12 +175,48 @@ def _draw_recording(page: "Figure", recording: Recording) -> None:
     _draw_history(axes[1, 0], axes[1, 1], recording)
     points = {point["number"]: point for point in recording.points}.values()
     left_out = sum(not point["accepted"] for point in points)
-    specimen = recording.configuration["bench"]["specimen"]["name"]
-    text = f"{specimen}: {recording.kind} test, {len(points)} point{'' if len(points) == 1 else 's'}"
+    text = f"{_specimen(recording)}: {recording.kind} test, {len(points)} point{'' if len(points) == 1 else 's'}"
     _title(page, text + (f", {left_out} not accepted" if left_out else ""))
 
 
-TRACE_BINS = 1200
+def _specimen(recording: Recording) -> str:
+    return str(recording.configuration["bench"]["specimen"]["name"])
+
+
+def _draw_sweep(page: "Figure", recording: Recording) -> None:
+    """The last sweep of a recording: its rows are read, and no others."""
+    number, sweep = list(sweeps(recording).items())[-1]
+    rows = point_rows(recording, number)
+    point = next(point for point in reversed(recording.points) if point["number"] == number)
+    draw_sweep(
+        page,
+        sweep,
+        np.vstack([rows["inputs"].T, rows["output_v"]]),
+        float(recording.configuration["bench"]["sample_rate_hz"]),
+        drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"]["off_resonance_hz"]),
+        title=f"{_specimen(recording)}: sweep at {point['level']:g} V, uncontrolled",
+    )
+
+
+def _draw_stepped_sine(page: "Figure", recording: Recording) -> None:
+    responses = frequency_responses(recording)
+    draw_stepped_sine(page, responses, title=f"{_specimen(recording)}: stepped sine, {len(responses)} levels")
+
+
+def _draw_multisine(page: "Figure", recording: Recording) -> None:
+    """The highest level of a recording."""
+    level, at_level = max(spectra(recording).items())
+    realisations = at_level.spectra.shape[0]
+    title = f"{_specimen(recording)}: multisine, {level:g} V RMS, {realisations} realisations"
+    draw_multisine(page, at_level, title=title)
+
+
+_DRAW = {
+    "backbone": _draw_backbone,
+    "sweep": _draw_sweep,
+    "stepped-sine": _draw_stepped_sine,
+    "multisine": _draw_multisine,
+}
 
 
 def _draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None:

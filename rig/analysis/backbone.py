@@ -1,0 +1,135 @@
+"""The backbone of a bench: vibrations at phase resonance over the level, by harmonic balance of the coupled rig."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.backbone_figure import draw_backbone
+from rig.analysis.levels import By, level_range, samples_for
+from rig.analysis.study import Study
+from rig.analysis.subject import Subject, refusing
+from rig.console import number, print_table
+from rig.errors import ConfigurationError
+from simulators.analysis import (
+    HysteresisLoop,
+    NotConvergedError,
+    PeriodicResponses,
+    hysteresis_loops,
+    phase_resonance_backbone,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Backbone", "backbone", "neglected"]
+
+_WORTH_A_NUMBER = 0.001
+_ROUNDING_J = 1e-15
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Backbone(Study):
+    """Vibrations at phase resonance, and the hysteresis of the joints at three of them."""
+
+    responses: PeriodicResponses
+    """One point per level."""
+    loops: dict[int, tuple[HysteresisLoop, ...]]
+    """Loops of all friction joints, by the number of the point: lowest, middle and highest level; empty without joints."""
+
+    @property
+    def figure_in(self) -> tuple[float, float]:
+        """Taller where there are loops."""
+        return (9.0, 8.6) if self.loops else (9.0, 6.4)
+
+    @property
+    def title(self) -> str:
+        """What this is."""
+        return f"backbone by harmonic balance, {self.responses.frequency_hz.size} levels"
+
+    def numbers(self) -> dict[str, Any]:
+        """Points and loops."""
+        joints = [f"{joint.at} ({joint.kind})" for joint in self.subject.rig.friction]
+        loops = [
+            {"point": point, "joint": name, "dissipated_j": loop.dissipated_j, "loop": loop}
+            for point, loops in self.loops.items()
+            for name, loop in zip(joints, loops, strict=True)
+        ]
+        return {"points": self.responses, "frequency_shift": self.responses.frequency_shift, "loops": loops}
+
+    def print_tables(self) -> None:
+        """One line per level, as of a measured backbone."""
+        r = self.responses
+        ratios = [r.force_harmonic_ratio(h) if h < r.force_harmonics_n.shape[1] else None for h in (2, 3)]
+        print_table(
+            ("force N", "voltage V", "frequency Hz", "damping %", "all harmonics %", "amplitude mm", "F2/F1", "F3/F1"),
+            [
+                (
+                    number(r.force_n[k], ".4f"),
+                    number(r.voltage_v[k], ".4f"),
+                    number(r.frequency_hz[k], ".4f"),
+                    number(r.damping_ratio[k], ".4f", 100.0),
+                    number(r.damping_ratio_total_power[k], ".4f", 100.0),
+                    number(r.amplitude_m[k], ".5f", 1e3),
+                    *(number(None if ratio is None else ratio[k], ".3f") for ratio in ratios),
+                )
+                for k in range(r.frequency_hz.size)
+            ],
+        )
+        print(f"modal frequency, largest amplitude over smallest: {100.0 * r.frequency_shift:+.2f} %")
+        for point, loops in self.loops.items():
+            lost = ", ".join(
+                f"{joint.at} {loop.dissipated_j if loop.dissipated_j > _ROUNDING_J else 0.0:.3g}"
+                for joint, loop in zip(self.subject.rig.friction, loops, strict=True)
+            )
+            print(f"lost per period in the joints at {r.force_n[point]:.4g} N, J: {lost}")
+
+    def draw_on(self, page: "Figure") -> None:
+        """Frequency, damping, amplitude and harmonics over the level, and the loops."""
+        draw_backbone(page, self.responses, self.loops, self.subject.rig.friction)
+
+
+def backbone(
+    subject: Subject,
+    *,
+    by: By = "force",
+    lowest: float | None = None,
+    highest: float | None = None,
+    points: int = 15,
+    harmonics: int = 15,
+) -> Backbone:
+    """Backbone over levels of force (peak of the fundamental, N) or voltage (V), in a geometric row.
+
+    Without ``highest`` up to where the bench's limits or the valid range of the rig end it, without ``lowest`` from a
+    hundredth of that. Raises `ConfigurationError` for values that are not allowed, and where nothing is found.
+    """
+    levels = level_range(subject, by, lowest, highest, points, harmonics)
+    ask: dict[str, Any] = {"forces_n" if by == "force" else "voltages_v": levels}
+    notes: list[str] = []
+    try:
+        with refusing():
+            found = phase_resonance_backbone(
+                subject.rig, **ask, near_hz=subject.near_hz, harmonics=harmonics, samples=samples_for(harmonics)
+            )
+    except NotConvergedError as failure:
+        if failure.found is None:
+            raise ConfigurationError(f"no vibration at resonance found at the lowest level: {failure}") from failure
+        found = failure.found
+        notes.append(f"ends after {found.frequency_hz.size} of {levels.size} levels: {failure}")
+    n = found.frequency_hz.size
+    shown = sorted({0, n // 2, n - 1}) if subject.rig.friction else []
+    return Backbone(
+        subject=subject,
+        notes=(*notes, *subject.excesses(found, "levels"), neglected(found)),
+        complete=not notes,
+        responses=found,
+        loops={point: hysteresis_loops(subject.rig, found, point) for point in shown},
+    )
+
+
+def neglected(found: PeriodicResponses) -> str:
+    """How much of the force lies above the harmonics that were balanced."""
+    highest = found.force_harmonics_n.shape[1] - 1
+    percent = 100.0 * float(np.max(found.neglected_share))
+    text = f"up to {percent:.2g} %" if percent >= _WORTH_A_NUMBER else f"less than {_WORTH_A_NUMBER:g} %"
+    return f"force above harmonic {highest} is left out: {text} of the fundamental (--harmonics)"

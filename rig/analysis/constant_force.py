@@ -1,0 +1,124 @@
+"""Response curves at constant force with their unstable branches, and the backbone through their tops."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analysis.backbone import neglected
+from rig.analysis.constant_force_figure import draw_curves
+from rig.analysis.levels import highest_resonance, most_points, samples_for
+from rig.analysis.study import Study
+from rig.analysis.subject import Subject, positive, refusing
+from rig.console import number, print_table
+from rig.errors import ConfigurationError
+from simulators.analysis import (
+    NotConvergedError,
+    PeriodicResponses,
+    constant_force_response,
+    phase_resonance_backbone,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["ConstantForce", "constant_force", "folds_of"]
+
+_DEFAULT_SHARES = (0.1, 0.3, 1.0)
+_LAGS_DEG = (-175.0, -5.0)
+_RESONANCE_DEG = -90.0
+_BACKBONE_POINTS = 15
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ConstantForce(Study):
+    """One response curve per force, phase lag rising along each, and the backbone up to the highest force."""
+
+    curves: dict[float, PeriodicResponses]
+    """Curves by their force, peak of the fundamental in N."""
+    resonances: PeriodicResponses
+    """The backbone."""
+
+    @property
+    def title(self) -> str:
+        """What this is."""
+        return f"responses at constant force, {', '.join(f'{force:.4g}' for force in self.curves)} N"
+
+    def numbers(self) -> dict[str, Any]:
+        """Curves with their folds, and the backbone."""
+        curves = [
+            {"force_n": force, "folds_hz": folds_of(curve), "points": curve} for force, curve in self.curves.items()
+        ]
+        return {"curves": curves, "backbone": self.resonances}
+
+    def print_tables(self) -> None:
+        """One line per curve."""
+        rows = []
+        for force, curve in self.curves.items():
+            top = int(np.argmax(curve.amplitude_m))
+            resonance = int(np.argmin(np.abs(curve.phase_lag_deg - _RESONANCE_DEG)))
+            folds = " to ".join(f"{fold:.4f}" for fold in folds_of(curve))
+            rows.append(
+                (
+                    f"{force:.4f}",
+                    number(curve.frequency_hz[resonance], ".4f"),
+                    number(curve.amplitude_m[top], ".5f", 1e3),
+                    number(curve.frequency_hz[top], ".4f"),
+                    number(float(np.max(curve.voltage_v)), ".3f"),
+                    folds or "none",
+                )
+            )
+        headings = ("force N", "resonance Hz", "largest mm", "at Hz", "highest voltage V", "unstable between, Hz")
+        print_table(headings, rows)
+
+    def draw_on(self, page: "Figure") -> None:
+        """Amplitude and phase over frequency."""
+        draw_curves(page, self.curves, self.resonances)
+
+
+def constant_force(
+    subject: Subject, forces_n: Sequence[float] = (), *, points: int = 141, harmonics: int = 15
+) -> ConstantForce:
+    """Response curves at constant fundamental force (N), ``points`` phase lags each.
+
+    Without forces: a tenth, three tenths, and all of what the backbone reaches within the bench's limits.
+    """
+    lags = np.unique(np.append(np.linspace(*_LAGS_DEG, most_points(points, 3)), _RESONANCE_DEG))
+    if not forces_n:
+        path, last = highest_resonance(subject, harmonics)
+        forces_n = [float(f"{share * path.force_n[last]:.3g}") for share in _DEFAULT_SHARES]
+    how: dict[str, Any] = {"near_hz": subject.near_hz, "harmonics": harmonics, "samples": samples_for(harmonics)}
+    curves, notes, failed = {}, [], []
+    for force in sorted({positive("force_n", force) for force in forces_n}):
+        try:
+            with refusing():
+                curves[force] = constant_force_response(subject.rig, force, lags, **how)
+        except NotConvergedError as failure:
+            failed.append(f"{force:g} N: {failure}")
+            if failure.found is not None:
+                curves[force] = failure.found
+    if not curves:
+        raise ConfigurationError("; ".join(failed))
+    for force, curve in curves.items():
+        notes += [f"{force:g} N: {line}" for line in subject.excesses(curve)]
+    largest = max(curves)
+    with refusing():
+        resonances = phase_resonance_backbone(
+            subject.rig, forces_n=np.linspace(largest / _BACKBONE_POINTS, largest, _BACKBONE_POINTS), **how
+        )
+    return ConstantForce(
+        subject=subject,
+        notes=(*failed, *notes, f"{largest:g} N: {neglected(curves[largest])}"),
+        complete=not failed,
+        curves=curves,
+        resonances=resonances,
+    )
+
+
+def folds_of(curve: PeriodicResponses) -> list[float]:
+    """Frequencies (Hz), lowest first, between which the curve has an unstable branch; empty where it has none."""
+    if curve.stable is None or np.all(curve.stable):
+        return []
+    unstable = curve.frequency_hz[~curve.stable]
+    return [float(np.min(unstable)), float(np.max(unstable))]

@@ -1,0 +1,197 @@
+"""What a slow uncontrolled sweep at constant voltage sees: the force drops out at resonance and overshoots beside it."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.backbone import neglected
+from rig.analysis.forced_figure import draw_forced
+from rig.analysis.levels import highest_resonance, most_points, samples_for
+from rig.analysis.rows import joined, part, turned
+from rig.analysis.study import Study
+from rig.analysis.subject import Subject, positive, refusing
+from rig.console import number, print_table
+from rig.errors import ConfigurationError
+from simulators.analysis import NotConvergedError, PeriodicResponses, forced_response, phase_resonance_backbone
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Forced", "forced"]
+
+Real = NDArray[np.float64]
+
+_DEFAULT_SHARE = 0.5
+_SPAN = (0.7, 1.3)
+_DENSE_WIDTHS = 12.0
+"""Half-widths of the resonance, on either side of it, in which half of the points lie."""
+_SAME = 1e-3
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Forced(Study):
+    """Steady vibrations at one voltage, followed up and down in frequency."""
+
+    voltage_v: float
+    """Amplitude of the voltage."""
+    up: PeriodicResponses
+    """Frequency rising [n]."""
+    down: PeriodicResponses
+    """Frequency falling [n], in the order of rising frequency."""
+
+    @property
+    def title(self) -> str:
+        """What this is."""
+        return f"steady response to {self.voltage_v:.4g} V"
+
+    @property
+    def differ_hz(self) -> Real:
+        """Frequencies at which the two directions differ; empty where they never do, or were not found."""
+        if not self.complete:
+            return np.zeros(0)
+        apart = np.abs(self.up.amplitude_m - self.down.amplitude_m) > _SAME * np.max(self.up.amplitude_m)
+        return np.asarray(self.up.frequency_hz[apart])
+
+    def numbers(self) -> dict[str, Any]:
+        """Both directions, drop-out and overshoot."""
+        return {
+            "voltage_v": self.voltage_v,
+            "up": self.up,
+            "down": self.down,
+            "force": {"up": _extremes(self.up), "down": _extremes(self.down)},
+            "directions_differ_hz": self.differ_hz,
+        }
+
+    def print_tables(self) -> None:
+        """Drop-out and overshoot of the force, and where the directions differ."""
+        rows = []
+        for name, one in (("up", self.up), ("down", self.down)):
+            extremes = _extremes(one)
+            k = int(np.argmax(one.amplitude_m))
+            rows.append(
+                (
+                    name,
+                    number(extremes["at_first_n"], ".4f"),
+                    number(extremes["lowest_n"], ".4f"),
+                    number(extremes["lowest_hz"], ".4f"),
+                    number(extremes["lowest_share"], ".2f", 100.0),
+                    number(extremes["highest_share"], ".3f"),
+                    number(extremes["highest_hz"], ".4f"),
+                    number(one.amplitude_m[k], ".5f", 1e3),
+                )
+            )
+        low = self.up.frequency_hz[0]
+        headings = (f"force at {low:.4g} Hz, N", "lowest N", "at Hz", "% of the first", "highest over first", "at Hz")
+        print_table(("direction", *headings, "largest mm"), rows)
+        if not self.complete:
+            return
+        if self.differ_hz.size:
+            print(f"up and down differ from {self.differ_hz[0]:.4f} to {self.differ_hz[-1]:.4f} Hz")
+        else:
+            print("up and down agree everywhere")
+
+    def draw_on(self, page: "Figure") -> None:
+        """Force, response and lag over frequency."""
+        draw_forced(page, self.up, self.down if self.differ_hz.size or not self.complete else None)
+
+
+def forced(
+    subject: Subject,
+    *,
+    voltage_v: float | None = None,
+    from_hz: float | None = None,
+    to_hz: float | None = None,
+    points: int = 401,
+    harmonics: int = 15,
+) -> Forced:
+    """Steady response to a constant voltage over frequency, rising and falling; half of the points lie around resonance.
+
+    Default: half of the voltage that the bench may be driven at in resonance,
+    from 0.7 to 1.3 times the frequency of the mode under test.
+    """
+    if voltage_v is None:
+        path, last = highest_resonance(subject, harmonics)
+        voltage_v = float(f"{_DEFAULT_SHARE * path.voltage_v[last]:.2g}")
+    voltage = positive("voltage_v", voltage_v)
+    low = positive("from_hz", _SPAN[0] * subject.frequency_hz if from_hz is None else from_hz)
+    high = positive("to_hz", _SPAN[1] * subject.frequency_hz if to_hz is None else to_hz)
+    if low >= high:
+        raise ConfigurationError(f"from_hz = {low:g}: allowed is less than to_hz = {high:g}")
+    how: dict[str, Any] = {"near_hz": subject.near_hz, "harmonics": harmonics, "samples": samples_for(harmonics)}
+    grid = _grid(low, high, most_points(points, 4), _resonance(subject, voltage, how))
+    up, up_ends = _followed(subject, voltage, grid, how)
+    down, down_ends = _followed(subject, voltage, grid[::-1], how)
+    up, down, notes = _completed(up, turned(down), up_ends, down_ends)
+    excesses = dict.fromkeys(line for way in (up, down) for line in subject.excesses(way))
+    return Forced(
+        subject=subject,
+        notes=(*notes, *excesses, neglected(up)),
+        complete=not (up_ends and down_ends),
+        voltage_v=voltage,
+        up=up,
+        down=down,
+    )
+
+
+def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
+    """Vibrations in the order of the grid as far as they are found, and why no further."""
+    try:
+        with refusing():
+            return forced_response(subject.rig, voltage_v, grid, **how), ""
+    except NotConvergedError as failure:
+        if failure.found is None:
+            raise ConfigurationError(f"{voltage_v:g} V: {failure}") from failure
+        return failure.found, str(failure)
+
+
+def _completed(
+    up: PeriodicResponses, down: PeriodicResponses, up_ends: str, down_ends: str
+) -> tuple[PeriodicResponses, PeriodicResponses, list[str]]:
+    """Directions completed by each other: beyond the end of its branch a sweep jumps to the one that is left."""
+    n_up, n_down = up.frequency_hz.size, down.frequency_hz.size
+    jump = "the branch of {} frequency ends at {:.4f} Hz; beyond, the vibration of the other direction is taken"
+    if up_ends and down_ends:
+        both = (("rising", up.frequency_hz[-1], up_ends), ("falling", down.frequency_hz[0], down_ends))
+        return up, down, [f"{name} frequency ends at {ends_hz:.4f} Hz: {why}" for name, ends_hz, why in both]
+    if up_ends:
+        return joined(up, part(down, slice(n_up, None))), down, [jump.format("rising", up.frequency_hz[-1])]
+    if down_ends:
+        return up, joined(part(up, slice(0, n_up - n_down)), down), [jump.format("falling", down.frequency_hz[0])]
+    return up, down, []
+
+
+def _resonance(subject: Subject, voltage_v: float, how: dict[str, Any]) -> tuple[float, float, float]:
+    """Linear frequency, frequency at phase resonance under the voltage, and half-width of that resonance, Hz."""
+    try:
+        with refusing():
+            path = phase_resonance_backbone(subject.rig, voltages_v=voltage_v * np.array([0.05, 0.3, 1.0]), **how)
+        resonance_hz, damping = float(path.frequency_hz[-1]), float(path.damping_ratio[-1])
+    except NotConvergedError:
+        resonance_hz, damping = subject.frequency_hz, float(subject.rig.linear_modes.damping_ratio[subject.mode])
+    return subject.frequency_hz, resonance_hz, damping * resonance_hz
+
+
+def _grid(low: float, high: float, points: int, resonance: tuple[float, float, float]) -> Real:
+    """Frequencies from low to high: half of them even, half of them where the resonance is or was."""
+    linear_hz, resonance_hz, width_hz = resonance
+    first = min(linear_hz, resonance_hz) - _DENSE_WIDTHS * width_hz
+    last = max(linear_hz, resonance_hz) + _DENSE_WIDTHS * width_hz
+    first, last = max(low, first), min(high, last)
+    dense = np.linspace(first, last, points // 2 if first < last else 0)
+    return np.unique(np.concatenate([np.linspace(low, high, points - dense.size), dense]))
+
+
+def _extremes(way: PeriodicResponses) -> dict[str, float]:
+    """Force at the lowest frequency, smallest and largest force and where, also as shares of the first."""
+    force, lowest, highest = way.force_n, int(np.argmin(way.force_n)), int(np.argmax(way.force_n))
+    return {
+        "at_first_n": float(force[0]),
+        "lowest_n": float(force[lowest]),
+        "lowest_hz": float(way.frequency_hz[lowest]),
+        "lowest_share": float(force[lowest] / force[0]),
+        "highest_n": float(force[highest]),
+        "highest_hz": float(way.frequency_hz[highest]),
+        "highest_share": float(force[highest] / force[0]),
+    }

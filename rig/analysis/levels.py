@@ -1,0 +1,75 @@
+"""Levels of an analysis: those asked for, or as far as the bench may be driven."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.subject import Subject, positive, refusing
+from rig.errors import ConfigurationError
+from simulators.analysis import NotConvergedError, PeriodicResponses, phase_resonance_backbone
+
+__all__ = ["By", "highest_resonance", "level_range", "most_points", "samples_for"]
+
+Real = NDArray[np.float64]
+By = Literal["force", "voltage"]
+
+_LOWEST_SHARE = 0.01
+"""The lowest level of a range that is not given, over the highest."""
+_SEARCHED = 25
+_MOST_POINTS = 20_000
+
+
+def level_range(
+    subject: Subject, by: By, lowest: float | None, highest: float | None, points: int, harmonics: int
+) -> Real:
+    """Levels [points] in a geometric row: peaks of the fundamental force (N) or voltages (V).
+
+    Without ``highest`` they end where the bench's limits, or the valid range of the rig, end the backbone.
+    """
+    unit = "n" if by == "force" else "v"
+    if highest is None:
+        path, last = highest_resonance(subject, harmonics)
+        highest = float(path.force_n[last] if by == "force" else path.voltage_v[last])
+    high = positive(f"to_{unit}", highest)
+    low = positive(f"from_{unit}", _LOWEST_SHARE * high if lowest is None else lowest)
+    if low >= high:
+        raise ConfigurationError(f"from_{unit} = {low:g}: allowed is less than to_{unit} = {high:g}")
+    return np.geomspace(low, high, most_points(points, 2))
+
+
+def most_points(points: int, least: int) -> int:
+    """``points`` where it is a number of points that makes sense."""
+    if not least <= points <= _MOST_POINTS:
+        raise ConfigurationError(f"points = {points}: allowed is {least} to {_MOST_POINTS}")
+    return points
+
+
+def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicResponses, int]:
+    """A backbone over the voltages of the bench, and the number of its last point that the bench may be driven at."""
+    limit_v = subject.bench.limits.voltage_v
+    volts = np.geomspace(_LOWEST_SHARE * limit_v, limit_v, _SEARCHED)
+    try:
+        with refusing():
+            path = phase_resonance_backbone(
+                subject.rig,
+                voltages_v=volts,
+                near_hz=subject.near_hz,
+                harmonics=harmonics,
+                samples=samples_for(harmonics),
+            )
+    except NotConvergedError as failure:
+        if failure.found is None:
+            raise ConfigurationError(f"no resonance found at {volts[0]:g} V: {failure}") from failure
+        path = failure.found
+    allowed = subject.within(path)
+    count = path.frequency_hz.size if np.all(allowed) else int(np.argmin(allowed))
+    if count == 0:
+        excesses = "; ".join(subject.excesses(path)) or "the resonance is outside of limits.frequency_hz"
+        raise ConfigurationError(f"already at {volts[0]:g} V the bench may not be driven at resonance ({excesses})")
+    return path, count - 1
+
+
+def samples_for(harmonics: int) -> int:
+    """Samples per period that resolve the nonlinear forces well: 512 up to 15 harmonics, then in proportion."""
+    return max(512, 32 * (harmonics + 1))

@@ -1,0 +1,124 @@
+"""Linear frequency responses of a bench: voltage to force and accelerations, force to accelerations."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.levels import most_points
+from rig.analysis.linear_figure import draw_responses
+from rig.analysis.study import Study
+from rig.analysis.subject import Subject, positive, refusing
+from rig.console import number, print_table
+from rig.errors import ConfigurationError
+from simulators.analysis import FrequencyResponses, frequency_response
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Responses", "responses"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_BELOW_LOWEST_MODE = 0.5
+_ABOVE_HIGHEST_MODE = 1.2
+_AROUND_A_MODE = np.tan(np.linspace(-1.5, 1.5, 41))
+"""Places around a resonance in units of its half-width, dense where the response turns."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Responses(Study):
+    """Linear frequency responses in continuous time, of what the sensors are exposed to."""
+
+    found: FrequencyResponses
+    """Everything as `simulators.analysis` has it."""
+    force_n_per_v: Complex
+    """Stinger force per voltage [n]."""
+    acceleration_per_v: dict[str, Complex]
+    """Acceleration per voltage of each acceleration channel [n], (m/s^2)/V."""
+    accelerance_per_kg: dict[str, Complex]
+    """Acceleration per stinger force of each acceleration channel [n], (m/s^2)/N."""
+
+    @property
+    def title(self) -> str:
+        """What this is."""
+        f = self.found.frequency_hz
+        return f"linear frequency responses, {f[0]:.4g} to {f[-1]:.4g} Hz, {f.size} points"
+
+    def numbers(self) -> dict[str, Any]:
+        """Curves over the frequency."""
+        return {
+            "frequency_hz": self.found.frequency_hz,
+            "force_n_per_v": self.force_n_per_v,
+            "acceleration_m_s2_per_v": self.acceleration_per_v,
+            "acceleration_m_s2_per_n": self.accelerance_per_kg,
+            "displacement_m_per_v": self.found.displacement_m_per_v,
+            "receptance_m_per_n": self.found.receptance_m_per_n,
+        }
+
+    def print_tables(self) -> None:
+        """Magnitudes and phases at the modes of the structure that lie in the range, and at both ends."""
+        f, modes = self.found.frequency_hz, self.subject.rig.linear_modes.frequency_hz
+        shown = {0, f.size - 1} | {int(np.argmin(np.abs(f - m))) for m in modes if f[0] <= m <= f[-1]}
+        drive = next(channel.name for channel in self.subject.bench.channels if channel.role == "drive")
+        curves = {
+            "force N/V": self.force_n_per_v,
+            f"{drive} m/s^2/V": self.acceleration_per_v[drive],
+            f"{drive} m/s^2/N": self.accelerance_per_kg[drive],
+        }
+        print("at the modes of the structure and at both ends, magnitude and phase in deg (all points with --json)")
+        print_table(
+            ("frequency Hz", *(heading for name in curves for heading in (name, "phase"))),
+            [
+                (
+                    f"{f[k]:.4f}",
+                    *(
+                        text
+                        for curve in curves.values()
+                        for text in (number(abs(curve[k]), ".4g"), number(np.angle(curve[k]), ".1f", 180.0 / np.pi))
+                    ),
+                )
+                for k in sorted(shown)
+            ],
+        )
+
+    def draw_on(self, page: "Figure") -> None:
+        """Magnitudes and phases."""
+        draw_responses(
+            page, self.found.frequency_hz, self.force_n_per_v, self.acceleration_per_v, self.accelerance_per_kg
+        )
+
+
+def responses(
+    subject: Subject, *, from_hz: float | None = None, to_hz: float | None = None, points: int = 500
+) -> Responses:
+    """Linear frequency responses over a geometric row of frequencies, with more points around every resonance.
+
+    Default: from half of the lowest mode to above the highest mode, a quarter of the sample rate at most.
+    """
+    rig, modes = subject.rig, subject.rig.linear_modes
+    highest = min(_ABOVE_HIGHEST_MODE * modes.frequency_hz[-1], 0.25 * subject.bench.sample_rate_hz)
+    lowest = _BELOW_LOWEST_MODE * float(min(modes.frequency_hz[modes.frequency_hz > 0.0]))
+    low = positive("from_hz", lowest if from_hz is None else from_hz)
+    high = positive("to_hz", max(highest, 2.0 * low) if to_hz is None else to_hz)
+    if low >= high:
+        raise ConfigurationError(f"from_hz = {low:g}: allowed is less than to_hz = {high:g}")
+    row = [np.geomspace(low, high, most_points(points, 2))]
+    for several in (modes, rig.coupled_modes):
+        for frequency_hz, damping_ratio in zip(several.frequency_hz, several.damping_ratio, strict=True):
+            row.append(frequency_hz * (1.0 + damping_ratio * _AROUND_A_MODE))
+    grid = np.unique(np.concatenate(row))
+    with refusing():
+        found = frequency_response(rig, grid[(grid >= low) & (grid <= high)])
+    where = {sensor.name: sensor.at for sensor in rig.sensors if sensor.at is not None}
+    accelerances = found.accelerance_per_kg
+    return Responses(
+        subject=subject,
+        notes=("elements at their linear stiffness, joints stuck; continuous time, without sensors and converters",),
+        found=found,
+        force_n_per_v=found.force_n_per_v,
+        acceleration_per_v={name: found.sensor_per_v[name] for name in where},
+        accelerance_per_kg={name: accelerances[at] for name, at in where.items()},
+    )

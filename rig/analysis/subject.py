@@ -1,0 +1,149 @@
+"""What is analysed: the virtual rig behind a bench, the mode under test, and what the bench may be asked for."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.bench import Bench, load_bench
+from rig.drivers.virtual import VirtualDAQ
+from rig.errors import ConfigurationError
+from simulators.analysis import PeriodicResponses
+from simulators.layout import Flag
+from simulators.virtual_rig import VirtualRig
+
+__all__ = ["Demand", "Subject", "positive", "refusing", "subject_of"]
+
+Real = NDArray[np.float64]
+
+_TOLERANCE = 1.0 + 1e-6
+
+FLAG_WORDS = {
+    Flag.MAGNET_RANGE: "a nonlinear element is beyond the range in which its law holds",
+    Flag.SENSOR_CLIPPED: "a sensor would clip",
+    Flag.DAC_CLIPPED: "the voltage is beyond the output converter",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Demand:
+    """A quantity that the bench limits, over the points of an analysis."""
+
+    name: str
+    values: Real
+    """Largest value at each point [n]."""
+    limit: float
+    unit: str
+    whose: str = "the bench's"
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A bench with the virtual rig behind it; of a rig that scatters the nominal specimen."""
+
+    bench: Bench
+    rig: VirtualRig
+    remarks: tuple[str, ...]
+    near_hz: float
+    """The linear mode nearest to this frequency is the one under test."""
+
+    @cached_property
+    def mode(self) -> int:
+        """Index of the mode under test among the linear modes of the structure."""
+        return int(np.argmin(np.abs(self.rig.linear_modes.frequency_hz - self.near_hz)))
+
+    @property
+    def frequency_hz(self) -> float:
+        """Linear frequency of the mode under test."""
+        return float(self.rig.linear_modes.frequency_hz[self.mode])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What holds for every analysis of this bench."""
+        scatter = ("the specimen scatters from run to run or by assembly; this is the nominal one, without scatter",)
+        return (*(scatter if self.rig.scatters else ()), *self.remarks)
+
+    def demands(self, responses: PeriodicResponses) -> list[Demand]:
+        """What the points ask of the bench, beside what it allows."""
+        limits, omega = self.bench.limits, 2.0 * np.pi * responses.frequency_hz
+        moving = [
+            responses.sensor_harmonics[channel.name]
+            for channel in self.bench.channels
+            if channel.role in ("drive", "response")
+        ]
+        peaks = np.max([peak(harmonics) for harmonics in moving], axis=0)
+        travel = np.max([np.abs(harmonics[:, 1]) / omega**2 for harmonics in moving], axis=0)
+        return [
+            Demand("voltage", responses.voltage_v, limits.voltage_v, "V"),
+            Demand("voltage", responses.voltage_v, self.rig.exciter.input_limit_v, "V", "the amplifier's"),
+            Demand("force", peak(responses.force_harmonics_n), limits.force_n, "N"),
+            Demand("acceleration", peaks, limits.acceleration_m_s2, "m/s^2"),
+            Demand("displacement", travel, limits.displacement_m, "m"),
+        ]
+
+    def within(self, responses: PeriodicResponses) -> NDArray[np.bool_]:
+        """Points [n] that the bench may be asked for and that raise no flag."""
+        inside = [demand.values <= _TOLERANCE * demand.limit for demand in self.demands(responses)]
+        low, high = self.bench.limits.frequency_hz
+        frequency = (responses.frequency_hz >= low) & (responses.frequency_hz <= high)
+        return np.asarray(np.all(inside, axis=0) & frequency & (responses.flags == 0))
+
+    def excesses(self, responses: PeriodicResponses, of: str = "points") -> tuple[str, ...]:
+        """Where points leave the valid range of the rig or the limits of the bench, one line each."""
+        total = responses.frequency_hz.size
+        lines = [
+            f"{text} in {count} of {total} {of}"
+            for flag, text in FLAG_WORDS.items()
+            if (count := int(np.count_nonzero(responses.flags & int(flag))))
+        ]
+        for demand in self.demands(responses):
+            if count := int(np.count_nonzero(demand.values > _TOLERANCE * demand.limit)):
+                lines.append(
+                    f"{demand.name} reaches {np.max(demand.values):.4g} {demand.unit} and is in {count} of {total} {of} "
+                    f"above {demand.whose} limit of {demand.limit:g} {demand.unit}"
+                )
+        return tuple(lines)
+
+
+def subject_of(bench: Bench | str | Path, near_hz: float | None = None) -> Subject:
+    """The virtual rig of a bench, or of a bench by its name or TOML file.
+
+    ``near_hz``: the mode under test is the one nearest to it; without it, to the linear frequency that the bench states.
+    Raises `ConfigurationError` for a bench that is not allowed or whose driver is not the virtual one.
+    """
+    loaded = bench if isinstance(bench, Bench) else load_bench(bench)
+    if loaded.driver.name != "virtual":
+        raise ConfigurationError(
+            f"driver.name = {loaded.driver.name!r} in bench {loaded.name}: allowed is 'virtual', nothing else can be analysed"
+        )
+    daq = VirtualDAQ(loaded)
+    near = loaded.specimen.linear_frequency_hz if near_hz is None else positive("near_hz", near_hz)
+    remarks = tuple(line for line in daq.remarks if line.startswith("specimen.") and near_hz is None)
+    return Subject(loaded, daq.rig, remarks, near)
+
+
+def positive(name: str, value: float) -> float:
+    """``value`` where it is a finite number above zero; `ConfigurationError` otherwise."""
+    if not 0.0 < value < np.inf:
+        raise ConfigurationError(f"{name} = {value:g}: allowed is a number above 0")
+    return value
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """What the physics refuses, as the bench's own error."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from error
+
+
+def peak(harmonics: NDArray[np.complex128], samples: int = 256) -> Real:
+    """Largest absolute value over a period [n] of signals with harmonics [n, H + 1]."""
+    theta = 2.0 * np.pi * np.arange(samples) / samples
+    waves = np.exp(1j * np.outer(np.arange(harmonics.shape[1]), theta))
+    return np.asarray(np.max(np.abs(np.einsum("nh,ht->nt", harmonics, waves).real), axis=1))

@@ -1,0 +1,137 @@
+"""The parts that a virtual rig is built from, as `rig list` shows them: made from the models, so nobody keeps it up."""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+from rig.errors import ConfigurationError
+from simulators.virtual_rig import VirtualRig
+
+__all__ = ["part_keys", "parts", "specimens"]
+
+Schema = dict[str, Any]
+
+UNITS = {
+    "m_s2": "m/s^2", "n_m_rad": "N m/rad", "n_s_m": "N s/m", "n_m4": "N m^4", "n_m3": "N/m^3", "n_m2": "N/m^2",
+    "kg_m3": "kg/m^3", "kg_m2": "kg m^2", "v_per_unit": "V per N or m/s^2", "rad_s": "rad/s", "n_m": "N/m", "n_a": "N/A",
+    "a_v": "A/V", "per_m2": "1/m^2", "per_m": "1/m", "ohm": "ohm", "deg": "deg", "hz": "Hz", "pa": "Pa", "kg": "kg",
+    "samples": "samples", "s": "s", "h": "H", "v": "V", "n": "N", "m": "m", "a": "A",
+}  # fmt: skip
+"""Units by the end of a key, longer ends first."""
+_TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
+_BOUNDS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
+_FEW = 4
+
+
+def specimens() -> list[dict[str, str]]:
+    """The shipped specimens: name, and what their file says first."""
+    from simulators.shipped import shipped_specimens, specimen_table
+
+    rows = []
+    for name in shipped_specimens():
+        table = specimen_table(name)
+        has = [str(part["kind"]) for key in ("elements", "friction") for part in table.get(key, ())]
+        local = ", ".join(f"{has.count(kind)} {kind}" for kind in dict.fromkeys(has))
+        rows.append({"name": name, "description": f"{table['structure']['kind']}; {local or 'linear'}"})
+    return rows
+
+
+def parts() -> list[dict[str, Any]]:
+    """Every part: where in the rig's table it stands, its name, its first line, and choices that it offers."""
+    return [
+        {"group": group, "name": name, "description": _first_line(schema), "choices": _choices(name, schema)}
+        for group, name, schema in _named_parts()
+    ]
+
+
+def part_keys(name: str) -> dict[str, Any]:
+    """A part in full: its description and its keys with type, unit, default and description.
+
+    Raises `ConfigurationError` for a name that no part has.
+    """
+    for group, known, schema in _named_parts():
+        if known == name:
+            text = str(schema.get("description", ""))
+            return {"group": group, "name": name, "description": text, "keys": list(_keys(schema, name))}
+    allowed = ", ".join(known for _, known, _ in _named_parts())
+    raise ConfigurationError(f"part = {name!r}: there is no such part; allowed is {allowed}")
+
+
+@cache
+def _schema() -> Schema:
+    return VirtualRig.model_json_schema()
+
+
+def _named_parts() -> Iterator[tuple[str, str, Schema]]:
+    """Group, name and schema of every part, in the order of the rig's table."""
+    for group, field in _schema()["properties"].items():
+        several = field.get("items", field)
+        kinds = several.get("discriminator", {}).get("mapping")
+        if kinds:
+            listed = {variant["$ref"]: number for number, variant in enumerate(several["oneOf"])}
+            for kind in sorted(kinds, key=lambda kind: listed[kinds[kind]]):
+                yield group, kind, _resolved(kinds[kind])
+        elif "$ref" in several:
+            yield group, group.removesuffix("s") if "items" in field else group, _resolved(several["$ref"])
+
+
+def _resolved(reference: str) -> Schema:
+    return dict(_schema()["$defs"][reference.rpartition("/")[2]])
+
+
+def _first_line(schema: Schema) -> str:
+    """The first paragraph of a model's docstring in one line, without its marks."""
+    return _plain(str(schema.get("description", "")).partition("\n\n")[0])
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.replace("``", "").replace("`", "").split())
+
+
+def _choices(name: str, schema: Schema) -> dict[str, list[str]]:
+    """Keys that take one of a few words, other than the one that names the part."""
+    words = {key: _words(field) for key, field in schema["properties"].items()}
+    return {key: few for key, few in words.items() if 0 < len(few) <= _FEW and name not in few}
+
+
+def _words(field: Schema) -> list[str]:
+    return [str(word) for word in field.get("enum", [field["const"]] if "const" in field else [])]
+
+
+def _keys(schema: Schema, name: str, path: str = "") -> Iterator[dict[str, Any]]:
+    """All keys of a part, and those of the parts inside it under ``path[].key``."""
+    required = schema.get("required", [])
+    for key, field in sorted(schema["properties"].items(), key=lambda item: item[0] != "kind"):
+        inner = field.get("items", field)
+        yield {
+            "key": path + key,
+            "type": _type(field),
+            "unit": _unit(key),
+            "required": key in required,
+            "default": field.get("default"),
+            "description": _plain(str(field.get("description", ""))),
+        }
+        if "$ref" in inner:
+            yield from _keys(_resolved(inner["$ref"]), name, f"{path}{key}{'[]' if 'items' in field else ''}.")
+
+
+def _unit(key: str) -> str:
+    return next((unit for end, unit in UNITS.items() if key.endswith(f"_{end}")), "")
+
+
+def _type(field: Schema) -> str:
+    """Type and range of a key in words."""
+    if words := _words(field):
+        return " | ".join(words)
+    if "anyOf" in field:
+        return " or ".join(_type(one) for one in field["anyOf"])
+    if "$ref" in field:
+        return "table"
+    kind = field.get("type")
+    if kind == "array":
+        return f"list of {_type(field['items'])}"
+    if kind == "object":
+        inside = field.get("additionalProperties")
+        return f"table of name = {_type(inside)}" if isinstance(inside, dict) else "table"
+    bounds = " ".join(f"{word} {field[bound]:g}" for bound, word in _BOUNDS.items() if bound in field)
+    return f"{_TYPES.get(str(kind), 'value')} {bounds}".strip()

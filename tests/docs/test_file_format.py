@@ -1,0 +1,51 @@
+"""The page on the file format names everything that points of every kind hold."""
+
+import re
+
+import pytest
+
+import rig
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.plan import Plan
+from rig.campaigns.plans import load_plan, plan_from
+from tests.docs.pages import ROOT
+
+SMALL = {"bench": "magnet-beam", "levels_v": [0.4]}
+PLANS = {
+    "backbone": load_plan("magnet-beam/backbone").model_dump(mode="json") | {"levels_v": [0.8], "record_periods": 8},
+    "stepped-sine": SMALL | {"kind": "stepped-sine", "frequencies_hz": [23.0]},
+    "sweep": SMALL | {"kind": "sweep", "start_hz": 22.0, "stop_hz": 26.0, "rate_hz_per_s": 4.0},
+    "multisine": {
+        "kind": "multisine",
+        "bench": "magnet-beam",
+        "levels_rms_v": [0.1],
+        "lowest_hz": 22.0,
+        "highest_hz": 28.0,
+        "resolution_hz": 0.5,
+        "realisations": 1,
+    },
+}
+BY_RULE = re.compile(r"(off_resonance|minimum|overshoot|peak|window)_?\w*")  # fields of ForceDropOut, named as such
+
+
+def section(heading: str) -> str:
+    text = (ROOT / "docs" / "file-format.md").read_text(encoding="utf-8")
+    found = re.search(rf"^## {heading}$(.*?)(?=^## )", text, re.MULTILINE | re.DOTALL)
+    assert found
+    return found.group(1)
+
+
+def test_every_kind_of_point_is_looked_at():
+    assert set(PLANS) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", PLANS)
+def test_every_key_of_a_point_is_on_the_page(kind):
+    named = set(re.findall(r"`(\w+)`", section("Points")))
+    plan: Plan = plan_from(PLANS[kind], kind)
+    with rig.run(plan) as run:
+        point, part = run.recording.points[0], run.recording.parts[0]
+        assert part.information["device_flags"][0] == "magnet_range"
+    assert point["accepted"], point["reason"]
+    keys = {key for key in point if kind != "sweep" or not BY_RULE.fullmatch(key)}
+    assert keys <= named

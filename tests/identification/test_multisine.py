@@ -1,0 +1,109 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification import IdentificationError, MultisineDesign
+
+DESIGN = MultisineDesign(sample_rate_hz=5000.0, period_samples=4096, lowest_hz=15.0, highest_hz=35.0, rms=0.7)
+
+
+def component(signal: np.ndarray, line: int) -> complex:
+    """Peak amplitude and phase of a line, by the definition of the Fourier coefficient."""
+    turn = 2 * np.pi * line * np.arange(signal.size) / signal.size
+    return complex(2 * np.mean(signal * np.exp(-1j * turn)))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    period=st.integers(50, 3000),
+    band=st.tuples(st.floats(0.01, 0.2), st.floats(0.25, 0.49)),
+    grid=st.sampled_from(["full", "odd"]),
+    rms=st.floats(0.01, 10.0),
+    seed=st.integers(0, 9),
+)
+def test_power_lies_on_the_excited_lines_only_and_rms_is_as_asked(
+    period: int, band: tuple[float, float], grid: str, rms: float, seed: int
+) -> None:
+    design = MultisineDesign(1000.0, period, 1000.0 * band[0], 1000.0 * band[1], grid, rms)
+    signal = design.realisation(seed, 0)
+    assert np.sqrt(np.mean(signal**2)) == pytest.approx(rms)
+    spectrum = np.abs(np.fft.rfft(signal)) * 2 / period
+    excited = np.zeros(spectrum.size, dtype=bool)
+    excited[design.lines] = True
+    np.testing.assert_allclose(spectrum[excited], rms * np.sqrt(2 / design.lines.size), rtol=1e-9)
+    assert np.all(spectrum[~excited] < 1e-10 * rms)
+    assert np.all((design.frequency_hz >= 1000 * band[0] - 1e-6) & (design.frequency_hz <= 1000 * band[1] + 1e-6))
+    assert grid == "full" or np.all(design.lines % 2 == 1)
+
+
+def test_both_ends_of_the_band_are_excited() -> None:
+    design = MultisineDesign.with_resolution(sample_rate_hz=5000.0, resolution_hz=0.1, lowest_hz=0.3, highest_hz=0.7)
+    assert design.period_samples == 50_000
+    assert design.lines.tolist() == [3, 4, 5, 6, 7]
+    assert design.resolution_hz == pytest.approx(0.1)
+    assert design.period_s == pytest.approx(10.0)
+
+
+def test_a_realisation_is_the_same_always_and_unlike_any_other() -> None:
+    first = DESIGN.realisation(3, 1)
+    assert np.array_equal(first, MultisineDesign(5000.0, 4096, 15.0, 35.0, rms=0.7).realisation(3, 1))
+    others = [DESIGN.realisation(3, 0), DESIGN.realisation(3, 2), DESIGN.realisation(4, 1)]
+    for other in others:
+        assert abs(np.corrcoef(first, other)[0, 1]) < 0.9
+
+
+def test_phases_are_even_over_the_circle() -> None:
+    phases = np.array([[np.angle(component(DESIGN.realisation(0, r), k)) for k in DESIGN.lines] for r in range(200)])
+    samples = phases.size
+    for harmonic in (1, 2, 3):  # the mean of exp(i h phi) over n even phases has a deviation of 1 / sqrt(n)
+        assert abs(np.mean(np.exp(1j * harmonic * phases))) < 4 / np.sqrt(samples)
+
+
+def test_unit_peak_times_crest_factor_times_rms_is_the_realisation() -> None:
+    unit = DESIGN.unit_peak(1, 2)
+    assert np.max(np.abs(unit)) == 1.0
+    np.testing.assert_allclose(unit * DESIGN.crest_factor(1, 2) * 0.7, DESIGN.realisation(1, 2), atol=1e-14)
+    single = MultisineDesign(1000.0, 40, 25.0, 25.0)
+    assert single.crest_factor(0, 0) == pytest.approx(np.sqrt(2.0), rel=0.01)
+
+
+def test_amplitudes_follow_the_given_spectrum() -> None:
+    design = MultisineDesign(1000.0, 100, 10.0, 40.0, rms=2.0, relative_amplitudes=(4.0, 3.0, 0.0, 0.0))
+    signal = design.realisation(0, 0)
+    # 4 : 3 with (A1^2 + A2^2) / 2 = 4
+    expected = [1.6 * np.sqrt(2), 1.2 * np.sqrt(2), 0.0, 0.0]
+    assert [abs(component(signal, k)) for k in (1, 2, 3, 4)] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"highest_hz": 2500.0}, r"highest_hz: is 2500 Hz, must be below half the sample rate, 2500 Hz"),
+        ({"highest_hz": 10.0}, r"highest_hz: is 10 Hz, needs lowest_hz = 15 Hz"),
+        ({"lowest_hz": 15.1, "highest_hz": 15.2}, r"no line of the full grid in 15.1 to 15.2 Hz; lines are 1.2207 Hz"),
+        ({"lowest_hz": 17.0, "highest_hz": 17.2, "grid": "odd"}, r"no line of the odd grid"),
+        ({"grid": "even"}, r"grid: is 'even', allowed are full, odd"),
+        ({"period_samples": 2}, r"period_samples: is 2, needs at least 3"),
+        ({"rms": 0.0}, r"rms: is 0, must be finite and above zero"),
+        ({"lowest_hz": float("nan")}, r"lowest_hz: is nan Hz"),
+        ({"relative_amplitudes": (1.0, 2.0)}, r"relative_amplitudes: has 2 values for 16 lines"),
+        ({"relative_amplitudes": (0.0,) * 16}, r"relative_amplitudes: lowest is 0, highest 0"),
+    ],
+)
+def test_a_design_that_cannot_be_played_is_refused(change: dict[str, object], message: str) -> None:
+    design = {"sample_rate_hz": 5000.0, "period_samples": 4096, "lowest_hz": 15.0, "highest_hz": 35.0} | change
+    with pytest.raises(IdentificationError, match=message):
+        MultisineDesign(**design)
+
+
+def test_a_resolution_without_whole_samples_is_refused_with_the_next_one() -> None:
+    with pytest.raises(
+        IdentificationError, match=r"resolution_hz: is 0.3 Hz, .*16666.6667 samples at 5000 Hz; .*0.299994"
+    ):
+        MultisineDesign.with_resolution(sample_rate_hz=5000.0, resolution_hz=0.3, lowest_hz=1.0, highest_hz=9.0)
+
+
+def test_seeds_below_zero_are_refused() -> None:
+    with pytest.raises(IdentificationError, match="seed: is -1, needs zero or more"):
+        DESIGN.realisation(-1, 0)
