@@ -208,6 +208,33 @@ def test_a_sweep_that_makes_no_sense_is_refused(changes, fault):
         _sweep(**changes)
 
 
+def test_a_ramp_to_a_limit_of_the_frequency_does_not_trip_by_rounding():
+    settle = {"average_periods": 1, "settled_periods": 1, "amplitude": 0.5}
+    plan = _plan(levels_v=(0.1,), frequencies_hz=(100.0, 8.0), record_periods=4, accepted_drift=1.0, settle=settle)
+    omega, lowest = 2.0 * np.pi * 100.0, 2.0 * np.pi * 8.0
+    assert omega + (lowest - omega) < lowest  # what the limit is up against
+    with rig.run(plan, bench=bench_with(**QUIET)) as run:
+        assert run.recording.parts[0].end["reason"] == "completed"
+
+
+@pytest.mark.parametrize(
+    ("plan", "highest_hz"),
+    [
+        (MULTISINE.model_copy(update={"levels_rms_v": (0.5,), "ramp_s": 1e-3, "transient_periods": 0}), 29.0),
+        (_sweep(levels_v=(2.0,), ramp_periods=1, hold_periods=1, start_hz=200.0, stop_hz=190.0), 200.0),
+    ],
+    ids=["multisine", "sweep"],
+)
+def test_what_is_recorded_is_at_its_level_though_the_ramp_is_faster_than_the_slew_limit(plan, highest_hz):
+    with rig.run(plan, bench=bench_with({"limits": {"slew_v_per_s": 20.0}}, **QUIET)) as run:
+        for point in run.recording.points:
+            commanded = point_rows(run.recording, point["number"])["command_v"]
+            assert commanded.min() >= 0.998 * commanded.max() > 0.0
+        part = run.recording.parts[0]
+        steps = np.abs(np.diff(part.rows("output_v")))  # one realisation does not break off into the next
+        assert steps.max() < 1.1 * 2.0 * np.pi * highest_hz / 5000.0 * part.rows("command_v").max()
+
+
 class StopAfterOne(Silent):
     """Asks for a stop as soon as the first point is done."""
 
