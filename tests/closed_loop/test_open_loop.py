@@ -1,13 +1,18 @@
 """Excitation without feedback, through the same tick: what goes out, and what comes back against harmonic balance."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 import rig
 from rig.campaigns.execution import Silent
 from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import MULTISINE_COLUMNS
 from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS
 from rig.campaigns.sweep import SweepPlan
+from rig.console import RunProgress
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
 from rig.summary import summarise_recording as show
@@ -201,6 +206,8 @@ def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
         ({"rate_hz_per_s": None}, "exactly one"),
         ({"stop_hz": 22.0}, "anything but start_hz"),
         ({"rate_hz_per_s": -1.0}, "rate_hz_per_s"),
+        ({"rate_hz_per_s": 1e4}, "rate_hz_per_s = 10000: allowed is up to 12.25 "),
+        ({"off_resonance_hz": ()}, "off_resonance_hz"),
     ],
 )
 def test_a_sweep_that_makes_no_sense_is_refused(changes, fault):
@@ -228,11 +235,40 @@ def test_a_ramp_to_a_limit_of_the_frequency_does_not_trip_by_rounding():
 def test_what_is_recorded_is_at_its_level_though_the_ramp_is_faster_than_the_slew_limit(plan, highest_hz):
     with rig.run(plan, bench=bench_with({"limits": {"slew_v_per_s": 20.0}}, **QUIET)) as run:
         for point in run.recording.points:
-            commanded = point_rows(run.recording, point["number"])["command_v"]
+            commanded = np.abs(point_rows(run.recording, point["number"])["command_v"])
             assert commanded.min() >= 0.998 * commanded.max() > 0.0
         part = run.recording.parts[0]
         steps = np.abs(np.diff(part.rows("output_v")))  # one realisation does not break off into the next
-        assert steps.max() < 1.1 * 2.0 * np.pi * highest_hz / 5000.0 * part.rows("command_v").max()
+        assert steps.max() < 1.1 * 2.0 * np.pi * highest_hz / 5000.0 * np.abs(part.rows("command_v")).max()
+
+
+def test_every_level_of_a_stepped_sine_begins_from_rest_at_its_first_frequency():
+    segments = _plan(frequencies_hz=(22.0, 26.0), levels_v=(0.1, 0.2)).segments(5000.0)
+    rising = [before for before, after in itertools.pairwise(segments) if after.level > before.level]
+    assert [before.excitation.frequency_hz for before in rising] == [22.0]
+
+
+def test_a_point_that_failed_says_where_it_is_and_nothing_of_a_phase_that_nobody_controls(capsys):
+    settle = {"amplitude": 1e-9, "longest_periods": 30}
+    plan = _plan(frequencies_hz=(24.5,), settle=settle | {"settled_periods": 5})
+    with rig.run(plan, bench=bench_with(**QUIET), progress=RunProgress(STEPPED_SINE_COLUMNS)) as run:
+        assert "at 24.5 Hz: not settled within 30 periods" in run.recording.points[0]["reason"]
+        assert "phase" not in run.recording.points[0]["reason"]
+    assert "FAILED: at 24.5 Hz" in capsys.readouterr().err
+
+
+def test_an_interrupted_realisation_is_shown_as_failed_without_empty_columns(capsys):
+    point = {"level": 0.1, "level_unit": "V RMS", "realisation": 0, "accepted": False, "reason": "interrupted"}
+    RunProgress(MULTISINE_COLUMNS).point(point, 1, 2)
+    assert capsys.readouterr().err.endswith("FAILED: interrupted\n")
+
+
+def test_one_period_of_a_multisine_does_not_count_as_settled():
+    plan = MULTISINE.model_copy(update={"periods": 1, "realisations": 1, "transient_periods": 0})
+    with rig.run(plan, bench=bench_with(**QUIET)) as run:
+        (point,) = run.recording.points
+    assert point["accepted"]
+    assert point["settled"] is None
 
 
 class StopAfterOne(Silent):
