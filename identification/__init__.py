@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from identification.backbones import Backbone
     from identification.channels import Channel
+    from identification.decimation import decimated
     from identification.errors import IdentificationError
     from identification.fourier import periodic_vibration
     from identification.frequency_responses import (
@@ -43,6 +44,7 @@ __all__ = [
     "PeriodicSpectra",
     "PeriodicVibration",
     "Transient",
+    "decimated",
     "demodulate",
     "force_drop_out",
     "mac",
@@ -71,6 +73,7 @@ _MODULE_OF = {
     "PeriodicSpectra": "multisine_spectra",
     "PeriodicVibration": "measurements",
     "Transient": "transients",
+    "decimated": "decimation",
     "demodulate": "transients",
     "force_drop_out": "sweeps",
     "mac": "mode_shapes",

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 from identification.errors import IdentificationError
 
-__all__ = ["MOTION_ORDER", "MOTION_UNIT", "Channel", "Motion", "Role", "find_role"]
+__all__ = ["MOTION_ORDER", "MOTION_UNIT", "Channel", "Motion", "Role", "find_name", "find_role"]
 
 Role = Literal["force", "drive", "response", "monitor"]
 Motion = Literal["displacement", "velocity", "acceleration"]
@@ -73,3 +73,11 @@ def find_role(channels: Sequence[Channel], role: Role) -> int:
             f"channels: {len(found)} have the role '{role}', needs exactly one; channels: {names}"
         )
     return found[0]
+
+
+def find_name(channels: Sequence[Channel], name: str) -> int:
+    """Index of the channel called ``name``; raises `IdentificationError` if there is none."""
+    for index, channel in enumerate(channels):
+        if channel.name == name:
+            return index
+    raise IdentificationError(f"no channel '{name}'; channels: {', '.join(c.name for c in channels)}")

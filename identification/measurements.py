@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.channels import MOTION_ORDER, Channel, find_role
+from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
@@ -100,10 +100,7 @@ class PeriodicVibration:
 
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
-        for index, channel in enumerate(self.channels):
-            if channel.name == name:
-                return index
-        raise IdentificationError(f"no channel '{name}'; channels: {', '.join(c.name for c in self.channels)}")
+        return find_name(self.channels, name)
 
     @property
     def force(self) -> Complex:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.channels import Channel, find_role
+from identification.channels import Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
@@ -75,10 +75,7 @@ class Transient:
 
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
-        for index, channel in enumerate(self.channels):
-            if channel.name == name:
-                return index
-        raise IdentificationError(f"no channel '{name}'; channels: {', '.join(c.name for c in self.channels)}")
+        return find_name(self.channels, name)
 
     def fundamental(self, name: str) -> Complex:
         """complex[n]: fundamental of the channel called ``name``, peak, in its unit."""

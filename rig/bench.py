@@ -34,7 +34,7 @@ class Limits(Configured):
     acceleration_m_s2: float = Field(gt=0)
     """Largest instantaneous acceleration of any drive or response channel, m/s^2."""
     displacement_m: float = Field(gt=0)
-    """Largest displacement amplitude of any drive or response channel, m; from the acceleration's fundamental."""
+    """Largest displacement of any drive or response channel, m; by integrating its acceleration twice, without its mean."""
     frequency_hz: tuple[float, float]
     """Lowest and highest frequency of the oscillator, Hz."""
     slew_v_per_s: float = Field(100.0, gt=0)
@@ -141,13 +141,26 @@ def shipped_benches() -> list[str]:
 def load_bench(name_or_path: str | Path) -> Bench:
     """A shipped bench by its name, or a bench from a TOML file.
 
-    ``base = "magnet-beam"`` in the file starts from a shipped bench; what else stands there changes it key by key.
+    ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file beside it; what else
+    stands there changes it key by key.
     """
-    table = read_toml(find_toml(name_or_path, _folder(), "bench"))
-    if "base" in table:
-        changes = {key: value for key, value in table.items() if key != "base"}
-        if table["base"] not in shipped_benches():
-            allowed = ", ".join(shipped_benches())
-            raise ConfigurationError(f"{name_or_path}: base = {table['base']!r}: allowed is {allowed}")
-        table = merged(read_toml(find_toml(table["base"], _folder(), "bench")), changes)
-    return validated(Bench, table, str(name_or_path))
+    return validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
+
+
+def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, Any]:
+    """The table of a bench on top of those it starts from; ``over`` are the files that start from this one."""
+    path = find_toml(name_or_path, _folder(), "bench")
+    table = read_toml(path)
+    base = table.pop("base", None)
+    if base is None:
+        return table
+    if isinstance(base, str) and base.endswith(".toml"):
+        if path.resolve() in over:
+            raise ConfigurationError(f"{name_or_path}: base = {base!r}: the files start from each other")
+        return merged(_with_base(path.parent / base, (*over, path.resolve())), table)
+    if base not in shipped_benches():
+        allowed = ", ".join(shipped_benches())
+        raise ConfigurationError(
+            f"{name_or_path}: base = {base!r}: allowed is {allowed}, or a .toml file beside this one"
+        )
+    return merged(_with_base(base, over), table)

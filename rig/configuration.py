@@ -4,7 +4,7 @@ import json
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -76,30 +76,45 @@ def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
     """All faults of a validation error in one line."""
-    return "; ".join(_fault(dict(detail), model) for detail in error.errors(include_url=False))
+    details = [dict(detail) for detail in error.errors(include_url=False)]
+    keys = _keys(model)
+    return "; ".join(_fault(detail, keys) for detail in details if not _follows(detail, details))
 
 
-def _fault(detail: dict[str, Any], model: type[BaseModel]) -> str:
+def _follows(detail: dict[str, Any], details: list[dict[str, Any]]) -> bool:
+    """Whether a list is too short only because its items are at fault."""
+    inside = (other for other in details if other["loc"][: len(detail["loc"])] == detail["loc"] and other is not detail)
+    return detail["type"] == "too_short" and any(inside)
+
+
+def _fault(detail: dict[str, Any], keys: set[str]) -> str:
     path = ""
     for part in detail["loc"]:
-        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else str(part)
+        if isinstance(part, int):
+            path += f"[{part}]"
+        elif part in keys or part == detail["loc"][-1]:  # else it is the kind of a part, which stands in no path
+            path += f".{part}" if path else str(part)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if detail["type"] == "extra_forbidden":
-        close = get_close_matches(str(detail["loc"][-1]), _keys(model), n=1)
+        close = get_close_matches(str(detail["loc"][-1]), sorted(keys), n=1)
         return f"{path}: unknown key" + (f", did you mean {close[0]}?" if close else "")
     if detail["type"] == "missing":
         return f"{path}: is missing"
     if detail["type"] == "value_error":
         return f"{path}: {message}" if path else message
+    if detail["type"].startswith("union_tag"):
+        of, allowed = (
+            detail["ctx"]["discriminator"].strip("'"),
+            detail["ctx"].get("expected_tags", "one of those listed"),
+        )
+        tag = detail["ctx"].get("tag")
+        return f"{path}.{of} = {tag!r}: allowed is {allowed}" if tag is not None else f"{path}.{of}: is missing"
     return f"{path} = {detail['input']!r}: allowed is {message}"
 
 
-def _keys(model: type[BaseModel]) -> list[str]:
+def _keys(model: Any) -> set[str]:
     """All keys that a model and the models inside it know."""
-    keys = list(model.model_fields)
-    for field in model.model_fields.values():
-        inner = [field.annotation, *getattr(field.annotation, "__args__", ())]
-        for kind in inner:
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                keys += _keys(kind)
-    return keys
+    if isinstance(model, type) and issubclass(model, BaseModel):
+        fields = model.model_fields
+        return set(fields).union(*(_keys(field.annotation) for field in fields.values()))
+    return set().union(*(_keys(inner) for inner in get_args(model)))

@@ -146,7 +146,7 @@ class User(LocalElement):
     linear_n_m: float = 0.0
     """Slope ``-df/dz`` at rest, which the linear plant then holds; any value is right, the true one integrates best."""
     largest_slope_n_m: Annotated[float, Field(ge=0.0)] = 0.0
-    """Largest slope of the force that is to be expected; a step too long for it is refused. 0: not checked."""
+    """Largest slope of the force to be expected (N/m, or N s/m); a step too long for it is refused. 0: not checked."""
 
     @field_serializer("function")
     def _as_name(self, function: Any) -> str:

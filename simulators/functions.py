@@ -2,7 +2,9 @@
 
 import ctypes
 import importlib
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from numba.core.ccallback import CFunc
@@ -57,6 +59,8 @@ def _imported(name: str) -> Any:
     module, colon, attribute = name.partition(":")
     if not (colon and module and attribute):
         raise ValueError(f"function = {name!r}: allowed is 'module:name'")
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.append(here)  # an installed command does not look there by itself
     try:
         return getattr(importlib.import_module(module), attribute)
     except Exception as error:  # the user's module may fail in any way

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from simulators.checks import check_elements, check_plant, check_step
 from simulators.elements import Element, Magnet
 from simulators.exciter import Exciter, Stinger
 from simulators.friction import FrictionSite
@@ -33,7 +34,7 @@ class VirtualRig(Part):
     """
 
     specimen: str | None = None
-    """Shipped specimen that the other tables change: magnet-beam or magnet-beam-symmetric."""
+    """Shipped specimen that the other tables change: magnet-beam, magnet-beam-symmetric or friction-beam."""
     provenance: dict[str, str] = Field(default_factory=dict)
     """Which of the numbers are published, calibrated, chosen, unverified; carried along, not used."""
     structure: Structure
@@ -79,7 +80,10 @@ class VirtualRig(Part):
             raise ValueError(f"sensors: two are named {twice[0]!r}, allowed is one of each name")
         if not np.any(self.structure.shape(self.stinger.at)):
             raise ValueError(f"stinger.at = {self.stinger.at!r}: allowed is a point that moves")
+        check_elements(self.elements, self.plant)
+        check_plant(self.plant)
         self._check_joints()
+        check_step(self.elements, self.plant, self.converter.sample_rate_hz, self.converter.substeps)
         self._check_low_passes()
         return self
 
@@ -97,12 +101,11 @@ class VirtualRig(Part):
             if isinstance(self.structure, ModalStructure) and joint.quantity != "deflection":
                 message = "allowed is 'deflection' where the modes are given"
                 raise ValueError(f"friction[{i}].quantity = {joint.quantity!r}: {message}")
+            if joint.relative_to_mode_1 and self.structure.shape(joint.at, joint.quantity)[0] == 0.0:
+                raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
 
     def _check_joints(self) -> None:
         """Refuse joints that are stiffer than the structure they are part of: slipping, it would not hold together."""
-        for i, joint in enumerate(self.friction):
-            if joint.relative_to_mode_1 and self.structure.shape(joint.at, joint.quantity)[0] == 0.0:
-                raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
         slipping = self.plant.modal_stiffness.copy()
         for joint, row in zip(self.friction, self.plant.site_rows[self.plant.n_local :], strict=True):
             coordinate = row[: self.plant.n_mode]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.drawing import length_unit, roomy
-from rig.figure_style import MAIN, SECOND
+from rig.figures.style import MAIN, SECOND
 from simulators.analysis import HysteresisLoop, PeriodicResponses
 from simulators.friction import FrictionSite
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.drawing import length_unit, level_colour
-from rig.figure_style import REJECTED, SECOND
+from rig.figures.style import REJECTED, SECOND
 from simulators.analysis import PeriodicResponses
 
 if TYPE_CHECKING:

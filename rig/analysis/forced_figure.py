@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.drawing import length_unit
-from rig.figure_style import MAIN, REJECTED, SECOND
+from rig.figures.style import MAIN, REJECTED, SECOND
 from simulators.analysis import PeriodicResponses
 
 if TYPE_CHECKING:

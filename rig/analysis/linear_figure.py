@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.figure_style import MAIN
+from rig.figures.style import MAIN
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

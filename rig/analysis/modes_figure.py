@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.figure_style import MAIN, REJECTED
+from rig.figures.style import MAIN, REJECTED
 from simulators.meshed import MeshedBeam
 from simulators.modes import LinearModes
 from simulators.virtual_rig import VirtualRig

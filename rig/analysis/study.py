@@ -85,7 +85,7 @@ def draw(study: Study, figure: Path) -> None:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from rig.figure_style import STYLE
+    from rig.figures.style import STYLE
 
     check_ending(figure)
     with mpl.rc_context(STYLE):

@@ -105,6 +105,7 @@ class Evaluation:
         converter = rig.converter
         flags = np.where(beyond, int(Flag.MAGNET_RANGE), 0)
         flags |= np.where(voltage > converter.dac_range_v, int(Flag.DAC_CLIPPED), 0)
+        flags |= np.where(voltage > rig.exciter.input_limit_v, int(Flag.AMPLIFIER_CLIPPED), 0)
         for sensor, harmonics in zip(rig.sensors, sensors, strict=True):
             peak_v = np.max(np.abs(series.waveforms(harmonics)), axis=1) * sensor.sensitivity_v_per_unit
             clipped = peak_v > min(sensor.range_v, converter.adc_range_v)

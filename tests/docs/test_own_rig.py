@@ -41,7 +41,7 @@ def folder(tmp_path_factory) -> Path:
 
 def typed(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """What comes of a command, typed in the folder; imports as the page says, and from where the tests are run."""
-    path = os.pathsep.join([".", str(ROOT), os.environ.get("PYTHONPATH", "")])
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     program = [sys.executable, "-c", "from rig.cli import main; main()", *command.split()[1:]]
     environment = os.environ | {"PYTHONPATH": path}
     return subprocess.run(program, cwd=folder, env=environment, capture_output=True, text=True, check=False)

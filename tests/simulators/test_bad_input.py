@@ -16,6 +16,7 @@ def table(**changes: Any) -> dict[str, Any]:
 
 JOINT = {"kind": "jenkins", "at": "clamp", "quantity": "curvature", "relative_to_mode_1": True}
 MAGNET = {"kind": "magnet-one-sided", "at": "magnet", "strength_n_m4": 1e-8, "gap_m": 0.011}
+STOP = {"kind": "clearance", "at": "magnet", "gap_m": 0.005, "contact_stiffness_n_m": 1e4}
 MODAL = {"kind": "modal", "frequency_hz": [20.0, 30.0], "damping_ratio": [0.01, 0.01]}
 
 BAD: list[tuple[dict[str, Any], str]] = [
@@ -58,6 +59,28 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ),
     (table(elements=[MAGNET | {"gap_m": 0.0}]), "greater than 0"),
     (table(elements=[MAGNET | {"at": "tipp"}]), r"elements\[0\].at = 'tipp': allowed is one of"),
+    (table(elements=[MAGNET | {"at": "clamp"}]), r"elements\[0\].at = 'clamp': allowed is a point that moves"),
+    (table(elements=[MAGNET | {"to": "tipp"}]), r"elements\[0\].to = 'tipp': allowed is one of"),
+    (table(elements=[MAGNET | {"to": "magnet"}]), r"elements\[0\].to = 'magnet': allowed is another point"),
+    (
+        table(elements=[MAGNET | {"kind": "magnet"}]),
+        "'magnet-one-sided', 'magnet-symmetric', 'cubic', 'clearance', 'user'",
+    ),
+    (table(elements=[MAGNET, STOP | {"gap_m": 0.011}]), r"elements\[1\].gap_m = 0.011: allowed is below 0.011, where"),
+    (
+        table(elements=[MAGNET | {"kind": "magnet-symmetric"}, STOP | {"other_gap_m": 0.02}]),
+        r"elements\[1\].other_gap_m = 0.02: allowed is below 0.011",
+    ),
+    (table(elements=[STOP | {"contact_stiffness_n_m": 0.0}]), "greater than 0"),
+    (
+        table(elements=[STOP | {"contact_stiffness_n_m": 1e8}]),
+        r"elements\[0\]: its slope of 1e\+08 N/m at 'magnet' is too steep for 2 integration steps per sample, "
+        r"allowed is up to 4\.\d+e\+06, or converter.substeps of at least 10",
+    ),
+    (
+        table(elements=[{"kind": "cubic", "at": "magnet", "stiffness_n_m3": 1e9, "linear_n_m": -1e5}]),
+        "elements: their linear stiffness takes .* too much from a mode",
+    ),
     (table() | {"structure": MODAL | {"shapes": {"drive": [1.0]}}}, "shapes.drive: has 1 values, allowed is 2"),
     (
         table(elements=[], sensors=table()["sensors"][:1])
@@ -94,3 +117,13 @@ def test_every_field_is_described() -> None:
         ]
 
     assert undescribed(VirtualRig.model_json_schema()) == []
+
+
+def test_a_step_that_is_called_long_enough_is_accepted() -> None:
+    stiff = table(elements=[STOP | {"contact_stiffness_n_m": 1e8}], converter={"substeps": 10})
+    assert VirtualRig.model_validate(stiff).converter.substeps == 10
+
+
+def test_a_stop_behind_a_one_sided_magnet_is_no_matter() -> None:
+    stops = table(elements=[MAGNET, STOP | {"other_gap_m": 0.02}])
+    assert len(VirtualRig.model_validate(stops).elements) == 2

@@ -7,13 +7,13 @@ import numpy as np
 
 from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
-from rig.figure_style import MAIN, REJECTED, SECOND, STYLE, TRACE_BINS
+from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, TRACE_BINS
+from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
 from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
 from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
 from rig.recording.arrays import kind_of
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from rig.transient_figures import draw_multisine, draw_stepped_sine, draw_sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

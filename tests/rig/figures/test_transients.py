@@ -16,8 +16,8 @@ from identification import (
     force_drop_out,
     periodic_spectra,
 )
-from rig.figure_style import STYLE
-from rig.transient_figures import draw_multisine, draw_stepped_sine, draw_sweep
+from rig.figures.style import STYLE
+from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
 
 CHANNELS = (
     Channel("voltage", "monitor", "V"),

@@ -17,7 +17,7 @@ from identification import (
     Transient,
     zero_crossings,
 )
-from rig.figure_style import MAIN, REJECTED, SECOND, TRACE_BINS
+from rig.figures.style import MAIN, REJECTED, SECOND, TRACE_BINS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

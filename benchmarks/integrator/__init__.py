@@ -1,0 +1,1 @@
+"""The integrator by itself, without sensors and tick."""

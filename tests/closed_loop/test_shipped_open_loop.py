@@ -1,0 +1,72 @@
+"""The shipped sweeps and multisines: forces as the paper states them, and the drop-out of the force that goes with them."""
+
+import pytest
+
+import rig
+from rig.campaigns.plans import load_plan, shipped_plans
+
+SWEEPS = {
+    # plan: force off resonance (N), smallest force as part of it; the paper's levels, PHYSICS.md's calibrated rig
+    "magnet-beam/sweep-1": (0.4, 0.059, 0.002),
+    "magnet-beam/sweep-2": (4.3, 0.061, 0.002),
+    "friction-beam/sweep-1": (8.1, 0.19, 0.01),
+    "friction-beam/sweep-2": (19.1, 0.049, 0.005),
+}
+FORCE_RMS_N = {
+    "magnet-beam/multisine-1": 0.5,
+    "magnet-beam/multisine-2": 2.6,
+    "magnet-beam/multisine-3": 5.2,
+    "friction-beam/multisine-1": 10.0,
+    "friction-beam/multisine-2": 20.0,
+    "friction-beam/multisine-3": 30.0,
+    "friction-beam/multisine-4": 50.0,
+}
+
+
+def test_every_shipped_sweep_and_multisine_is_tested_here():
+    tested = {*SWEEPS, *FORCE_RMS_N, "magnet-beam/sweep-3", "friction-beam/modal", "magnet-beam/modal"}
+    assert tested == {name for name in shipped_plans() if "/backbone" not in name}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_the_force_of_a_slow_sweep_drops_at_resonance(name):
+    force_n, smallest, tolerance = SWEEPS[name]
+    with rig.run(name, seed=5) as run:
+        assert run.complete
+        point = run.recording.points[0]
+    assert point["off_resonance_n"] == pytest.approx(force_n, rel=5e-3)
+    assert point["minimum_ratio"] == pytest.approx(smallest, abs=tolerance)
+
+
+def test_the_force_of_the_fast_sweep_drops_less_and_overshoots():
+    with rig.run("magnet-beam/sweep-3", seed=5) as run:
+        point = run.recording.points[0]
+    assert point["off_resonance_n"] == pytest.approx(6.5, rel=5e-3)
+    assert 0.13 < point["minimum_ratio"] < 0.18  # the narrower the window that is averaged over, the deeper
+    assert point["overshoot_ratio"] == pytest.approx(1.2, abs=0.04)
+
+
+@pytest.mark.parametrize("name", FORCE_RMS_N)
+def test_a_multisine_has_the_force_it_is_named_after(name):
+    plan = load_plan(name).model_copy(update={"realisations": 1, "periods": 2})
+    with rig.run(plan, seed=5) as run:
+        assert run.complete
+        point = run.recording.points[0]
+    assert f"{FORCE_RMS_N[name]:g} N RMS" in plan.description
+    assert point["force_rms_n"] == pytest.approx(FORCE_RMS_N[name], rel=0.02)
+    assert not point["warnings"]
+
+
+@pytest.mark.parametrize("name", ["magnet-beam/modal", "friction-beam/modal"])
+def test_a_modal_test_sees_every_listed_mode_well_above_the_noise(name):
+    plan = load_plan(name).model_copy(update={"realisations": 1})
+    with rig.run(plan, seed=5) as run:
+        assert run.complete
+        spectra = next(iter(run.spectra().values()))
+    response = spectra.frequency_response("drive")
+    modes_hz = {"magnet-beam": (24.37, 134.06), "friction-beam": (149.0, 564.3, 1138.3, 1496.5)}[name.split("/")[0]]
+    for mode_hz in modes_hz:
+        near = abs(response.frequency_hz - mode_hz) < 0.02 * mode_hz
+        peak = abs(response.value[near]).argmax()
+        assert response.frequency_hz[near][peak] == pytest.approx(mode_hz, rel=5e-3)
+        assert response.noise_std[near][peak] < 0.3 * abs(response.value[near][peak])
