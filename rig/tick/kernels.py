@@ -55,13 +55,16 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tuple[bool, bool]:
     """A reading that is not plainly in order: watch it; returns whether it may be used, and whether it is a motion.
 
-    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel.
+    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel. So would the
+    gap that is left without it: from then on the channel tells nothing of a motion any more.
     """
     guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
     channel, watch = t.inputs[index], t.watches[index]
     usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
-    faulty = watch.same_samples >= STUCK_SAMPLES or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD)
-    return usable, not faulty and abs(volts * channel.unit_per_volt) <= channel.limit
+    within = usable and abs(volts * channel.unit_per_volt) <= channel.limit
+    if not within or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD):
+        watch.distrusted = 1
+    return usable, watch.distrusted == 0 and watch.same_samples < STUCK_SAMPLES
 
 
 @kernel

@@ -15,6 +15,7 @@ from rig.campaigns.sweep import SweepPlan
 from rig.console import RunProgress
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
+from rig.safety.layout import GuardMode
 from rig.summary import summarise_recording as show
 from simulators.virtual_rig import VirtualRig
 from tests.reference.harmonic_balance import response_to_voltage
@@ -269,6 +270,16 @@ def test_one_period_of_a_multisine_does_not_count_as_settled():
         (point,) = run.recording.points
     assert point["accepted"]
     assert point["settled"] is None
+
+
+def test_a_vibration_beyond_the_limit_of_the_response_is_ramped_down_though_its_peaks_cannot_be_integrated():
+    bench = bench_with({"limits": {"acceleration_m_s2": 60.0}}, **QUIET)
+    with rig.run(_plan(frequencies_hz=(25.0,), levels_v=(4.0,)), bench=bench) as run:
+        part = run.recording.parts[0]
+        assert part.end["reason"] == "response_limit"
+        ramp = np.count_nonzero(part.rows("guard") == GuardMode.RAMPING)
+        assert np.abs(part.rows("inputs")).max() > 61.0
+    assert ramp == bench.limits.ramp_down_s * bench.sample_rate_hz
 
 
 class StopAfterOne(Silent):
