@@ -193,6 +193,8 @@ def test_a_multisine_that_is_not_settled_is_not_accepted():
         ({"highest_hz": 4000.0}, "highest_hz = 4000"),
         ({"levels_rms_v": (3.0,)}, r"levels_rms_v\[0\] = 3 V: peaks reach"),
         ({"lowest_hz": 25.1, "highest_hz": 25.2}, "no line"),
+        ({"resolution_hz": 0.001, "realisations": 21}, "realisations = 21: allowed is up to 20 "),
+        ({"resolution_hz": 1e5}, "resolution_hz: is 100000 Hz"),
     ],
 )
 def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
@@ -262,6 +264,11 @@ def test_an_interrupted_realisation_is_shown_as_failed_without_empty_columns(cap
     point = {"level": 0.1, "level_unit": "V RMS", "realisation": 0, "accepted": False, "reason": "interrupted"}
     RunProgress(MULTISINE_COLUMNS).point(point, 1, 2)
     assert capsys.readouterr().err.endswith("FAILED: interrupted\n")
+
+
+def test_a_level_of_a_multisine_stands_in_its_plan_once():
+    with pytest.raises(ValueError, match=r"levels_rms_v\[1\] = 0.05: allowed is each level once"):
+        MultisinePlan.model_validate(MULTISINE.model_dump() | {"levels_rms_v": (0.05, 0.05)})
 
 
 def test_one_period_of_a_multisine_does_not_count_as_settled():
