@@ -73,7 +73,8 @@ def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
     armed = guard.mode == ARMED
     driven = armed and loop.held == 1
-    mean_gain, gain, first = law.mean_gain, law.demodulator_gain, loop.sample == 0
+    # At first the mean of all samples so far: noise or ambient vibration in a single one would be integrated as travel.
+    mean_gain, gain = max(law.mean_gain, 1.0 / (loop.sample + 1.0)), law.demodulator_gain
     flags = 0
     force = 0.0
     drive = 0.0
@@ -92,7 +93,7 @@ def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_
                 continue
             if watch.overload_samples > 0:
                 flags |= SENSOR_AT_RANGE
-        mean = value if first else track(watch.mean, value, mean_gain)
+        mean = track(watch.mean, value, mean_gain)
         watch.mean = mean
         value -= mean
         watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, gain)

@@ -289,6 +289,13 @@ def test_a_vibration_beyond_the_limit_of_the_response_is_ramped_down_though_its_
     assert ramp == bench.limits.ramp_down_s * bench.sample_rate_hz
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_noise_in_the_first_sample_is_not_taken_for_travel(seed):
+    bench = bench_with({"limits": {"frequency_hz": (0.5, 600.0), "displacement_m": 0.002}}, noise_scale=10.0)
+    with rig.run(_plan(frequencies_hz=(25.0,), levels_v=(0.3,)), bench=bench, seed=seed) as run:
+        assert run.recording.parts[0].end["reason"] == "completed"
+
+
 class StopAfterOne(Silent):
     """Asks for a stop as soon as the first point is done."""
 
