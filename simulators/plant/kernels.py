@@ -9,10 +9,10 @@ The predictor takes f_1 = f_0, the corrector f_1 from the predicted site coordin
 from the corrected ones and kept. Friction forces of the predictor are provisional: Jenkins elements are committed once.
 """
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
+from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -30,8 +30,6 @@ from simulators.layout import (
 )
 from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.lanes.kernels import WIDTH, greatest, least, load, spread, store
-
-ir: Any = import_module("llvmlite.ir")  # it has no types
 
 
 def _call_at(typing: Any, address: Any, z: Any, parameters: Any) -> Any:

@@ -9,9 +9,9 @@ Arrays are C-contiguous and counted flat; ``load`` and ``store`` touch all of ``
 
 import operator
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
+from llvmlite import ir
 from numba.core import types
 from numba.core.datamodel import models
 from numba.extending import intrinsic, overload, register_model
@@ -20,7 +20,6 @@ __all__ = ["WIDTH", "greatest", "least", "load", "spread", "store"]
 
 WIDTH = 8
 
-ir: Any = import_module("llvmlite.ir")  # it has no types
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
 _INDEX = ir.IntType(32)
