@@ -21,6 +21,7 @@ Float = NDArray[np.float64]
 Grid = Literal["full", "odd"]
 
 _ROUNDING = 1e-9
+_LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,11 @@ class MultisineDesign:
     ) -> "MultisineDesign":
         """A design by the distance of its lines; refused where a period is not a whole number of samples."""
         samples = positive("sample_rate_hz", sample_rate_hz, "Hz") / positive("resolution_hz", resolution_hz, "Hz")
+        if not 3.0 <= samples <= _LONGEST_PERIOD:
+            raise IdentificationError(
+                f"resolution_hz: is {resolution_hz:g} Hz, a period has {samples:.4g} samples at {sample_rate_hz:g} Hz; "
+                f"needs 3 to {_LONGEST_PERIOD:.0e}"
+            )
         if abs(samples - round(samples)) > 1e-6:
             raise IdentificationError(
                 f"resolution_hz: is {resolution_hz:g} Hz, a period has {samples:.4f} samples at {sample_rate_hz:g} Hz; "

@@ -17,7 +17,7 @@ app = typer.Typer(no_args_is_help=True, help="What can be known of a virtual ben
 BenchName = Annotated[str, typer.Option("--bench", help="Shipped bench or TOML file, with the virtual driver.")]
 NearHz = Annotated[float | None, typer.Option(help="Mode under test, nearest to this, Hz; default: the bench's.")]
 Figure = Annotated[Path | None, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")]
-Json = Annotated[bool, typer.Option("--json", help="Print all numbers as one JSON document; complex as [re, im].")]
+Json = Annotated[bool, typer.Option("--json", help="Print all numbers as one JSON document; complex as pairs re, im.")]
 Harmonics = Annotated[int, typer.Option(help="Highest harmonic that is balanced.", min=1, max=200)]
 
 

@@ -62,7 +62,7 @@ class RunProgress:
         """Print the point's line."""
         self._finished = number_done
         head = f"point {number_done:>3}/{total}  {point['level']:>7.4g} {point['level_unit']}"
-        if any(column.key in point for column in self._columns):
+        if any(column.key in point for column in self._columns[-1:]):  # the last is a result, whatever comes first
             shown = "  ".join(_in_a_line(column, point) for column in self._columns)
             line = f"{head}  {shown}"
             if "settle_periods" in point:

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification import Channel, PeriodicVibration, periodic_vibration
 from rig.bench import Bench
-from rig.campaigns.plan import Plan, Target
+from rig.campaigns.plan import OpenLoopPlan, Plan, Target
 from rig.sequencer.layout import Outcome
 
 __all__ = [
@@ -56,10 +56,13 @@ def failed_point(plan: Plan, target: Target, outcome: np.void) -> dict[str, Any]
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle_rule.longest_periods)
+    if target.frequency_hz is not None:
+        why = f"at {target.frequency_hz:.6g} Hz: {why}"
     if not math.isfinite(error) and code in (Outcome.NOT_SETTLED, Outcome.DISTURBED):
         why += ": force or drive signal is too small for its phase to be read"
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
-        why += f" (averaged phase error {error:.2f} deg, amplitude drift {100.0 * drift:.2f} %)"
+        phase = "" if isinstance(plan, OpenLoopPlan) else f"averaged phase error {error:.2f} deg, "
+        why += f" ({phase}amplitude drift {100.0 * drift:.2g} %)"
         if abs(error) > POLARITY_DEG:
             why += "; is a sensor's polarity reversed, or the resonance outside the frequency window?"
     return {

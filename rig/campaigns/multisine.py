@@ -1,9 +1,9 @@
 """The multisine campaign in open loop: periodic random-phase signals, realisation by realisation, in whole periods."""
 
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from identification import IdentificationError, MultisineDesign
 from rig.bench import Bench
@@ -13,6 +13,8 @@ from rig.sequencer.layout import SegmentKind
 from rig.sequencer.segments import Excitation, Segment
 
 __all__ = ["MultisinePlan"]
+
+LARGEST_WAVEFORMS = 100_000_000  # samples of all realisations, that are held in memory
 
 
 class MultisinePlan(OpenLoopPlan):
@@ -46,6 +48,13 @@ class MultisinePlan(OpenLoopPlan):
     accepted_change: float = Field(0.05, gt=0, le=1)
     """Largest difference of force or drive between the first recorded period and the mean of the others, RMS in the band,
     relative, with which a realisation is accepted: a transient or a disturbance."""
+
+    @model_validator(mode="after")
+    def _each_level_once(self) -> Self:
+        for index, level in enumerate(self.levels_rms_v):
+            if level in self.levels_rms_v[:index]:
+                raise ValueError(f"levels_rms_v[{index}] = {level:g}: allowed is each level once; see realisations")
+        return self
 
     def design(self, sample_rate_hz: float) -> MultisineDesign:
         """The multisine of unit RMS; `ConfigurationError` where it cannot be."""
@@ -102,6 +111,12 @@ class MultisinePlan(OpenLoopPlan):
         """Refuse bands, periods and peaks beyond what the bench allows."""
         self.check_frequencies(bench, lowest_hz=self.lowest_hz, highest_hz=self.highest_hz)
         design = self.design(bench.sample_rate_hz)
+        most = LARGEST_WAVEFORMS // design.period_samples
+        if self.realisations > most:
+            raise ConfigurationError(
+                f"realisations = {self.realisations}: allowed is up to {most} of {design.period_samples} samples, "
+                f"that of resolution_hz = {self.resolution_hz:g} Hz"
+            )
         crest = max(design.crest_factor(self.phase_seed, index) for index in range(self.realisations))
         for index, level in enumerate(self.levels_rms_v):
             if not 0.0 < level * crest <= bench.limits.voltage_v:

@@ -45,7 +45,7 @@ def measure_multisine_point(
         )
     return {
         **point,
-        "settled": not reason,
+        "settled": not reason if plan.periods > 1 else None,
         "accepted": not reason,
         "reason": reason,
         "force_rms_n": spectra.rms(roles["force"]),

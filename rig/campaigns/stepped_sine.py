@@ -94,6 +94,7 @@ class SteppedSinePlan(TonePlan):
             number, level = target.number, target.level
             if before is not None and before.level != level:
                 out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.ramp_periods, excitation=out[-1].excitation))
+                out.append(Segment(SegmentKind.RAMP, number, 0.0, 1.0, excitation=tone))
             out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods, excitation=tone))
             longest = self.settle.longest_periods
             out.append(Segment(SegmentKind.SETTLE, number, level, longest, failure, excitation=tone))

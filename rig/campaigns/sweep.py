@@ -12,6 +12,8 @@ from rig.sequencer.segments import Excitation, Segment
 
 __all__ = ["SweepPlan"]
 
+FEWEST_PERIODS = 10  # the fundamental is a mean over two; fewer than this show no course of it
+
 
 class SweepPlan(TonePlan):
     """Uncontrolled sweeps, one per level: the force is whatever shaker and structure make of the voltage.
@@ -34,7 +36,7 @@ class SweepPlan(TonePlan):
     """Length of the ramp to the level, and down from it, periods."""
     hold_periods: float = Field(20.0, ge=1, le=1e5)
     """Time at the first frequency before the sweep, periods."""
-    off_resonance_hz: tuple[tuple[float, float], ...] | None = None
+    off_resonance_hz: tuple[tuple[float, float], ...] | None = Field(None, min_length=1)
     """Bands in which the force counts as that off resonance (the mean of their medians); the first 15 % if not given."""
 
     @model_validator(mode="after")
@@ -43,6 +45,17 @@ class SweepPlan(TonePlan):
             raise ValueError("rate_hz_per_s, rate_octaves_per_min: exactly one of the two is to be given")
         if self.start_hz == self.stop_hz:
             raise ValueError(f"stop_hz = {self.stop_hz:g}: allowed is anything but start_hz")
+        mean_hz = 0.5 * (self.start_hz + self.stop_hz)
+        if self.rate_hz_per_s is None:
+            mean_hz = (self.stop_hz - self.start_hz) / math.log(self.stop_hz / self.start_hz)
+        periods = mean_hz * self.duration_s
+        if periods < FEWEST_PERIODS:
+            name = "rate_hz_per_s" if self.rate_hz_per_s is not None else "rate_octaves_per_min"
+            rate = getattr(self, name)
+            raise ValueError(
+                f"{name} = {rate:g}: allowed is up to {rate * periods / FEWEST_PERIODS:.4g} from {self.start_hz:g} to "
+                f"{self.stop_hz:g} Hz, a sweep of {FEWEST_PERIODS} periods"
+            )
         low, high = sorted((self.start_hz, self.stop_hz))
         for index, band in enumerate(self.off_resonance_hz or ()):
             if not low <= band[0] < band[1] <= high:

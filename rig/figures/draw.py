@@ -193,7 +193,7 @@ def _draw_sweep(page: "Figure", recording: Recording) -> None:
         sweep,
         np.vstack([rows["inputs"].T, rows["output_v"]]),
         float(recording.configuration["bench"]["sample_rate_hz"]),
-        drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"]["off_resonance_hz"]),
+        drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"].get("off_resonance_hz")),
         title=f"{_specimen(recording)}: sweep at {point['level']:g} V, uncontrolled",
     )
 

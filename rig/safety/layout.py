@@ -104,6 +104,7 @@ INPUT_WATCH = np.dtype(
         ("last_v", "f8"),
         ("same_samples", "i8"),
         ("overload_samples", "i8"),
+        ("distrusted", "i8"),
         ("alert", "i8"),
     ]
 )

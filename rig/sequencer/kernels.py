@@ -8,7 +8,7 @@ from controller.kernels import reacquire
 from controller.layout import LOST
 from rig.safety.kernels import shut_down
 from rig.safety.layout import ARMED, EndReason
-from rig.sequencer.layout import LONGEST_AVERAGE, RAMP, RECORD, SETTLE, SWEEP, OnFailure, Outcome
+from rig.sequencer.layout import LONGEST_AVERAGE, LOOP_DRIVE, RAMP, RECORD, SETTLE, SWEEP, OnFailure, Outcome
 from vibrolock.compiled import Record, kernel
 
 COMPLETED = int(EndReason.COMPLETED)
@@ -27,6 +27,7 @@ INTERRUPTED = int(Outcome.INTERRUPTED)
 STOP = int(OnFailure.STOP)
 
 SATURATED_PERIODS = 20
+ARRIVED = 1e-3  # the output within this part of the larger of a ramp's levels is at its end
 LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
 
 
@@ -148,6 +149,20 @@ def swept(segment: Record, start_omega: float, samples: int) -> float:
 
 
 @kernel
+def between(start: float, end: float, rise: float) -> float:
+    """Value at ``rise`` (0 to 1) of the way; never beyond either end, where a limit may be: rounding would go there."""
+    return float(min(max(start + (end - start) * rise, min(start, end)), max(start, end)))
+
+
+@kernel
+def has_arrived(segment: Record, start_level: float, amplitude_v: float) -> bool:
+    """Whether the output (V) is where a ramp of tone or waveform ends: the slew limit may have held it back."""
+    if segment.drive == LOOP_DRIVE:
+        return True  # its level may be a force, and its settle rule waits for the output
+    return bool(abs(amplitude_v - segment.level) <= ARRIVED * max(start_level, segment.level))
+
+
+@kernel
 def advance(
     progress: Record,
     segments: np.ndarray,
@@ -193,9 +208,9 @@ def advance(
     if segment.kind == RAMP:
         done = min(elapsed / segment.periods, 1.0)
         rise = 0.5 * (1.0 - math.cos(math.pi * done))
-        progress.level = progress.start_level + (segment.level - progress.start_level) * rise
-        progress.omega = progress.start_omega + (segment.omega - progress.start_omega) * rise
-        if done >= 1.0:
+        progress.level = between(progress.start_level, segment.level, rise)
+        progress.omega = between(progress.start_omega, segment.omega, rise)
+        if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
         return
     progress.level = segment.level

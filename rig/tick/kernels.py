@@ -55,13 +55,16 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tuple[bool, bool]:
     """A reading that is not plainly in order: watch it; returns whether it may be used, and whether it is a motion.
 
-    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel.
+    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel. So would the
+    gap that is left without it: from then on the channel tells nothing of a motion any more.
     """
     guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
     channel, watch = t.inputs[index], t.watches[index]
     usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
-    faulty = watch.same_samples >= STUCK_SAMPLES or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD)
-    return usable, not faulty and abs(volts * channel.unit_per_volt) <= channel.limit
+    within = usable and abs(volts * channel.unit_per_volt) <= channel.limit
+    if not within or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD):
+        watch.distrusted = 1
+    return usable, watch.distrusted == 0 and watch.same_samples < STUCK_SAMPLES
 
 
 @kernel
@@ -70,7 +73,8 @@ def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
     armed = guard.mode == ARMED
     driven = armed and loop.held == 1
-    mean_gain, gain, first = law.mean_gain, law.demodulator_gain, loop.sample == 0
+    # At first the mean of all samples so far: noise or ambient vibration in a single one would be integrated as travel.
+    mean_gain, gain = max(law.mean_gain, 1.0 / (loop.sample + 1.0)), law.demodulator_gain
     flags = 0
     force = 0.0
     drive = 0.0
@@ -89,7 +93,7 @@ def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_
                 continue
             if watch.overload_samples > 0:
                 flags |= SENSOR_AT_RANGE
-        mean = value if first else track(watch.mean, value, mean_gain)
+        mean = track(watch.mean, value, mean_gain)
         watch.mean = mean
         value -= mean
         watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, gain)

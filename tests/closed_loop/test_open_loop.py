@@ -1,15 +1,21 @@
 """Excitation without feedback, through the same tick: what goes out, and what comes back against harmonic balance."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 import rig
 from rig.campaigns.execution import Silent
 from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import MULTISINE_COLUMNS
 from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS
 from rig.campaigns.sweep import SweepPlan
+from rig.console import RunProgress
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
+from rig.safety.layout import GuardMode
 from rig.summary import summarise_recording as show
 from simulators.virtual_rig import VirtualRig
 from tests.reference.harmonic_balance import response_to_voltage
@@ -187,6 +193,8 @@ def test_a_multisine_that_is_not_settled_is_not_accepted():
         ({"highest_hz": 4000.0}, "highest_hz = 4000"),
         ({"levels_rms_v": (3.0,)}, r"levels_rms_v\[0\] = 3 V: peaks reach"),
         ({"lowest_hz": 25.1, "highest_hz": 25.2}, "no line"),
+        ({"resolution_hz": 0.001, "realisations": 21}, "realisations = 21: allowed is up to 20 "),
+        ({"resolution_hz": 1e5}, "resolution_hz: is 100000 Hz"),
     ],
 )
 def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
@@ -201,11 +209,91 @@ def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
         ({"rate_hz_per_s": None}, "exactly one"),
         ({"stop_hz": 22.0}, "anything but start_hz"),
         ({"rate_hz_per_s": -1.0}, "rate_hz_per_s"),
+        ({"rate_hz_per_s": 1e4}, "rate_hz_per_s = 10000: allowed is up to 12.25 "),
+        ({"off_resonance_hz": ()}, "off_resonance_hz"),
     ],
 )
 def test_a_sweep_that_makes_no_sense_is_refused(changes, fault):
     with pytest.raises(ValueError, match=fault):
         _sweep(**changes)
+
+
+def test_a_ramp_to_a_limit_of_the_frequency_does_not_trip_by_rounding():
+    settle = {"average_periods": 1, "settled_periods": 1, "amplitude": 0.5}
+    plan = _plan(levels_v=(0.1,), frequencies_hz=(100.0, 8.0), record_periods=4, accepted_drift=1.0, settle=settle)
+    omega, lowest = 2.0 * np.pi * 100.0, 2.0 * np.pi * 8.0
+    assert omega + (lowest - omega) < lowest  # what the limit is up against
+    with rig.run(plan, bench=bench_with(**QUIET)) as run:
+        assert run.recording.parts[0].end["reason"] == "completed"
+
+
+@pytest.mark.parametrize(
+    ("plan", "highest_hz"),
+    [
+        (MULTISINE.model_copy(update={"levels_rms_v": (0.5,), "ramp_s": 1e-3, "transient_periods": 0}), 29.0),
+        (_sweep(levels_v=(2.0,), ramp_periods=1, hold_periods=1, start_hz=200.0, stop_hz=190.0), 200.0),
+    ],
+    ids=["multisine", "sweep"],
+)
+def test_what_is_recorded_is_at_its_level_though_the_ramp_is_faster_than_the_slew_limit(plan, highest_hz):
+    with rig.run(plan, bench=bench_with({"limits": {"slew_v_per_s": 20.0}}, **QUIET)) as run:
+        for point in run.recording.points:
+            commanded = np.abs(point_rows(run.recording, point["number"])["command_v"])
+            assert commanded.min() >= 0.998 * commanded.max() > 0.0
+        part = run.recording.parts[0]
+        steps = np.abs(np.diff(part.rows("output_v")))  # one realisation does not break off into the next
+        assert steps.max() < 1.1 * 2.0 * np.pi * highest_hz / 5000.0 * np.abs(part.rows("command_v")).max()
+
+
+def test_every_level_of_a_stepped_sine_begins_from_rest_at_its_first_frequency():
+    segments = _plan(frequencies_hz=(22.0, 26.0), levels_v=(0.1, 0.2)).segments(5000.0)
+    rising = [before for before, after in itertools.pairwise(segments) if after.level > before.level]
+    assert [before.excitation.frequency_hz for before in rising] == [22.0]
+
+
+def test_a_point_that_failed_says_where_it_is_and_nothing_of_a_phase_that_nobody_controls(capsys):
+    settle = {"amplitude": 1e-9, "longest_periods": 30}
+    plan = _plan(frequencies_hz=(24.5,), settle=settle | {"settled_periods": 5})
+    with rig.run(plan, bench=bench_with(**QUIET), progress=RunProgress(STEPPED_SINE_COLUMNS)) as run:
+        assert "at 24.5 Hz: not settled within 30 periods" in run.recording.points[0]["reason"]
+        assert "phase" not in run.recording.points[0]["reason"]
+    assert "FAILED: at 24.5 Hz" in capsys.readouterr().err
+
+
+def test_an_interrupted_realisation_is_shown_as_failed_without_empty_columns(capsys):
+    point = {"level": 0.1, "level_unit": "V RMS", "realisation": 0, "accepted": False, "reason": "interrupted"}
+    RunProgress(MULTISINE_COLUMNS).point(point, 1, 2)
+    assert capsys.readouterr().err.endswith("FAILED: interrupted\n")
+
+
+def test_a_level_of_a_multisine_stands_in_its_plan_once():
+    with pytest.raises(ValueError, match=r"levels_rms_v\[1\] = 0.05: allowed is each level once"):
+        MultisinePlan.model_validate(MULTISINE.model_dump() | {"levels_rms_v": (0.05, 0.05)})
+
+
+def test_one_period_of_a_multisine_does_not_count_as_settled():
+    plan = MULTISINE.model_copy(update={"periods": 1, "realisations": 1, "transient_periods": 0})
+    with rig.run(plan, bench=bench_with(**QUIET)) as run:
+        (point,) = run.recording.points
+    assert point["accepted"]
+    assert point["settled"] is None
+
+
+def test_a_vibration_beyond_the_limit_of_the_response_is_ramped_down_though_its_peaks_cannot_be_integrated():
+    bench = bench_with({"limits": {"acceleration_m_s2": 60.0}}, **QUIET)
+    with rig.run(_plan(frequencies_hz=(25.0,), levels_v=(4.0,)), bench=bench) as run:
+        part = run.recording.parts[0]
+        assert part.end["reason"] == "response_limit"
+        ramp = np.count_nonzero(part.rows("guard") == GuardMode.RAMPING)
+        assert np.abs(part.rows("inputs")).max() > 61.0
+    assert ramp == bench.limits.ramp_down_s * bench.sample_rate_hz
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_noise_in_the_first_sample_is_not_taken_for_travel(seed):
+    bench = bench_with({"limits": {"frequency_hz": (0.5, 600.0), "displacement_m": 0.002}}, noise_scale=10.0)
+    with rig.run(_plan(frequencies_hz=(25.0,), levels_v=(0.3,)), bench=bench, seed=seed) as run:
+        assert run.recording.parts[0].end["reason"] == "completed"
 
 
 class StopAfterOne(Silent):

@@ -104,6 +104,14 @@ def test_a_resolution_without_whole_samples_is_refused_with_the_next_one() -> No
         MultisineDesign.with_resolution(sample_rate_hz=5000.0, resolution_hz=0.3, lowest_hz=1.0, highest_hz=9.0)
 
 
+@pytest.mark.parametrize("resolution_hz", [1e5, 1e-300])
+def test_a_resolution_without_a_usable_period_is_refused(resolution_hz: float) -> None:
+    with pytest.raises(IdentificationError, match="needs 3 to 1e"):
+        MultisineDesign.with_resolution(
+            sample_rate_hz=5000.0, resolution_hz=resolution_hz, lowest_hz=10.0, highest_hz=20.0
+        )
+
+
 def test_seeds_below_zero_are_refused() -> None:
     with pytest.raises(IdentificationError, match="seed: is -1, needs zero or more"):
         DESIGN.realisation(-1, 0)

@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -45,6 +47,17 @@ def test_momentary_frequency_of_a_linear_sweep_is_exact() -> None:
     _, theta = linear_sweep(10.0, 7.5, 4.0)
     result = demodulate(theta, [np.cos(theta)] * 2, CHANNELS, sample_rate_hz=RATE_HZ)
     np.testing.assert_allclose(result.frequency_hz, 10.0 + 7.5 * result.time_s, atol=1e-5)
+
+
+def test_a_long_record_is_as_good_everywhere_and_takes_little_memory() -> None:
+    _, theta = linear_sweep(20.0, 0.2, 60.0)
+    signal = 2.0 * np.cos(theta + 0.5) + 3.0 * np.cos(2 * theta)
+    tracemalloc.start()
+    result = demodulate(theta, [signal, signal], CHANNELS, sample_rate_hz=RATE_HZ)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    np.testing.assert_allclose(result.force, 2.0 * np.exp(0.5j), atol=1e-4)
+    assert peak_bytes < 200 * theta.size
 
 
 @pytest.mark.parametrize("periods", [1, 2, 4])
