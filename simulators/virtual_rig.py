@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from simulators.checks import check_elements, check_plant, check_step
-from simulators.elements import Element, Magnet
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import FrictionSite
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
 from simulators.plant.assembly import LinearPlant, assemble
+from simulators.plant.checks import check_elements, check_plant, check_step
 from simulators.plant.compilation import at_rest, rig_arrays
 from simulators.scatter import Deviation, Scatter, deviated
 from simulators.sensing.filters import channel_delays, filter_delay
 from simulators.sensing.parts import Converter, Sensor
 from simulators.shipped import merged, specimen_table
-from simulators.structure import ModalStructure, Structure
+from simulators.sites.elements import Element, Magnet
+from simulators.sites.friction import FrictionSite
+from simulators.structures.structure import ModalStructure, Structure
 
 __all__ = ["VirtualRig"]
 

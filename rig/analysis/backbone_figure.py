@@ -8,7 +8,7 @@ import numpy as np
 from rig.analysis.drawing import length_unit, roomy
 from rig.figures.style import MAIN, SECOND
 from simulators.analysis import HysteresisLoop, PeriodicResponses
-from simulators.friction import FrictionSite
+from simulators.sites.friction import FrictionSite
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.figures.style import MAIN, REJECTED
-from simulators.meshed import MeshedBeam
 from simulators.modes import LinearModes
+from simulators.structures.meshed import MeshedBeam
 from simulators.virtual_rig import VirtualRig
 
 if TYPE_CHECKING:

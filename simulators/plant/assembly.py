@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.elements import Element
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import FrictionSite
 from simulators.plant.sites import Place, element_places, exciter_places
-from simulators.structure import Structure
+from simulators.sites.elements import Element
+from simulators.sites.friction import FrictionSite
+from simulators.structures.structure import Structure
 
 __all__ = ["LinearPlant", "assemble"]
 

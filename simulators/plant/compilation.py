@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.elements import Element
 from simulators.exciter import Exciter
-from simulators.friction import FrictionSite
 from simulators.layout import CHANNEL, CONVERTER, PLANT, RigArrays, RigState
 from simulators.plant.assembly import LinearPlant
 from simulators.plant.discretise import aligned, pad, round_up, step_columns
 from simulators.plant.sites import local_sites
 from simulators.sensing.filters import channel_sections, output_sections, ring_size, skew_taps
 from simulators.sensing.parts import Converter, Sensor
+from simulators.sites.elements import Element
+from simulators.sites.friction import FrictionSite
 from vibrolock.lanes.kernels import WIDTH
 
 __all__ = ["at_rest", "jenkins_elements", "rig_arrays"]

@@ -96,7 +96,7 @@ def magnet_force(site: Record, z: float) -> float:
 def local_force(site: Record, z: float) -> float:
     """Force (N) of one site without memory at coordinate ``z`` (m or m/s), minus its linear part.
 
-    The laws are those of `simulators.elements`.
+    The laws are those of `simulators.sites.elements`.
     """
     if site.kind <= MAGNET_SYMMETRIC:
         force = magnet_force(site, z)

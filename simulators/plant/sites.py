@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.elements import Clearance, Cubic, Element, Magnet
 from simulators.exciter import Exciter
-from simulators.functions import loaded
 from simulators.layout import SITE, SiteKind
-from simulators.structure import Structure
+from simulators.sites.elements import Clearance, Cubic, Element, Magnet
+from simulators.sites.functions import loaded
+from simulators.structures.structure import Structure
 
 __all__ = ["Place", "element_places", "exciter_places", "local_sites"]
 

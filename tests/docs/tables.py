@@ -9,13 +9,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from simulators.attachments import LumpedMass, Support
-from simulators.elements import Clearance, Cubic, Magnet, User
 from simulators.exciter import Exciter, Stinger
-from simulators.friction import IwanSite, JenkinsSite
 from simulators.scatter import Deviation, Scatter
 from simulators.sensing.parts import Converter, Sensor
-from simulators.structure import BeamStructure, LapJointedBeam, ModalStructure
+from simulators.sites.elements import Clearance, Cubic, Magnet, User
+from simulators.sites.friction import IwanSite, JenkinsSite
+from simulators.structures.attachments import LumpedMass, Support
+from simulators.structures.structure import BeamStructure, LapJointedBeam, ModalStructure
 from simulators.virtual_rig import VirtualRig
 from tests.docs.pages import ROOT
 

@@ -9,9 +9,9 @@ import pytest
 import scipy.io
 
 from rig.cli import main
-from simulators.friction import IwanSite
 from simulators.sensing.parts import Converter, Sensor
-from simulators.structure import BeamStructure
+from simulators.sites.friction import IwanSite
+from simulators.structures.structure import BeamStructure
 from simulators.virtual_rig import VirtualRig
 
 PLAN = """

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from simulators.elements import Clearance, Cubic, Element, Magnet, User
 from simulators.simulation import Simulation
+from simulators.sites.elements import Clearance, Cubic, Element, Magnet, User
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simulators.structure import LapJointedBeam
+from simulators.structures.structure import LapJointedBeam
 from simulators.virtual_rig import VirtualRig
 
 # Mass-normalised shapes of the two suspension modes and the four bending modes.

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from simulators.friction import IwanSite
 from simulators.simulation import Simulation
+from simulators.sites.friction import IwanSite
 from tests.simulators.friction_reference import SlippingEquations
 from tests.simulators.references import ideal
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from simulators.elements import Magnet
 from simulators.kernels import run_open_loop
 from simulators.scatter import Deviation
+from simulators.sites.elements import Magnet
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 
-from simulators.elements import Clearance, Cubic, Element, Magnet, User
 from simulators.exciter import Exciter
 from simulators.plant.kernels import local_forces
 from simulators.plant.sites import local_sites
 from simulators.simulation import Simulation
+from simulators.sites.elements import Clearance, Cubic, Element, Magnet, User
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal
 

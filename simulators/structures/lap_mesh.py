@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.beam import Quantity, hermite
+from simulators.structures.beam import Quantity, hermite
 
 __all__ = ["LapMesh", "bending_dofs"]
 

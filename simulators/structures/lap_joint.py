@@ -1,4 +1,4 @@
-"""Modes of two beams joined by a bolted lap, by finite elements (`simulators.lap_mesh`).
+"""Modes of two beams joined by a bolted lap, by finite elements (`simulators.structures.lap_mesh`).
 
 The legs are coupled by springs between their interfaces, tangential ``u_upper - u_lower`` and normal ``w_upper -
 w_lower``, peaked at the bolts. Linear axial and cubic Hermite bending elements, consistent mass, rotary inertia (Rayleigh
@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.beam import Lump, Quantity, Spring, bending_element, solve_modes
-from simulators.lap_mesh import LapMesh, bending_dofs
+from simulators.structures.beam import Lump, Quantity, Spring, bending_element, solve_modes
+from simulators.structures.lap_mesh import LapMesh, bending_dofs
 
 __all__ = ["Interface", "LapJointModes", "Section", "lap_joint_modes"]
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simulators.beam import BeamModes, Boundary, Lump, Quantity, Spring, beam_modes
+from simulators.structures.beam import BeamModes, Boundary, Lump, Quantity, Spring, beam_modes
 
 LENGTH_M, STIFFNESS, MASS = 0.55, 184.0, 1.3
 CLAMPED_FREE = (1.8751040687, 4.6940911330, 7.8547574382, 10.9955407349)

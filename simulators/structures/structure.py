@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from simulators.beam import BeamModes, Boundary, Quantity, beam_modes
-from simulators.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
-from simulators.lap_mesh import LapMesh
-from simulators.meshed import MeshedBeam, check_rising
 from simulators.part import Part, Positive, Several
+from simulators.structures.beam import BeamModes, Boundary, Quantity, beam_modes
+from simulators.structures.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
+from simulators.structures.lap_mesh import LapMesh
+from simulators.structures.meshed import MeshedBeam, check_rising
 
 __all__ = ["BeamStructure", "LapJointedBeam", "ModalStructure", "Structure"]
 
@@ -53,7 +53,7 @@ class BeamStructure(MeshedBeam):
 class LapJointedBeam(MeshedBeam):
     """Two beams joined by a bolted lap, hung on its supports (the Brake-Reuss beam); modes by finite elements.
 
-    `simulators.lap_joint` has the model. Modes are those of the stuck joint; friction sites take their stiffness from it.
+    `simulators.structures.lap_joint` has the model. Modes are those of the stuck joint; friction sites take their stiffness from it.
     """
 
     kind: Literal["lap-jointed-beam"]

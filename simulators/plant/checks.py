@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simulators.elements import Clearance, Element, Magnet
 from simulators.plant.assembly import LinearPlant
+from simulators.sites.elements import Clearance, Element, Magnet
 
 __all__ = ["check_elements", "check_plant", "check_step"]
 

@@ -7,10 +7,10 @@ import pytest
 from pydantic import ValidationError
 from scipy.linalg import eigh
 
-from simulators.beam import Lump, Spring
-from simulators.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
-from simulators.lap_mesh import LapMesh
-from simulators.structure import LapJointedBeam
+from simulators.structures.beam import Lump, Spring
+from simulators.structures.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
+from simulators.structures.lap_mesh import LapMesh
+from simulators.structures.structure import LapJointedBeam
 
 LENGTH_M, LAP_M = 0.72, 0.12
 STEEL = Section(193e9, 7900.0, 0.0254, 0.0254)

@@ -5,8 +5,8 @@ import pytest
 from pydantic import ValidationError
 from scipy.optimize import brentq
 
-from simulators.beam import BeamModes, Boundary, Lump, Spring, beam_modes
-from simulators.structure import BeamStructure
+from simulators.structures.beam import BeamModes, Boundary, Lump, Spring, beam_modes
+from simulators.structures.structure import BeamStructure
 
 LENGTH_M, STIFFNESS, MASS = 0.55, 184.0, 1.3
 PI = np.pi

@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from simulators.beam import Quantity
 from simulators.part import Part, Positive, Several
+from simulators.structures.beam import Quantity
 
 __all__ = ["FrictionSite", "IwanSite", "JenkinsSite"]
 

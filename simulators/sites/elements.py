@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_serializer, field_validator, model_validator
 
-from simulators.functions import loaded, named, portable
 from simulators.layout import N_PARAMETER
 from simulators.part import Part, Positive, Several
+from simulators.sites.functions import loaded, named, portable
 
 __all__ = ["Clearance", "Cubic", "Element", "LocalElement", "Magnet", "User"]
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from simulators.attachments import LumpedMass, Support
-from simulators.beam import Lump, Quantity, Spring
 from simulators.part import Part, Positive, Several
+from simulators.structures.attachments import LumpedMass, Support
+from simulators.structures.beam import Lump, Quantity, Spring
 
 __all__ = ["MeshedBeam", "check_rising"]
 

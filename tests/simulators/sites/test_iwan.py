@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from simulators.friction import IwanSite
+from simulators.sites.friction import IwanSite
 
 TABLE = {"kind": "iwan", "at": "joint", "stiffness_n_m": 2e8, "phi_max_m": 3e-6, "chi": -0.4, "beta": 0.7}
 # Stiffness (N/m) and slip force (N) of the calibrated outermost joint: eight elements and an end slider.

@@ -1,0 +1,1 @@
+"""Local nonlinear sites: elements without memory, friction joints, functions of the user's own."""

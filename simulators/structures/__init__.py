@@ -1,0 +1,1 @@
+"""What vibrates: beams by finite elements, lap joints, modes that are given."""
