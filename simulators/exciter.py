@@ -2,6 +2,7 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive
@@ -74,6 +75,13 @@ class Exciter(Part):
     def droops(self) -> bool:
         """True where the force factor depends on position."""
         return self.droop_per_m != 0.0 or self.droop_per_m2 != 0.0
+
+    @property
+    def droop_limit_m(self) -> float:
+        """Travel of the armature at which the force factor is down to a half, where a run is flagged; infinite if nowhere."""
+        roots = np.roots([self.droop_per_m2, self.droop_per_m, 0.5])
+        real = [abs(root.real) for root in roots if abs(root.imag) <= 1e-12 * abs(root)]
+        return float(min(real, default=np.inf))
 
 
 class Stinger(Part):

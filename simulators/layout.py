@@ -16,8 +16,9 @@ __all__ = ["CHANNEL", "CONVERTER", "PLANT", "SITE", "Flag", "RigArrays", "RigSta
 class Flag(IntFlag):
     """What went wrong in a sample; ``sample`` returns these, or-ed."""
 
-    MAGNET_RANGE = 1
-    """A magnet was displaced by more than 0.7 of its gap: beyond is contact, which the model does not know."""
+    LAW_RANGE = 1
+    """A law was left behind: a magnet beyond 0.7 of its gap (next comes contact, which is not modelled), or an armature where
+    the force factor has drooped to a half."""
     SENSOR_CLIPPED = 2
     """A sensor left its own range, or the range of the analogue-to-digital converter."""
     DAC_CLIPPED = 4
@@ -28,7 +29,7 @@ class Flag(IntFlag):
     """The voltage asked for would take the amplifier beyond its limit."""
 
 
-MAGNET_RANGE, SENSOR_CLIPPED, DAC_CLIPPED, DIVERGED, AMPLIFIER_CLIPPED = (int(flag) for flag in Flag)
+LAW_RANGE, SENSOR_CLIPPED, DAC_CLIPPED, DIVERGED, AMPLIFIER_CLIPPED = (int(flag) for flag in Flag)
 
 
 class SiteKind(IntEnum):

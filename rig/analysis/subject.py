@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 _TOLERANCE = 1.0 + 1e-6
 
 FLAG_WORDS = {
-    Flag.MAGNET_RANGE: "a nonlinear element is beyond the range in which its law holds",
+    Flag.LAW_RANGE: "a magnet or the force factor is beyond the range in which its law holds",
     Flag.SENSOR_CLIPPED: "a sensor would clip",
     Flag.DAC_CLIPPED: "the voltage is beyond the output converter",
 }

@@ -103,7 +103,7 @@ class Evaluation:
         """What a run of the rig would flag."""
         rig, series = self.rig, Series(self.balance.series.harmonics, 128)
         converter = rig.converter
-        flags = np.where(beyond, int(Flag.MAGNET_RANGE), 0)
+        flags = np.where(beyond, int(Flag.LAW_RANGE), 0)
         flags |= np.where(voltage > converter.dac_range_v, int(Flag.DAC_CLIPPED), 0)
         flags |= np.where(voltage > rig.exciter.input_limit_v, int(Flag.AMPLIFIER_CLIPPED), 0)
         for sensor, harmonics in zip(rig.sensors, sensors, strict=True):

@@ -22,8 +22,8 @@ from simulators.layout import (
     CLEARANCE,
     CUBIC,
     DROOP,
+    LAW_RANGE,
     MAGNET_ONE_SIDED,
-    MAGNET_RANGE,
     MAGNET_SYMMETRIC,
     RigArrays,
     RigState,
@@ -156,7 +156,7 @@ def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
 
 @inner_kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
-    """Advance the plant by one sample with ``voltage`` (V) held; returns MAGNET_RANGE, AMPLIFIER_CLIPPED or 0, or-ed."""
+    """Advance the plant by one sample with ``voltage`` (V) held; returns LAW_RANGE, AMPLIFIER_CLIPPED or 0, or-ed."""
     inputs, rows, forces, joints, changes = state.inputs, state.rows, state.forces, state.joints, state.changes
     n, n_local, n_joint = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_joint
     first_state, first_local, first_joint = n_joint + n_local, n + 1, n + 1 + n_local
@@ -182,4 +182,4 @@ def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
             inputs[first_local + s] = forces[s]
         for s in range(n_joint):
             inputs[first_joint + s] = joints[s]
-    return (MAGNET_RANGE if beyond else 0) | (AMPLIFIER_CLIPPED if held != voltage else 0)
+    return (LAW_RANGE if beyond else 0) | (AMPLIFIER_CLIPPED if held != voltage else 0)

@@ -55,7 +55,7 @@ def exciter_places(exciter: Exciter, n: int) -> list[Place]:
 
 def _exciter_records(exciter: Exciter) -> list[dict[str, Any]]:
     """Suspension on the armature; where the force factor droops, its force on it and its back-EMF on the coil."""
-    suspension = {"kind": SiteKind.CUBIC, "strength": exciter.suspension_cubic_n_m3}
+    suspension = {"kind": SiteKind.CUBIC, "strength": exciter.suspension_cubic_n_m3, "limit": exciter.droop_limit_m}
     if not exciter.droops:
         return [suspension] if exciter.suspension_cubic_n_m3 else []
     g = exciter.force_factor_n_a

@@ -53,7 +53,8 @@ class BeamStructure(MeshedBeam):
 class LapJointedBeam(MeshedBeam):
     """Two beams joined by a bolted lap, hung on its supports (the Brake-Reuss beam); modes by finite elements.
 
-    `simulators.structures.lap_joint` has the model. Modes are those of the stuck joint; friction sites take their stiffness from it.
+    `simulators.structures.lap_joint` has the model. Modes are those of the stuck joint; friction sites take their stiffness
+    from it.
     """
 
     kind: Literal["lap-jointed-beam"]

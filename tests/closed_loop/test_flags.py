@@ -14,7 +14,7 @@ FAR = {"limits": {"displacement_m": 0.02, "force_n": 44.0, "acceleration_m_s2": 
 WAYS = {
     "amplifier_clipped": (None, {"exciter": {"voltage_limit_v": 0.4}}, 1.0),
     "sensor_clipped": (None, {"converter": {"adc_range_v": 0.05}}, 1.0),
-    "magnet_range": (
+    "law_range": (
         FAR,
         {"elements": [{"kind": "magnet-one-sided", "at": "magnet", "strength_n_m4": 1e-15, "gap_m": 0.0005}]},
         1.0,

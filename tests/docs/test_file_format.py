@@ -45,7 +45,7 @@ def test_every_key_of_a_point_is_on_the_page(kind):
     plan: Plan = plan_from(PLANS[kind], kind)
     with rig.run(plan) as run:
         point, part = run.recording.points[0], run.recording.parts[0]
-        assert part.information["device_flags"][0] == "magnet_range"
+        assert part.information["device_flags"][0] == "law_range"
     assert point["accepted"], point["reason"]
     keys = {key for key in point if kind != "sweep" or not BY_RULE.fullmatch(key)}
     assert keys <= named

@@ -14,7 +14,7 @@ ELEMENTS = [
     {
         "kind": "user",
         "at": "drive",
-        "function": "tests.simulators.test_elements:cubic_of_a_user",
+        "function": "tests.simulators.sites.test_elements:cubic_of_a_user",
         "parameters": [3e14],
     },
 ]

@@ -153,3 +153,13 @@ def test_droop_and_stiff_suspension_make_no_power() -> None:
 def test_bad_exciter_is_refused(exciter: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         ideal(exciter=exciter)
+
+
+@pytest.mark.parametrize(("curvature", "flagged"), [(-1e6, True), (-1e4, False), (1e6, False)])
+def test_a_force_factor_down_to_a_half_is_flagged(curvature: float, flagged: bool) -> None:
+    rig = ideal("magnet-beam", exciter={"droop_per_m2": curvature})
+    voltages = 2.0 * np.sin(2.0 * np.pi * 22.0 * np.arange(5000) / 5000.0)
+    run = Simulation(rig).run(voltages)
+    travel_m = np.max(np.abs(run.displacement_m["drive"]))  # the stinger hardly gives way: that of the armature
+    assert rig.exciter.droop_limit_m == (pytest.approx(np.sqrt(0.5 / -curvature)) if curvature < 0.0 else np.inf)
+    assert bool(run.flag & Flag.LAW_RANGE) == flagged == (travel_m > rig.exciter.droop_limit_m)

@@ -87,10 +87,10 @@ def test_magnet_that_leaves_its_range_is_flagged_and_the_state_stays_finite() ->
     run = Simulation(VirtualRig.shipped("magnet-beam")).run(sine(10.0, 25.5, 10_000))
     beyond = np.abs(run.displacement_m["magnet"]) > 0.7 * 0.011
     assert beyond.any()
-    assert run.flag & Flag.MAGNET_RANGE
+    assert run.flag & Flag.LAW_RANGE
     assert not run.flag & Flag.DIVERGED
     # The flag of a sample tells of the way to the next instant.
-    flagged = (run.flags & Flag.MAGNET_RANGE) != 0
+    flagged = (run.flags & Flag.LAW_RANGE) != 0
     assert np.all(flagged[:-1][beyond[1:]])
 
 

@@ -66,7 +66,7 @@ def test_what_a_run_would_flag_is_flagged() -> None:
     assert np.max(drive[1]) > 20.0 > drive[0].sum()
     assert Flag(int(found.flags[0])) == Flag(0)
     assert Flag(int(found.flags[1])) == Flag.DAC_CLIPPED | Flag.SENSOR_CLIPPED
-    assert Flag.MAGNET_RANGE in Flag(int(found.flags[2]))
+    assert Flag.LAW_RANGE in Flag(int(found.flags[2]))
     assert np.abs(found.point_harmonics_m["magnet"][2]).sum() > 0.7 * 0.011
 
 
