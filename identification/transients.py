@@ -125,7 +125,8 @@ def demodulate(
         On NaN or inf, unequal lengths, a phase that falls, fewer than 8 samples per period, a record that is too short.
     """
     theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
-    data = finite_array("samples", samples, np.float64, 2)
+    single = np.asarray(samples).dtype == np.float32  # as recorded; stretches are computed in double precision
+    data = finite_array("samples", samples, np.float32 if single else np.float64, 2)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
     if data.shape != (len(channels), theta.size):
         raise IdentificationError(

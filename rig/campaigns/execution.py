@@ -176,9 +176,18 @@ class Execution:
         return self.tick.sample
 
     def _rows(self, first: int, end: int) -> np.ndarray:
-        return np.concatenate(
-            [rows[max(0, first - start) : max(0, end - start)] for start, rows in self.kept if start < end]
-        )
+        """The rows of a point; those up to its end are kept no longer."""
+        out = np.empty(end - first, self.tick.row_dtype)
+        while self.kept and self.kept[0][0] < end:
+            start, rows = self.kept.popleft()
+            if start + rows.size <= first:
+                continue
+            taken = slice(max(0, first - start), min(rows.size, end - start))
+            out[max(0, start - first) : min(end, start + rows.size) - first] = rows[taken]
+            if start + rows.size > end:
+                self.kept.appendleft((start, rows))
+                break
+        return out
 
     def _drop_rows_before(self, sample: int) -> None:
         while self.kept and self.kept[0][0] + self.kept[0][1].size <= sample:

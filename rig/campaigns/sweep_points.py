@@ -45,9 +45,9 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
 
 def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
     """Fundamentals over time of recorded rows: every input, and the output as channel ``voltage``."""
-    signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
+    signals = np.vstack([rows["inputs"].T, rows["output_v"]])
     return demodulate(
-        rows["theta_rad"].astype(float),
+        rows["theta_rad"],
         signals,
         (*channels_of(bench), Channel("voltage", "monitor", "V")),
         sample_rate_hz=bench.sample_rate_hz,
