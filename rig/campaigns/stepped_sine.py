@@ -56,6 +56,8 @@ class SteppedSinePlan(TonePlan):
         for index, frequency_hz in enumerate(self.frequencies_hz or ()):
             if not frequency_hz > 0.0:
                 raise ValueError(f"frequencies_hz[{index}] = {frequency_hz:g}: allowed is above 0")
+        if len(set(self.levels_v)) != len(self.levels_v):
+            raise ValueError("levels_v: a level is given twice")
         if not self.frequencies_at_each_level:
             raise ValueError("frequencies_hz = []: at least one frequency is needed")
         return self

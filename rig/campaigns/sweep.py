@@ -13,6 +13,7 @@ from rig.sequencer.segments import Excitation, Segment
 __all__ = ["SweepPlan"]
 
 FEWEST_PERIODS = 10  # the fundamental is a mean over two; fewer than this show no course of it
+LONGEST_S = 86400.0
 
 
 class SweepPlan(TonePlan):
@@ -49,9 +50,12 @@ class SweepPlan(TonePlan):
         if self.rate_hz_per_s is None:
             mean_hz = (self.stop_hz - self.start_hz) / math.log(self.stop_hz / self.start_hz)
         periods = mean_hz * self.duration_s
+        name = "rate_hz_per_s" if self.rate_hz_per_s is not None else "rate_octaves_per_min"
+        rate = getattr(self, name)
+        if self.duration_s > LONGEST_S:
+            least = rate * self.duration_s / LONGEST_S
+            raise ValueError(f"{name} = {rate:g}: allowed is from {least:.4g}, a sweep of a day")
         if periods < FEWEST_PERIODS:
-            name = "rate_hz_per_s" if self.rate_hz_per_s is not None else "rate_octaves_per_min"
-            rate = getattr(self, name)
             raise ValueError(
                 f"{name} = {rate:g}: allowed is up to {rate * periods / FEWEST_PERIODS:.4g} from {self.start_hz:g} to "
                 f"{self.stop_hz:g} Hz, a sweep of {FEWEST_PERIODS} periods"

@@ -63,6 +63,7 @@ def test_stepped_sines_are_handed_out_as_one_frequency_response_per_level(steppe
         ({"start_hz": 22.0}, "exactly one"),
         ({"frequencies_hz": (24.0, -1.0)}, r"frequencies_hz\[1\] = -1"),
         ({"frequencies_hz": ()}, "at least one"),
+        ({"frequencies_hz": (24.0,), "levels_v": (1.0, 1.0)}, "twice"),
         ({"frequencies_hz": (24.0,), "levels_v": ()}, "levels_v"),
     ],
 )
@@ -209,6 +210,7 @@ def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
         ({"rate_hz_per_s": None}, "exactly one"),
         ({"stop_hz": 22.0}, "anything but start_hz"),
         ({"rate_hz_per_s": -1.0}, "rate_hz_per_s"),
+        ({"rate_hz_per_s": 1e-300}, "rate_hz_per_s = 1e-300: allowed is from 5.787e-05, a sweep of a day"),
         ({"rate_hz_per_s": 1e4}, "rate_hz_per_s = 10000: allowed is up to 12.25 "),
         ({"off_resonance_hz": ()}, "off_resonance_hz"),
     ],
