@@ -32,7 +32,7 @@ from simulators.kernels import run_open_loop
 ROUNDS = 9
 SAMPLES = 40_000
 BLOCKS = (1, 8, 64)
-DRIVE = {"magnet-beam": (0.5, 24.4), "friction-beam": (5.0, 149.0)}  # V and Hz of the open-loop measurements
+DRIVE = {"magnet-beam": (0.5, 24.4), "friction-beam": (0.5, 149.0)}  # V and Hz of the open-loop measurements
 
 
 def _started(bench: Bench, block: int = 1) -> tuple[VirtualDAQ, Tick]:
