@@ -85,24 +85,32 @@ class SteppedSinePlan(TonePlan):
         )
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that measure all points but those ``done``; a new level begins from rest at its first frequency."""
+        """The segments that measure all points but those ``done``; a new level begins from rest at its first frequency.
+
+        Points that are done are passed through on the way to the others of their level: where two responses exist, the way
+        decides which is found.
+        """
         failure = OnFailure[self.on_failure.upper()]
+        targets = self.targets()
+        last_of_level = {target.level: target.number for target in targets if target.number not in done}
         out: list[Segment] = []
         before: Target | None = None
-        for target in self.targets():
-            if target.number in done:
+        for target in targets:
+            if target.number > last_of_level.get(target.level, -1):
                 continue
             tone = Excitation(target.frequency_hz or 0.0)
-            number, level = target.number, target.level
+            number, level = -1 if target.number in done else target.number, target.level
             if before is not None and before.level != level:
                 out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.ramp_periods, excitation=out[-1].excitation))
                 out.append(Segment(SegmentKind.RAMP, number, 0.0, 1.0, excitation=tone))
             out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods, excitation=tone))
+            before = target
+            if target.number in done:
+                continue
             longest = self.settle.longest_periods
             out.append(Segment(SegmentKind.SETTLE, number, level, longest, failure, excitation=tone))
             periods = self.record_periods + 1.0
             out.append(Segment(SegmentKind.RECORD, number, level, periods, failure, excitation=tone))
-            before = target
         return tuple(out)
 
     def check(self, bench: Bench) -> None:
