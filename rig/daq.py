@@ -51,7 +51,7 @@ class Channel(Configured):
     noise_rms: float = Field(0.0, ge=0)
     """Noise of sensor and converter, RMS in the physical unit, as far as known."""
     skew_samples: float = Field(0.0, ge=-100, le=100)
-    """Delay of this channel behind the others, samples; taken out of the measured phase lag."""
+    """Delay of this channel behind the others, samples; taken out of the measured phase lag and of every amplitude."""
     sensor: str = ""
     """Type and serial number, for the record."""
 

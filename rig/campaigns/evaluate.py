@@ -20,6 +20,7 @@ __all__ = [
     "head",
     "quantisation_warnings",
     "recorded_vibration",
+    "skew_turn",
     "within_periods",
 ]
 
@@ -123,10 +124,14 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
 
 def _without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
     """The vibration with every channel's harmonics turned forward by its skew: ``Y_h exp(i h Omega tau)``."""
-    omega = 2.0 * math.pi * vibration.frequency_hz
+    orders = np.arange(vibration.harmonics.shape[1])
+    return replace(vibration, harmonics=vibration.harmonics * skew_turn(bench, vibration.frequency_hz * orders))
+
+
+def skew_turn(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:
+    """Factors complex[n_channels, n] ``exp(2 pi i f tau)`` that take each channel's skew tau out of amplitudes at f."""
     delay_s = np.array([channel.skew_samples for channel in bench.channels]) / bench.sample_rate_hz
-    turn = np.exp(1j * omega * np.outer(delay_s, np.arange(vibration.harmonics.shape[1])))
-    return replace(vibration, harmonics=vibration.harmonics * turn)
+    return np.asarray(np.exp(2j * math.pi * np.outer(delay_s, frequency_hz)))
 
 
 def channels_of(bench: Bench) -> tuple[Channel, ...]:

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from identification import Channel, IdentificationError, PeriodicSpectra, periodic_spectra
 from rig.bench import Bench
-from rig.campaigns.evaluate import channels_of, head
+from rig.campaigns.evaluate import channels_of, head, skew_turn
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.plan import Column, Target
 
@@ -59,7 +60,10 @@ def measure_multisine_point(
 
 
 def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
-    """Spectra of recorded rows, by the number of the realisation; every period is turned to begin where the signal does."""
+    """Spectra of recorded rows, by the number of the realisation; every period is turned to begin where the signal does.
+
+    The channels' skew is taken out.
+    """
     design = plan.design(bench.sample_rate_hz)
     size = design.period_samples
     turned = []
@@ -71,7 +75,10 @@ def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarr
         signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
         periods = signals.reshape(signals.shape[0], plan.periods, size)
         turned.append(np.roll(periods, begun, axis=2).reshape(signals.shape))
-    return periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
+    spectra = periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
+    without_skew = spectra.spectra.copy()
+    without_skew[:, :, :-1] *= skew_turn(bench, spectra.frequency_hz)
+    return replace(spectra, spectra=without_skew)
 
 
 def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:

@@ -1,13 +1,13 @@
 """From the recorded rows of a sweep to its result, and to fundamentals over time."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from identification import Channel, IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
-from rig.campaigns.evaluate import channels_of, head
+from rig.campaigns.evaluate import channels_of, head, skew_turn
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.sweep import SweepPlan
 
@@ -44,11 +44,14 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
 
 
 def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
-    """Fundamentals over time of recorded rows: every input, and the output as channel ``voltage``."""
+    """Fundamentals over time of recorded rows: every input, its skew taken out, and the output as channel ``voltage``."""
     signals = np.vstack([rows["inputs"].T, rows["output_v"]])
-    return demodulate(
+    transient = demodulate(
         rows["theta_rad"],
         signals,
         (*channels_of(bench), Channel("voltage", "monitor", "V")),
         sample_rate_hz=bench.sample_rate_hz,
     )
+    without_skew = transient.fundamentals.copy()
+    without_skew[:-1] *= skew_turn(bench, transient.frequency_hz)
+    return replace(transient, fundamentals=without_skew)

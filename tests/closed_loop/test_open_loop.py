@@ -335,3 +335,24 @@ def test_an_interrupted_open_loop_test_is_ramped_down_and_resumed(plan, tmp_path
         assert numbers == {target.number for target in plan.targets()}
         assert len(run.recording.parts) == 2
         assert show(run.recording)["complete"]
+
+
+def _late_drive(samples):
+    """The quiet bench with a drive channel that is late by so many samples, and says so."""
+    channels = [channel.model_dump() for channel in bench_with().channels]
+    sensors = [sensor.model_dump() for sensor in VirtualRig.shipped("magnet-beam").sensors]
+    channels[1]["skew_samples"] = sensors[1]["skew_samples"] = samples
+    return bench_with({"channels": channels}, sensors=sensors, **QUIET)
+
+
+def test_the_skew_of_a_channel_is_taken_out_of_spectra_and_sweeps():
+    plain, late = bench_with(**QUIET), _late_drive(3.4)
+    one = MULTISINE.model_copy(update={"realisations": 1})
+    with rig.run(one, bench=plain) as first, rig.run(one, bench=late) as second:
+        expected, found = (run.spectra()[0.05].frequency_response("drive").value for run in (first, second))
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+    with rig.run(_sweep(), bench=plain) as first, rig.run(_sweep(), bench=late) as second:
+        expected, found = (run.sweeps()[0] for run in (first, second))
+    ratio = found.fundamental("drive") / expected.fundamental("drive")
+    assert np.abs(np.angle(ratio)).max() < 3e-3  # undeclared, 3.4 samples would be 0.12 rad at 27 Hz
+    np.testing.assert_allclose(np.abs(ratio), 1.0, rtol=2e-2)  # it is late by its skew in time, too
