@@ -12,6 +12,7 @@ from rig.campaigns.plan import OpenLoopPlan, Plan, Target
 from rig.sequencer.layout import Outcome
 
 __all__ = [
+    "VOLTAGE",
     "as_complex",
     "as_pairs",
     "channels_of",
@@ -23,6 +24,9 @@ __all__ = [
     "skew_turn",
     "within_periods",
 ]
+
+VOLTAGE = Channel("voltage", "monitor", "V")
+"""The output on the converter, as a channel beside the inputs."""
 
 WHY = {
     Outcome.NOT_SETTLED: "not settled within {longest:g} periods",

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from identification import Channel, IdentificationError, PeriodicSpectra, periodic_spectra
+from identification import IdentificationError, PeriodicSpectra, periodic_spectra
 from rig.bench import Bench
-from rig.campaigns.evaluate import channels_of, head, skew_turn
+from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.plan import Column, Target
 
-__all__ = ["MULTISINE_COLUMNS", "VOLTAGE", "measure_multisine_point", "spectra_of"]
+__all__ = ["MULTISINE_COLUMNS", "measure_multisine_point", "spectra_of"]
 
 MULTISINE_COLUMNS = (
     Column("realisation", "realisation", "", ".0f"),
@@ -22,9 +22,6 @@ MULTISINE_COLUMNS = (
     Column("voltage_peak_v", "peak", "V", ".3f"),
     Column("change", "change over the periods", "%", ".3f", 100.0),
 )
-
-VOLTAGE = Channel("voltage", "monitor", "V")
-"""The output on the converter, as a channel beside the inputs."""
 
 
 def measure_multisine_point(

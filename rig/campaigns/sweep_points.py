@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from identification import Channel, IdentificationError, Transient, demodulate, force_drop_out
+from identification import IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
-from rig.campaigns.evaluate import channels_of, head, skew_turn
+from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.sweep import SweepPlan
 
@@ -49,7 +49,7 @@ def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
     transient = demodulate(
         rows["theta_rad"],
         signals,
-        (*channels_of(bench), Channel("voltage", "monitor", "V")),
+        (*channels_of(bench), VOLTAGE),
         sample_rate_hz=bench.sample_rate_hz,
     )
     without_skew = transient.fundamentals.copy()
