@@ -9,25 +9,25 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from identification.backbones import Backbone
     from identification.channels import Channel
-    from identification.decimation import decimated
     from identification.errors import IdentificationError
-    from identification.fourier import periodic_vibration
     from identification.frequency_responses import (
         FrequencyResponse,
         pack_frequency_responses,
         unpack_frequency_responses,
     )
-    from identification.half_periods import HalfPeriods, zero_crossings
     from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
-    from identification.mode_shapes import ModeShapes, mac
-    from identification.multisine import MultisineDesign
-    from identification.multisine_spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
-    from identification.nonlinear_modes import NonlinearMode
-    from identification.phase_resonance import nonlinear_mode
-    from identification.stepped_sine import stepped_sine_mode
-    from identification.sweeps import ForceDropOut, force_drop_out
-    from identification.transients import Transient, demodulate
+    from identification.multisine.design import MultisineDesign
+    from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
+    from identification.nonlinear.mode_shapes import ModeShapes, mac
+    from identification.nonlinear.nonlinear_modes import NonlinearMode
+    from identification.nonlinear.phase_resonance import nonlinear_mode
+    from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.signals.decimation import decimated
+    from identification.signals.fourier import periodic_vibration
+    from identification.signals.half_periods import HalfPeriods, zero_crossings
+    from identification.signals.sweeps import ForceDropOut, force_drop_out
+    from identification.signals.transients import Transient, demodulate
 
 __all__ = [
     "Backbone",
@@ -61,30 +61,30 @@ __all__ = [
 _MODULE_OF = {
     "Backbone": "backbones",
     "Channel": "channels",
-    "ForceDropOut": "sweeps",
+    "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping",
-    "HalfPeriods": "half_periods",
+    "HalfPeriods": "signals.half_periods",
     "IdentificationError": "errors",
-    "InstrumentResponse": "multisine_spectra",
-    "ModeShapes": "mode_shapes",
-    "MultisineDesign": "multisine",
-    "NonlinearMode": "nonlinear_modes",
-    "PeriodicSpectra": "multisine_spectra",
+    "InstrumentResponse": "multisine.spectra",
+    "ModeShapes": "nonlinear.mode_shapes",
+    "MultisineDesign": "multisine.design",
+    "NonlinearMode": "nonlinear.nonlinear_modes",
+    "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
-    "Transient": "transients",
-    "decimated": "decimation",
-    "demodulate": "transients",
-    "force_drop_out": "sweeps",
-    "mac": "mode_shapes",
+    "Transient": "signals.transients",
+    "decimated": "signals.decimation",
+    "demodulate": "signals.transients",
+    "force_drop_out": "signals.sweeps",
+    "mac": "nonlinear.mode_shapes",
     "map_frequency_responses": "mapping",
-    "nonlinear_mode": "phase_resonance",
+    "nonlinear_mode": "nonlinear.phase_resonance",
     "pack_frequency_responses": "frequency_responses",
-    "periodic_spectra": "multisine_spectra",
-    "periodic_vibration": "fourier",
-    "stepped_sine_mode": "stepped_sine",
+    "periodic_spectra": "multisine.spectra",
+    "periodic_vibration": "signals.fourier",
+    "stepped_sine_mode": "nonlinear.stepped_sine",
     "unpack_frequency_responses": "frequency_responses",
-    "zero_crossings": "half_periods",
+    "zero_crossings": "signals.half_periods",
 }
 
 

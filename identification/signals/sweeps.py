@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
-from identification.transients import Transient
+from identification.signals.transients import Transient
 
 __all__ = ["ForceDropOut", "force_drop_out"]
 

@@ -27,8 +27,8 @@ from identification.backbones import Backbone
 from identification.channels import Role, find_role
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration, wrapped_deg
-from identification.mode_shapes import ModeShapes, mac
-from identification.nonlinear_modes import NonlinearMode
+from identification.nonlinear.mode_shapes import ModeShapes, mac
+from identification.nonlinear.nonlinear_modes import NonlinearMode
 
 __all__ = ["nonlinear_mode"]
 

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from identification.decimation import EDGE_SAMPLES, decimated
 from identification.errors import IdentificationError
+from identification.signals.decimation import EDGE_SAMPLES, decimated
 
 INNER = slice(EDGE_SAMPLES, -EDGE_SAMPLES)
 RATES = [(5000.0, 800.0), (5000.0, 2500.0), (12800.0, 6400.0), (5000.0, 4000.0), (48000.0, 44100.0)]

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import Channel, find_name, find_role
 from identification.errors import IdentificationError
-from identification.multisine import MultisineDesign
+from identification.multisine.design import MultisineDesign
 from identification.validation import finite_array
 
 __all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
-from identification.nonlinear_modes import NonlinearMode
+from identification.nonlinear.nonlinear_modes import NonlinearMode
 
 __all__ = ["stepped_sine_mode"]
 

@@ -1,0 +1,1 @@
+"""Multisines: their design, and the spectra of what was recorded under them."""

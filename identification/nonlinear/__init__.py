@@ -1,0 +1,1 @@
+"""Nonlinear modes: modal properties over the vibration level, from backbones and stepped sines."""
