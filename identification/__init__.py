@@ -15,6 +15,8 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
+    from identification.linear.modes import LinearModes
+    from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
     from identification.multisine.design import MultisineDesign
@@ -35,9 +37,11 @@ __all__ = [
     "ForceDropOut",
     "FrequencyResponse",
     "FrequencyResponseMapping",
+    "FrequencyResponseMatrix",
     "HalfPeriods",
     "IdentificationError",
     "InstrumentResponse",
+    "LinearModes",
     "ModeShapes",
     "MultisineDesign",
     "NonlinearMode",
@@ -64,9 +68,11 @@ _MODULE_OF = {
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping",
+    "FrequencyResponseMatrix": "linear.response_matrix",
     "HalfPeriods": "signals.half_periods",
     "IdentificationError": "errors",
     "InstrumentResponse": "multisine.spectra",
+    "LinearModes": "linear.modes",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
     "NonlinearMode": "nonlinear.nonlinear_modes",

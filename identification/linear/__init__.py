@@ -1,0 +1,1 @@
+"""Linear frequency responses and what a modal analysis makes of them."""

@@ -1,0 +1,187 @@
+"""A linear modal model as a modal analysis gives it: poles, mass-normalised shapes, residual terms, their errors.
+
+The accelerance is, with ``s = i W``,
+
+    H_o(s) = sum_k phi_ok phi_dk s^2 / (s^2 + 2 z_k w_k s + w_k^2) + L_o + U_o s^2,
+
+phi mass-normalised shapes at the channel o and at the drive point d, L_o what lower modes and rigid-body motion leave
+in the band (inertia), U_o what higher modes leave (stiffness).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import MOTION_ORDER, Channel, find_name
+from identification.errors import IdentificationError
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.nonlinear.mode_shapes import ModeShapes
+from identification.validation import finite_array
+
+__all__ = ["LinearModes"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_POLES = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "phase_collinearity")
+_SHAPES = ("shapes", "shapes_std")
+_RESIDUALS = ("lower", "upper")
+_SCALARS = ("lowest_hz", "highest_hz", "force_rms_n", "fit_residual")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LinearModes:
+    """Linear modes of a structure, lowest frequency first.
+
+    Parameters
+    ----------
+    channels
+        The motions, one per row of ``shapes``; the one of role ``drive`` is where the force acts.
+    frequency_hz, frequency_std_hz
+        float[n_modes], undamped natural frequencies ``w / 2 pi`` and their standard errors (NaN if unknown).
+    damping_ratio, damping_ratio_std
+        float[n_modes].
+    shapes, shapes_std
+        float[n_channels, n_modes], mass-normalised deflection, kg^-1/2, positive at the drive point.
+    phase_collinearity
+        float[n_modes], how well the complex residues of a mode lie on one line, in [0, 1]; NaN if unknown.
+    lower, upper
+        complex[n_channels], residual terms L (1/kg) and U (s^2/kg) of the accelerance.
+    lowest_hz, highest_hz
+        Band that the model was fitted in.
+    force_rms_n
+        RMS of the force in that band, the level of the test; 0 where it was extrapolated to zero, NaN if unknown.
+    fit_residual
+        Root of the mean square of misfit over expected error; 1 where nothing but noise is left; NaN if unknown.
+    specimen
+        Name of what was tested.
+    notes
+        What a user should know about these numbers, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        On shapes that do not agree, no single drive channel, frequencies that are not positive and rising.
+    """
+
+    channels: tuple[Channel, ...]
+    frequency_hz: Float
+    frequency_std_hz: Float
+    damping_ratio: Float
+    damping_ratio_std: Float
+    shapes: Float
+    shapes_std: Float
+    phase_collinearity: Float
+    lower: Complex
+    upper: Complex
+    lowest_hz: float
+    highest_hz: float
+    force_rms_n: float = np.nan
+    fit_residual: float = np.nan
+    specimen: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        object.__setattr__(self, "notes", tuple(self.notes))
+        self.drive_row  # noqa: B018 (refuses channels without a drive point)
+        modes, rows = np.size(self.frequency_hz), len(self.channels)
+        for names, shape, dtype in (
+            (_POLES, (modes,), np.float64),
+            (_SHAPES, (rows, modes), np.float64),
+            (_RESIDUALS, (rows,), np.complex128),
+        ):
+            for name in names:
+                array = np.array(getattr(self, name), dtype=dtype)
+                if array.shape != shape:
+                    raise IdentificationError(f"{name}: shape {array.shape}, needs {shape}")
+                array.setflags(write=False)
+                object.__setattr__(self, name, array)
+        for name in ("frequency_hz", "damping_ratio", "shapes"):
+            finite_array(name, getattr(self, name), np.float64, 2 if name == "shapes" else 1)
+        if not modes or self.frequency_hz[0] <= 0.0 or np.any(np.diff(self.frequency_hz) <= 0.0):
+            raise IdentificationError("frequency_hz: needs at least one, above zero, each above the one before")
+
+    @property
+    def drive_row(self) -> int:
+        """Row of the drive point."""
+        rows = [row for row, channel in enumerate(self.channels) if channel.role == "drive"]
+        if len(rows) != 1:
+            raise IdentificationError(f"channels: {len(rows)} have the role drive, needs exactly one")
+        return rows[0]
+
+    @property
+    def drive_shape(self) -> Float:
+        """float[n_modes]: shapes at the drive point, kg^-1/2."""
+        return np.asarray(self.shapes[self.drive_row])
+
+    def nearest(self, frequency_hz: float) -> int:
+        """Index of the mode nearest to a frequency."""
+        return int(np.argmin(np.abs(self.frequency_hz - frequency_hz)))
+
+    def mode_shapes(self, mode: int = 0, *, modes: int | None = None) -> ModeShapes:
+        """Shapes for the modal amplitude of ``mode``, from ``modes`` modes nearest to it (as many as channels tell apart)."""
+        count = min(len(self.channels), self.frequency_hz.size) if modes is None else modes
+        order = np.argsort(np.abs(self.frequency_hz - self.frequency_hz[mode]), kind="stable")[:count]
+        return ModeShapes(tuple(c.name for c in self.channels), self.shapes[:, order], 0)
+
+    def accelerance(self, frequency_hz: ArrayLike, *, without: int | None = None) -> Complex:
+        """complex[n, n_channels]: acceleration over drive force, 1/kg, residual terms included; one mode may be left out."""
+        s = 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))[:, None]
+        omega = 2.0 * np.pi * self.frequency_hz
+        modal = s**2 / (s**2 + 2.0 * self.damping_ratio * omega * s + omega**2)
+        residues = self.shapes * self.drive_shape
+        if without is not None:
+            residues = np.delete(residues, without, axis=1)
+            modal = np.delete(modal, without, axis=1)
+        return np.asarray(modal @ residues.T + self.lower + self.upper * s**2)
+
+    def receptance(self, frequency_hz: ArrayLike, output: str | None = None, *, without: int | None = None) -> Complex:
+        """complex[n]: displacement of a channel (the drive point if None) over drive force, m/N."""
+        row = self.drive_row if output is None else find_name(self.channels, output)
+        s = 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        return np.asarray(self.accelerance(frequency_hz, without=without)[:, row] / s**2)
+
+    def response_matrix(self, frequency_hz: ArrayLike) -> FrequencyResponseMatrix:
+        """The model's frequency responses in the units of the channels, for one force."""
+        frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        s = 2j * np.pi * frequency
+        order = np.array([2 - MOTION_ORDER[channel.motion] for channel in self.channels])
+        value = self.accelerance(frequency) / s[:, None] ** order
+        return FrequencyResponseMatrix(
+            outputs=self.channels,
+            inputs=(Channel("force", "force", "N"),),
+            frequency_hz=frequency,
+            value=value[:, :, None],
+            estimator="model",
+            specimen=self.specimen,
+        )
+
+    def table(self) -> list[dict[str, float | None]]:
+        """One dictionary per mode, with None for what could not be had: ready for JSON."""
+        names = (*_POLES[:4], "drive_shape", "phase_collinearity")
+        return [
+            {name: float(v) if np.isfinite(v := getattr(self, name)[mode]) else None for name in names}
+            for mode in range(self.frequency_hz.size)
+        ]
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        arrays = {name: getattr(self, name) for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
+        arrays |= {name: np.array(getattr(self, name)) for name in _SCALARS}
+        channels = [vars(channel) for channel in self.channels]
+        return arrays, {"channels": channels, "specimen": self.specimen, "notes": list(self.notes)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "LinearModes":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        try:
+            channels = tuple(Channel(**channel) for channel in attributes["channels"])
+            values: dict[str, Any] = {name: arrays[name] for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
+            values |= {name: float(arrays[name]) for name in _SCALARS}
+            return cls(channels=channels, **values, specimen=attributes["specimen"], notes=tuple(attributes["notes"]))
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"linear modes: {error} is missing or unknown") from None

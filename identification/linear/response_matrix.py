@@ -1,0 +1,147 @@
+"""Frequency responses from several inputs to several outputs, with what is known of their errors."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import Channel, find_name
+from identification.errors import IdentificationError
+from identification.validation import finite_array
+
+__all__ = ["FrequencyResponseMatrix"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_ARRAYS = ("frequency_hz", "value", "noise_covariance", "total_covariance")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FrequencyResponseMatrix:
+    """Frequency responses ``Y = H U`` line by line.
+
+    Parameters
+    ----------
+    outputs, inputs
+        The channels Y and U, each with its unit.
+    frequency_hz
+        float[n_lines], rising.
+    value
+        complex[n_lines, n_outputs, n_inputs], in units of output over input, ``exp(+i w t)``.
+    noise_covariance, total_covariance
+        complex[n_lines, m, m] with ``m = n_outputs * n_inputs``, of ``value`` with its rows one after another:
+        ``E[e e^H]``, from noise alone and with nonlinear distortion. None where unknown.
+    estimator
+        How it came about: ``instrument``, ``H1``, ``H2``, ``model`` ...
+    input_rms
+        float[n_inputs], RMS of every input in the band, in its unit: the level; empty if unknown.
+    specimen
+        Name of what was tested.
+    notes
+        What a user should know about these numbers, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, shapes that do not agree, frequencies that do not rise.
+    """
+
+    outputs: tuple[Channel, ...]
+    inputs: tuple[Channel, ...]
+    frequency_hz: Float
+    value: Complex
+    noise_covariance: Complex | None = None
+    total_covariance: Complex | None = None
+    estimator: str = ""
+    input_rms: tuple[float, ...] = ()
+    specimen: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("outputs", "inputs", "input_rms", "notes"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if not self.outputs or not self.inputs:
+            raise IdentificationError("outputs, inputs: needs at least one of each")
+        object.__setattr__(self, "frequency_hz", finite_array("frequency_hz", self.frequency_hz, np.float64, 1))
+        if not self.frequency_hz.size or self.frequency_hz[0] < 0.0 or np.any(np.diff(self.frequency_hz) <= 0.0):
+            raise IdentificationError("frequency_hz: needs at least one, none below zero, each above the one before")
+        self._check("value", (len(self.outputs), len(self.inputs)))
+        paths = len(self.outputs) * len(self.inputs)
+        for name in ("noise_covariance", "total_covariance"):
+            if getattr(self, name) is not None:
+                self._check(name, (paths, paths))
+        if self.input_rms and len(self.input_rms) != len(self.inputs):
+            raise IdentificationError(f"input_rms: {len(self.input_rms)} values for {len(self.inputs)} inputs")
+
+    def _check(self, name: str, trailing: tuple[int, int]) -> None:
+        array = finite_array(name, getattr(self, name), np.complex128, 3)
+        if array.shape != (self.frequency_hz.size, *trailing):
+            raise IdentificationError(f"{name}: shape {array.shape}, needs {(self.frequency_hz.size, *trailing)}")
+        object.__setattr__(self, name, array)
+
+    @property
+    def noise_std(self) -> Float:
+        """float[n_lines, n_outputs, n_inputs]: ``sqrt(E|e|^2)`` of ``value`` from noise; NaN if unknown."""
+        return self._std(self.noise_covariance)
+
+    @property
+    def total_std(self) -> Float:
+        """float[n_lines, n_outputs, n_inputs]: the same with nonlinear distortion; NaN if unknown."""
+        return self._std(self.total_covariance)
+
+    def _std(self, covariance: Complex | None) -> Float:
+        if covariance is None:
+            return np.full(self.value.shape, np.nan)
+        return np.asarray(np.sqrt(np.einsum("kii->ki", covariance).real).reshape(self.value.shape))
+
+    def path(self, output: str, input: str | None = None) -> Complex:
+        """complex[n_lines]: response of ``output`` to ``input`` (the first input if None)."""
+        column = 0 if input is None else find_name(self.inputs, input)
+        return np.asarray(self.value[:, find_name(self.outputs, output), column])
+
+    def select(
+        self, outputs: Sequence[str] | None = None, *, lowest_hz: float = 0.0, highest_hz: float = np.inf
+    ) -> "FrequencyResponseMatrix":
+        """The same for some outputs, and for the lines of a band, both ends included."""
+        rows = list(range(len(self.outputs))) if outputs is None else [find_name(self.outputs, o) for o in outputs]
+        lines = (self.frequency_hz >= lowest_hz) & (self.frequency_hz <= highest_hz)
+        if not lines.any():
+            raise IdentificationError(
+                f"lowest_hz, highest_hz: no line in {lowest_hz:g} to {highest_hz:g} Hz, there are some in "
+                f"{self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
+            )
+        paths = (np.array(rows)[:, None] * len(self.inputs) + np.arange(len(self.inputs))).ravel()
+
+        def part(covariance: Complex | None) -> Complex | None:
+            return None if covariance is None else covariance[lines][:, paths[:, None], paths]
+
+        return replace(
+            self,
+            outputs=tuple(self.outputs[row] for row in rows),
+            frequency_hz=self.frequency_hz[lines],
+            value=self.value[lines][:, rows],
+            noise_covariance=part(self.noise_covariance),
+            total_covariance=part(self.total_covariance),
+        )
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS if getattr(self, name) is not None}
+        channels = {name: [vars(channel) for channel in getattr(self, name)] for name in ("outputs", "inputs")}
+        texts = {"estimator": self.estimator, "specimen": self.specimen, "notes": list(self.notes)}
+        return arrays, {**channels, **texts, "input_rms": list(self.input_rms)}
+
+    @classmethod
+    def from_arrays(
+        cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]
+    ) -> "FrequencyResponseMatrix":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        try:
+            channels = {name: tuple(Channel(**c) for c in attributes[name]) for name in ("outputs", "inputs")}
+            texts = {name: attributes[name] for name in ("estimator", "specimen", "notes", "input_rms")}
+            return cls(**channels, **texts, **{name: arrays.get(name) for name in _ARRAYS})  # type: ignore[arg-type]
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"frequency response matrix: {error} is missing or unknown") from None
