@@ -17,7 +17,11 @@ if TYPE_CHECKING:
     )
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
-    from identification.mapping import FrequencyResponseMapping, map_frequency_responses
+    from identification.mapping.backbone import BackboneMapping, map_backbone
+    from identification.mapping.multisine import MultisineMapping, map_multisine
+    from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
+    from identification.mapping.response_matrix import ResponseMatrixMapping, map_response_matrix
+    from identification.mapping.stepped_sine import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
     from identification.multisine.design import MultisineDesign
     from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Backbone",
+    "BackboneMapping",
     "Channel",
     "ForceDropOut",
     "FrequencyResponse",
@@ -44,15 +49,22 @@ __all__ = [
     "LinearModes",
     "ModeShapes",
     "MultisineDesign",
+    "MultisineMapping",
     "NonlinearMode",
+    "NonlinearModeMapping",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "ResponseMatrixMapping",
     "Transient",
     "decimated",
     "demodulate",
     "force_drop_out",
     "mac",
+    "map_backbone",
     "map_frequency_responses",
+    "map_multisine",
+    "map_nonlinear_mode",
+    "map_response_matrix",
     "nonlinear_mode",
     "pack_frequency_responses",
     "periodic_spectra",
@@ -64,10 +76,11 @@ __all__ = [
 
 _MODULE_OF = {
     "Backbone": "backbones",
+    "BackboneMapping": "mapping.backbone",
     "Channel": "channels",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
-    "FrequencyResponseMapping": "mapping",
+    "FrequencyResponseMapping": "mapping.stepped_sine",
     "FrequencyResponseMatrix": "linear.response_matrix",
     "HalfPeriods": "signals.half_periods",
     "IdentificationError": "errors",
@@ -75,15 +88,22 @@ _MODULE_OF = {
     "LinearModes": "linear.modes",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
+    "MultisineMapping": "mapping.multisine",
     "NonlinearMode": "nonlinear.nonlinear_modes",
+    "NonlinearModeMapping": "mapping.nonlinear_mode",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "ResponseMatrixMapping": "mapping.response_matrix",
     "Transient": "signals.transients",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "force_drop_out": "signals.sweeps",
     "mac": "nonlinear.mode_shapes",
-    "map_frequency_responses": "mapping",
+    "map_backbone": "mapping.backbone",
+    "map_frequency_responses": "mapping.stepped_sine",
+    "map_multisine": "mapping.multisine",
+    "map_nonlinear_mode": "mapping.nonlinear_mode",
+    "map_response_matrix": "mapping.response_matrix",
     "nonlinear_mode": "nonlinear.phase_resonance",
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
