@@ -57,7 +57,9 @@ def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMod
     for name, path in columns.items():
         stored[name] = np.asarray(numbers(value_at(data, path, name), 1, f"{name} '{path}'"), dtype=np.float64)
         if not np.all(np.isfinite(stored[name])):
-            raise IdentificationError(f"{name} '{path}': is not finite at [{int(np.argmin(np.isfinite(stored[name])))}]")
+            raise IdentificationError(
+                f"{name} '{path}': is not finite at [{int(np.argmin(np.isfinite(stored[name])))}]"
+            )
     if len({array.size for array in stored.values()}) > 1:
         sizes = ", ".join(f"{name} {array.size}" for name, array in stored.items())
         raise IdentificationError(f"columns: unequal lengths ({sizes})")
@@ -66,7 +68,9 @@ def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMod
     peak = np.sqrt(2.0) if mapping.values == "rms" else 1.0
     unit, factor = si_of(mapping.amplitude_unit, "amplitude_unit")
     if unit not in _ORDER:
-        raise IdentificationError(f"amplitude_unit: is '{mapping.amplitude_unit}', needs a displacement, velocity or acceleration")
+        raise IdentificationError(
+            f"amplitude_unit: is '{mapping.amplitude_unit}', needs a displacement, velocity or acceleration"
+        )
     amplitude = stored["amplitude"] * factor * peak / (2.0 * np.pi * frequency) ** _ORDER[unit]
     force_unit, force_factor = si_of(mapping.force_unit, "force_unit")
     if force_unit != "N":
@@ -91,7 +95,7 @@ def _mode(mapping: NonlinearModeMapping, frequency: Any, damping: Any, amplitude
         "force_harmonics": np.stack([nothing, force + 0j], axis=1),
         "response_harmonics_m": np.stack([nothing, -1j * amplitude], axis=1),
     }
-    columns |= {name: unknown for name in _UNKNOWN}
+    columns |= dict.fromkeys(_UNKNOWN, unknown)
     texts = {"source": mapping.source, "specimen": mapping.specimen}
     return NonlinearMode.from_arrays(columns, {**texts, "notes": ["imported: only what the table says is known"]})
 

@@ -58,7 +58,9 @@ def map_response_matrix(data: Any, mapping: ResponseMatrixMapping) -> FrequencyR
     frequency = np.asarray(numbers(value_at(data, mapping.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
     outputs, out_factors = in_si(mapping.outputs)
     inputs, in_factors = in_si(mapping.inputs)
-    value = _matrix(data, mapping, frequency.size) if mapping.matrix is not None else _paths(data, mapping, frequency.size)
+    value = (
+        _matrix(data, mapping, frequency.size) if mapping.matrix is not None else _paths(data, mapping, frequency.size)
+    )
     value = value * (out_factors[:, None] / in_factors)
     return FrequencyResponseMatrix(
         outputs=outputs,

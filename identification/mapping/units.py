@@ -17,7 +17,16 @@ UNITS: dict[str, tuple[str, float]] = {
 }
 """SI unit and factor of every unit that is understood."""
 
-_SPELLINGS = {"m/s²": "m/s2", "m/s**2": "m/s2", "m/sec^2": "m/s2", "lb": "lbf", "G": "g", "gn": "g", "µm": "um", "volt": "V"}
+_SPELLINGS = {
+    "m/s²": "m/s2",
+    "m/s**2": "m/s2",
+    "m/sec^2": "m/s2",
+    "lb": "lbf",
+    "G": "g",
+    "gn": "g",
+    "µm": "um",
+    "volt": "V",
+}
 
 
 def si_of(unit: str, where: str) -> tuple[str, float]:

@@ -59,6 +59,11 @@ class Contents:
         """Unit of an array, or those of its columns."""
         return self.units.get(name, unit_of(name))
 
+    def summary(self) -> dict[str, Any]:
+        """Kind, title, number of rows and names of the arrays."""
+        rows = next((np.shape(self.arrays[name])[axis] for name, axis in self.rows.items()), 0)
+        return {"kind": self.kind, "title": self.title, "rows": int(rows), "arrays": list(self.arrays)}
+
     def columns(self, name: str) -> list[tuple[str, str, Array]]:
         """Name, unit and values of every column of an array; real and imaginary part are columns of their own."""
         table = np.moveaxis(np.asarray(self.arrays[name]), self.rows[name], 0)

@@ -44,7 +44,11 @@ def _others(item: Contents) -> dict[str, Any]:
             pairs = np.stack([np.real(array), np.imag(array)], -1) if np.iscomplexobj(array) else np.asarray(array)
             loose[name] = {"complex": bool(np.iscomplexobj(array)), "values": pairs.tolist()}
     table = {
-        name: {"axis": axis, "shape": list(np.shape(item.arrays[name])), "complex": bool(np.iscomplexobj(item.arrays[name]))}
+        name: {
+            "axis": axis,
+            "shape": list(np.shape(item.arrays[name])),
+            "complex": bool(np.iscomplexobj(item.arrays[name])),
+        }
         for name, axis in ((name, item.rows[name]) for name in item.arrays if name in item.rows)
     }
     return {"attributes": dict(item.attributes), "table": table, "arrays": loose}
@@ -104,8 +108,10 @@ def read_csv(path: Path) -> dict[str, Any]:
     comma = max(",;\t", key=lines[0][1].count)
     names = [name.strip() for name in next(csv.reader([lines[0][1]], delimiter=comma))]
     if len(set(names)) < len(names) or any(_number(name) is not None for name in names):
-        raise ImportFailed(f"{path}: the first line must name every column, each differently; it is '{lines[0][1][:60]}'")
-    rows = []
+        raise ImportFailed(
+            f"{path}: the first line must name every column, each differently; it is '{lines[0][1][:60]}'"
+        )
+    rows: list[list[float | None]] = []
     for number, line in lines[1:]:
         cells = next(csv.reader([line], delimiter=comma))
         values = [_number(cell) for cell in cells]

@@ -26,7 +26,7 @@ from rig.exchange.signals import time_data_from, time_data_parts, transient_from
 from rig.exchange.time_data import TimeData
 from rig.recording.arrays import write_arrays
 
-__all__ = ["KINDS", "put_together", "restored", "save", "taken_apart"]
+__all__ = ["KINDS", "described", "put_together", "restored", "save", "taken_apart"]
 
 
 def _nonlinear_mode(mode: NonlinearMode) -> Contents:
@@ -142,3 +142,22 @@ def restored(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, Any]
         if known.stored == kind:
             return known.together(arrays, attributes)
     return None
+
+
+def described(value: Any) -> dict[str, Any]:
+    """Kind of an object as its file says it, its title, and in ``holds`` what a line can say of it."""
+    contents = taken_apart(value)
+    summary = contents.summary()
+    kind = next(kind for kind in KINDS if isinstance(value, kind.type))
+    if isinstance(value, tuple):
+        return {**summary, "kind": kind.stored, "holds": f"{len(value)} levels"}
+    if isinstance(value, FrequencyResponseMatrix):
+        names = [", ".join(channel.name for channel in channels) for channels in (value.outputs, value.inputs)]
+        band = f"{value.frequency_hz[0]:g} to {value.frequency_hz[-1]:g} Hz"
+        return {
+            **summary,
+            "kind": kind.stored,
+            "holds": f"{summary['rows']} lines, {band}, of {names[0]} to {names[1]}",
+        }
+    what = "modes" if isinstance(value, LinearModes) else "points"
+    return {**summary, "kind": kind.stored, "holds": f"{summary['rows']} {what}"}

@@ -98,9 +98,7 @@ def structures_of_ours(data: Mapping[str, Any]) -> list[tuple[str, dict[str, Any
 def _restored(entry: Mapping[str, Any]) -> tuple[str, dict[str, Any], dict[str, Any]]:
     try:
         told = json.loads(str(entry[_ATTRIBUTES]))
-        arrays = {
-            name: np.asarray(entry[name[:_LONGEST]]).reshape(shape) for name, shape in told["shapes"].items()
-        }
+        arrays = {name: np.asarray(entry[name[:_LONGEST]]).reshape(shape) for name, shape in told["shapes"].items()}
         return str(entry[_KIND]), arrays, told["attributes"]
     except (KeyError, ValueError, TypeError) as error:
         raise ImportFailed(

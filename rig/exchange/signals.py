@@ -31,7 +31,10 @@ def time_data_parts(data: TimeData) -> Contents:
     return Contents(
         kind="time-data",
         title=f"{data.specimen}, point {data.point}",
-        arrays={"time_s": data.start_s + np.arange(data.samples.shape[1]) / data.sample_rate_hz, "samples": data.samples},
+        arrays={
+            "time_s": data.start_s + np.arange(data.samples.shape[1]) / data.sample_rate_hz,
+            "samples": data.samples,
+        },
         attributes=attributes,
         rows={"time_s": 0, "samples": 1},
         units={"samples": units},
@@ -63,5 +66,5 @@ def transient_parts(transient: Transient) -> Contents:
 def transient_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Transient:
     """Inverse of `transient_parts`; KeyError or TypeError on what is missing or unknown."""
     channels = tuple(Channel(**channel) for channel in attributes["channels"])
-    columns = (arrays[name] for name in ("time_s", "frequency_hz", "fundamentals"))
-    return Transient(channels, *columns, window_periods=int(attributes["window_periods"]))
+    time_s, frequency_hz, fundamentals = (arrays[name] for name in ("time_s", "frequency_hz", "fundamentals"))
+    return Transient(channels, time_s, frequency_hz, fundamentals, int(attributes["window_periods"]))

@@ -61,7 +61,7 @@ def axis(prefix: str, label: str, unit: str) -> dict[str, Any]:
 def evenly(x: Any) -> bool:
     """Whether the first value and the step, as a header keeps them (six digits), give all values again."""
     if len(x) < 2:
-        return float(f"{x[0]:.5e}") == x[0]
+        return bool(float(f"{x[0]:.5e}") == x[0])
     first, step = float(f"{x[0]:.5e}"), float(f"{x[1] - x[0]:.5e}")
     return bool(np.allclose(first + step * np.arange(len(x)), x, rtol=_EVEN, atol=0.0))
 

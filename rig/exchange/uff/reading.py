@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -100,11 +100,15 @@ def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> Any:
         paths[output, source] = value
         for known, channel in zip((outputs, inputs), channels, strict=True):
             if known.setdefault(channel.name, channel).unit != channel.unit:
-                raise ImportFailed(f"{where}: {channel.name} is in {channel.unit}, before in {known[channel.name].unit}")
+                raise ImportFailed(
+                    f"{where}: {channel.name} is in {channel.unit}, before in {known[channel.name].unit}"
+                )
             if channel.role == "drive":
                 known[channel.name] = channel
     if missing := [f"{o} to {i}" for o in outputs for i in inputs if (o, i) not in paths]:
-        raise ImportFailed(f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs")
+        raise ImportFailed(
+            f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs"
+        )
     return FrequencyResponseMatrix(
         outputs=tuple(outputs.values()),
         inputs=tuple(inputs.values()),
@@ -116,14 +120,16 @@ def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> Any:
 
 
 def _estimator(function: Dataset) -> str:
-    found = re.search(r", estimator (.+)", function["id5"])
+    found = re.search(r", estimator ([^,]+)", function["id5"])
     return found.group(1) if found else "imported"
 
 
 def _path(function: Dataset, units: FileUnits, output: str, source: str) -> tuple[Any, tuple[Channel, Channel]]:
     """One response in SI, and its two channels."""
     where = function["where"]
-    (out_unit, out_factor), (in_unit, in_factor) = (units.of(function, axis, where) for axis in ("ordinate", "orddenom"))
+    (out_unit, out_factor), (in_unit, in_factor) = (
+        units.of(function, axis, where) for axis in ("ordinate", "orddenom")
+    )
     value = np.asarray(function["data"], dtype=np.complex128) * (out_factor / in_factor)
     told = re.match(r"(\w+) / (\w+), estimator", function["id5"])
     if told:
@@ -146,11 +152,18 @@ def _stepped_sines(datasets: Sequence[Dataset], functions: Sequence[Dataset]) ->
         force = forces.get(function["func_id"])
         if told is None or force is None or len(force["data"]) != len(function["data"]):
             raise ImportFailed(f"{function['where']}: level or force of this stepped sine is missing")
-        kind = function["ordinate_axis_lab"]
+        kind, controlled = function["ordinate_axis_lab"], cast(Any, told[1])
         label, specimen = ("" if function[key] == "NONE" else function[key] for key in ("id1", "id2"))
         drive = np.asarray(force["data"], dtype=np.complex128)
         response = FrequencyResponse(
-            function["x"], drive, function["data"] * drive, kind, told[1], float(told[2]), label, specimen  # type: ignore[arg-type]
+            function["x"],
+            drive,
+            function["data"] * drive,
+            kind,
+            controlled,
+            float(told[2]),
+            label,
+            specimen,
         )
         out.append(response)
     return tuple(out)
@@ -164,7 +177,9 @@ def modes_in(datasets: Sequence[Dataset], assumed: str = "", drive: str = "") ->
     """
     modes = sorted((d for d in datasets if d["type"] == 55 and d["analysis_type"] == 2), key=lambda d: d["freq"])
     if not modes:
-        raise ImportFailed("no normal mode (dataset 55 of analysis type 2) in the file; complex modes are not understood")
+        raise ImportFailed(
+            "no normal mode (dataset 55 of analysis type 2) in the file; complex modes are not understood"
+        )
     first = modes[0]
     to_kg = file_units(datasets, assumed).mass_factor(first["where"])
     for mode in modes:
@@ -234,7 +249,9 @@ def time_data_in(datasets: Sequence[Dataset], assumed: str = "") -> dict[str, An
     for function in functions:
         rates.append(_rate(function))
         if abs(rates[-1] / rates[0] - 1.0) > 1e-9:
-            raise ImportFailed(f"{function['where']}: sample rate {rates[-1]:g} Hz, that of the first is {rates[0]:g} Hz")
+            raise ImportFailed(
+                f"{function['where']}: sample rate {rates[-1]:g} Hz, that of the first is {rates[0]:g} Hz"
+            )
         name = function["id1"] if function["id4"].startswith("vibrolock") else _degree(function, "rsp")
         try:
             unit, factor = units.of(function, "ordinate", function["where"])
@@ -250,7 +267,12 @@ def time_data_in(datasets: Sequence[Dataset], assumed: str = "") -> dict[str, An
                 "of one length"
             )
         known[name] = unit
-    return {**{name: np.column_stack(records) for name, records in out.items()}, "sets": stored, "units": known, "sample_rate_hz": rates[0]}
+    return {
+        **{name: np.column_stack(records) for name, records in out.items()},
+        "sets": stored,
+        "units": known,
+        "sample_rate_hz": rates[0],
+    }
 
 
 def _rate(function: Dataset) -> float:

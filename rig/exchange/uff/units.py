@@ -11,6 +11,7 @@ __all__ = ["FileUnits", "file_units"]
 _TOLERANCE = 1e-3
 _LENGTH = {8: "m", 11: "m/s", 12: "m/s2"}
 _FORCE = (9, 13)
+_APART = ("g", "1", "V")  # labels that no system of units speaks of
 _CODES = ("", "SI", "BG", "MG", "BA", "MM", "CM", "IN", "GM", "US")
 
 
@@ -38,8 +39,8 @@ class FileUnits:
         if self._assumed == "si":
             return (quantity or (labelled[0] if labelled else "1")), 1.0
         filed = self._filed(code, quantity)
-        if self._assumed == "labels" and labelled or (labelled and (filed is None or label in ("g", "1", "V"))):
-            return labelled  # type: ignore[return-value]
+        if labelled and (self._assumed == "labels" or filed is None or label in _APART):
+            return labelled
         if labelled and filed and self._assumed != "file":
             if labelled[0] != filed[0] or abs(labelled[1] / filed[1] - 1.0) > _TOLERANCE:
                 raise ImportFailed(
@@ -80,5 +81,7 @@ def file_units(datasets: Sequence[Mapping[str, Any]], assumed: str = "") -> File
     found = [dataset for dataset in datasets if dataset["type"] == 164]
     factors = {(dataset["length"], dataset["force"]) for dataset in found}
     if len(factors) > 1 or any(length <= 0.0 or force <= 0.0 for length, force in factors):
-        raise ImportFailed(f"units (dataset 164): {len(factors)} different ones, {sorted(factors)}; wanted is one, above zero")
+        raise ImportFailed(
+            f"units (dataset 164): {len(factors)} different ones, {sorted(factors)}; wanted is one, above zero"
+        )
     return FileUnits(found[0] if found else None, assumed)

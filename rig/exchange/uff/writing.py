@@ -88,13 +88,20 @@ def _time_data(item: Contents) -> Iterator[dict[str, Any]]:
     degrees = degrees_of_freedom(channels)
     x = item.arrays["time_s"]
     for number, channel in enumerate(channels):
-        function = _function(_TIME_RESPONSE, item.attributes["point"], channel.name, item, x, item.arrays["samples"][number])
+        function = _function(
+            _TIME_RESPONSE, item.attributes["point"], channel.name, item, x, item.arrays["samples"][number]
+        )
         function |= {"binary": 1, "abscissa_spacing": 1, "id5": _ascii(f"sample rate {rate!r} Hz, {channel.role}")}
         function["data"] = function["data"].astype(np.float64)
-        yield function | _at("rsp", channel.name, degrees[channel.name]) | _nowhere("ref") | {
-            **axis("abscissa", "Time", "s"),
-            **axis("ordinate", channel.name, channel.unit),
-        }
+        yield (
+            function
+            | _at("rsp", channel.name, degrees[channel.name])
+            | _nowhere("ref")
+            | {
+                **axis("abscissa", "Time", "s"),
+                **axis("ordinate", channel.name, channel.unit),
+            }
+        )
 
 
 def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
@@ -106,12 +113,20 @@ def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
         for row, output in enumerate(outputs):
             title = f"{output.name} / {source.name}"
             function = _function(_RESPONSE_FUNCTION, row + 1, title, item, x, item.arrays["value"][:, row, column])
-            function["id5"] = _ascii(f"{output.role} / {source.role}, estimator {item.attributes['estimator']}")
-            yield function | _at("rsp", output.name, degrees[output.name]) | _at("ref", source.name, degrees[source.name]) | {
-                **axis("abscissa", "Frequency", "Hz"),
-                **axis("ordinate", output.name, output.unit),
-                **axis("orddenom", source.name, source.unit),
-            }
+            function["id5"] = _ascii(
+                f"{output.role} / {source.role}, estimator {item.attributes['estimator'] or 'unknown'}, {item.title}"
+            )
+            function["id2"] = _ascii(item.attributes["specimen"])
+            yield (
+                function
+                | _at("rsp", output.name, degrees[output.name])
+                | _at("ref", source.name, degrees[source.name])
+                | {
+                    **axis("abscissa", "Frequency", "Hz"),
+                    **axis("ordinate", output.name, output.unit),
+                    **axis("orddenom", source.name, source.unit),
+                }
+            )
 
 
 def _table(item: Contents) -> Iterator[dict[str, Any]]:
@@ -146,7 +161,9 @@ def _frequency_responses(item: Contents) -> Iterator[dict[str, Any]]:
         unit = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}[level["kind"]]
         x, force = item.arrays["frequency_hz"][rows], item.arrays["force"][rows]
         told = _ascii(f"controlled {level['controlled']}, level {float(item.arrays['level'][number])!r}")
-        ratio = _function(_RESPONSE_FUNCTION, number + 1, level["label"], item, x, item.arrays["response"][rows] / force)
+        ratio = _function(
+            _RESPONSE_FUNCTION, number + 1, level["label"], item, x, item.arrays["response"][rows] / force
+        )
         forces = _function(_GENERAL, number + 1, level["label"], item, x, force)
         abscissa, drive = axis("abscissa", "Frequency", "Hz"), _at("rsp", "drive", (1, 3))
         ratio |= abscissa | axis("ordinate", level["kind"], unit) | axis("orddenom", "force", "N") | drive
@@ -169,7 +186,12 @@ def _modes(item: Contents) -> Iterator[dict[str, Any]]:
             **dict(zip(("id3", "id4", "id5"), lines, strict=True)),
             **{"mode_n": mode + 1, "freq": float(frequency), "modal_m": 1.0},
             **{"modal_damp_vis": float(item.arrays["damping_ratio"][mode]), "modal_damp_his": 0.0},
-            **{"node_nums": [degrees[channel.name][0] for channel in channels], "r1": nothing, "r2": nothing, "r3": shape},
+            **{
+                "node_nums": [degrees[channel.name][0] for channel in channels],
+                "r1": nothing,
+                "r2": nothing,
+                "r3": shape,
+            },
         }
 
 
