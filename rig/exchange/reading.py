@@ -72,6 +72,10 @@ def import_file(
     reader = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}[format_of(path, format_, "--format")]
     try:
         return reader(path, mapping, {"units": units, "drive": drive, "item": item})
+    except ImportFailed as error:
+        if str(path) in str(error):
+            raise
+        raise ImportFailed(f"{path}: {error}") from None
     except IdentificationError as error:
         fit = "" if mapping is None else f" does not fit {mapping}"
         raise ImportFailed(f"{path}{fit}: {error}") from None
