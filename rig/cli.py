@@ -129,14 +129,15 @@ def identify(
     """Turn a recording into a model."""
     from rig.console import print_json
     from rig.errors import ConfigurationError
-    from rig.models import NONLINEAR_MODE, identify_nonlinear_mode, save_model
+    from rig.models.files import save
+    from rig.models.identify import identify_nonlinear_mode
     from rig.summary import summarise
     from rig.tables import print_summary
 
-    if model != NONLINEAR_MODE:
-        raise ConfigurationError(f"--model = {model!r}: allowed is {NONLINEAR_MODE}")
+    if model != "nonlinear-mode":
+        raise ConfigurationError(f"--model = {model!r}: allowed is nonlinear-mode")
     _keep_existing(file, output, overwrite)
-    save_model(identify_nonlinear_mode(file), output)
+    save(identify_nonlinear_mode(file), output)
     summary = summarise(output)
     if json:
         print_json(summary)
@@ -161,7 +162,7 @@ def plot_(
     output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
 ) -> None:
     """Draw what is in a file."""
-    from rig.figures import plot
+    from rig.figures.draw import plot
 
     plot(file, output)
 
@@ -179,14 +180,14 @@ def import_(
     from rig.console import print_json
     from rig.errors import ConfigurationError
     from rig.importing import read_frequency_responses
-    from rig.models import save_frequency_responses
+    from rig.models.files import save
     from rig.summary import summarise
     from rig.tables import print_summary
 
     if format_ != "mat":
         raise ConfigurationError(f"--format = {format_!r}: allowed is mat")
     _keep_existing(file, output, overwrite)
-    save_frequency_responses(read_frequency_responses(file, mapping), output)
+    save(read_frequency_responses(file, mapping), output)
     summary = summarise(output)
     if json:
         print_json(summary)
