@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
+    from identification.multisine.best_linear_approximation import best_linear_approximation
     from identification.multisine.design import MultisineDesign
     from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
     from identification.nonlinear.mode_shapes import ModeShapes, mac
@@ -48,6 +49,7 @@ __all__ = [
     "PeriodicSpectra",
     "PeriodicVibration",
     "Transient",
+    "best_linear_approximation",
     "decimated",
     "demodulate",
     "force_drop_out",
@@ -79,6 +81,7 @@ _MODULE_OF = {
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
     "Transient": "signals.transients",
+    "best_linear_approximation": "multisine.best_linear_approximation",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "force_drop_out": "signals.sweeps",
