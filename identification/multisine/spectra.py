@@ -22,6 +22,8 @@ __all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
+_LOW_DEGREE = 3  # what a weak nonlinearity mostly makes
+
 
 @dataclass(frozen=True, eq=False)
 class InstrumentResponse:
@@ -203,6 +205,18 @@ def periodic_spectra(
     return PeriodicSpectra(
         channels=tuple(channels),
         frequency_hz=np.asarray(design.band_lines * design.resolution_hz, dtype=np.float64),
-        excited=np.isin(design.band_lines, design.lines),
+        excited=np.isin(design.band_lines, design.lines[design.amplitudes > 0.0]),
         spectra=np.array(spectra),
+        notes=_folding(design),
+    )
+
+
+def _folding(design: MultisineDesign) -> tuple[str, ...]:
+    """A note where products of low degree come back into the band in what is sampled without a filter."""
+    degree = design.folding_degree
+    if degree > _LOW_DEGREE:
+        return ()
+    return (
+        f"sampled at {design.sample_rate_hz:g} Hz, products of degree {degree} of a band up to {design.highest_hz:g} Hz fold "
+        "back into it unless a filter holds them off: distortion may be theirs",
     )
