@@ -124,8 +124,16 @@ class MultisineDesign:
                 f"resolution_hz: is {resolution_hz:g} Hz, a period has {samples:.4f} samples at {sample_rate_hz:g} Hz; "
                 f"needs a whole number, such as {sample_rate_hz / round(samples):.9g} Hz gives"
             )
-        more = {"detection_group": detection_group, "grid_seed": grid_seed}
-        return cls(sample_rate_hz, round(samples), lowest_hz, highest_hz, grid, rms, **more)
+        return cls(
+            sample_rate_hz,
+            round(samples),
+            lowest_hz,
+            highest_hz,
+            grid,
+            rms,
+            detection_group=detection_group,
+            grid_seed=grid_seed,
+        )
 
     @property
     def resolution_hz(self) -> float:
@@ -162,7 +170,7 @@ class MultisineDesign:
     @property
     def folding_degree(self) -> int:
         """Lowest degree of nonlinearity of which products lie above half the sample rate and fold back into the band."""
-        return int(np.floor(self.sample_rate_hz / self.highest_hz - 1.0 + _ROUNDING)) + 1
+        return int(np.ceil(self.sample_rate_hz / self.highest_hz - 1.0 - _ROUNDING))
 
     @property
     def frequency_hz(self) -> Float:

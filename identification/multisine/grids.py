@@ -36,7 +36,7 @@ def excited_lines(band: Lines, grid: Grid, detection_group: int, grid_seed: int)
     """
     if grid == "full":
         return band
-    odd = band[band % 2 == 1]
+    odd: Lines = band[band % 2 == 1]
     if grid == "odd":
         return odd
     groups = odd.size // detection_group
