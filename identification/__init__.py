@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
+    from identification.multisine.best_linear_approximation import best_linear_approximation
+    from identification.multisine.coherences import coherence
     from identification.multisine.design import MultisineDesign
+    from identification.multisine.distortion import DistortionLevels, distortion_levels
     from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
     from identification.nonlinear.mode_shapes import ModeShapes, mac
     from identification.nonlinear.nonlinear_modes import NonlinearMode
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Backbone",
     "Channel",
+    "DistortionLevels",
     "ForceDropOut",
     "FrequencyResponse",
     "FrequencyResponseMapping",
@@ -48,8 +52,11 @@ __all__ = [
     "PeriodicSpectra",
     "PeriodicVibration",
     "Transient",
+    "best_linear_approximation",
+    "coherence",
     "decimated",
     "demodulate",
+    "distortion_levels",
     "force_drop_out",
     "mac",
     "map_frequency_responses",
@@ -65,6 +72,7 @@ __all__ = [
 _MODULE_OF = {
     "Backbone": "backbones",
     "Channel": "channels",
+    "DistortionLevels": "multisine.distortion",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping",
@@ -79,8 +87,11 @@ _MODULE_OF = {
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
     "Transient": "signals.transients",
+    "best_linear_approximation": "multisine.best_linear_approximation",
+    "coherence": "multisine.coherences",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
+    "distortion_levels": "multisine.distortion",
     "force_drop_out": "signals.sweeps",
     "mac": "nonlinear.mode_shapes",
     "map_frequency_responses": "mapping",
