@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Backbone",
     "Channel",
+    "ExtrapolationError",
     "ForceDropOut",
     "FrequencyResponse",
     "FrequencyResponseMapping",
@@ -42,6 +44,7 @@ __all__ = [
     "IdentificationError",
     "InstrumentResponse",
     "LinearModes",
+    "ModalProperties",
     "ModeShapes",
     "MultisineDesign",
     "NonlinearMode",
@@ -65,6 +68,7 @@ __all__ = [
 _MODULE_OF = {
     "Backbone": "backbones",
     "Channel": "channels",
+    "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping",
@@ -73,6 +77,7 @@ _MODULE_OF = {
     "IdentificationError": "errors",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
+    "ModalProperties": "prediction.properties",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
     "NonlinearMode": "nonlinear.nonlinear_modes",
