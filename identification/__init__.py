@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -38,6 +39,7 @@ __all__ = [
     "Backbone",
     "Channel",
     "DistortionLevels",
+    "ExtrapolationError",
     "ForceDropOut",
     "FrequencyResponse",
     "FrequencyResponseMapping",
@@ -46,6 +48,7 @@ __all__ = [
     "IdentificationError",
     "InstrumentResponse",
     "LinearModes",
+    "ModalProperties",
     "ModeShapes",
     "MultisineDesign",
     "NonlinearMode",
@@ -73,6 +76,7 @@ _MODULE_OF = {
     "Backbone": "backbones",
     "Channel": "channels",
     "DistortionLevels": "multisine.distortion",
+    "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping",
@@ -81,6 +85,7 @@ _MODULE_OF = {
     "IdentificationError": "errors",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
+    "ModalProperties": "prediction.properties",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
     "NonlinearMode": "nonlinear.nonlinear_modes",
