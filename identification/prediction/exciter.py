@@ -8,11 +8,12 @@ g the force per volt of the blocked exciter at low frequency (amplifier gain tim
 constant, m moving mass, c and k suspension, b = G^2 / R what the back-EMF damps, 1 / k_s the stinger's compliance. A
 current amplifier is the case b = 0.
 
-The voltage that a recording holds is a number given to a converter. `Hold` says what becomes of it.
+The voltage that a recording holds is a number given to a converter, and the inputs have filters of their own.
+`VoltagePath` says what becomes of it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
-__all__ = ["PARAMETERS", "Exciter", "Hold"]
+__all__ = ["PARAMETERS", "Exciter", "VoltagePath"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -39,34 +40,44 @@ PARAMETERS = (
 
 
 @dataclass(frozen=True)
-class Hold:
-    """From the recorded voltage to the one at the amplifier: the converter's zero-order hold, and the delay on record.
+class VoltagePath:
+    """From the recorded voltage to the one at the amplifier, as inputs with their filters show it.
 
-    A held number lasts one sampling interval T: line f is weakened by ``sinc(f T)`` and comes half a sample late. Where a
-    recording pairs inputs with the voltage that was on the converter, whole samples of latency are taken out already and
-    ``delay_samples`` is the fraction of ``latency_samples`` that is left: 0.5 for a hold and nothing else.
+    A number held for a sampling interval T weakens line f by ``sinc(f T)`` and comes half a sample late. A recording pairs
+    inputs with the voltage that was on the converter only up to whole samples of latency; the rest, the delay of anti-alias
+    filters and what the images of the held output fold into the readings are one delay D at low frequency, with a first
+    correction. Force and motion have the coupling of their conditioners in common, which the voltage has not:
+
+        factor = sinc(f T) exp(-s D + s^3 D_3) s / (s + 2 pi f_c).
 
     Parameters
     ----------
     sample_rate_hz
         Rate of the converter; infinite where the voltage was measured at the amplifier.
-    delay_samples
-        By how much the voltage at the amplifier is later than the recorded one, as the inputs show it.
+    delay_s, dispersion_s3
+        D and D_3.
+    coupling_hz
+        f_c, corner of the first-order high-pass of both force and motion; 0 for none.
     """
 
     sample_rate_hz: float = np.inf
-    delay_samples: float = 0.5
+    delay_s: float = 0.0
+    dispersion_s3: float = 0.0
+    coupling_hz: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.sample_rate_hz > 0.0:
             raise IdentificationError(f"sample_rate_hz: is {self.sample_rate_hz:g} Hz, must be above zero")
-        if not np.isfinite(self.delay_samples):
-            raise IdentificationError(f"delay_samples: is {self.delay_samples:g}, must be finite")
+        for name in ("delay_s", "dispersion_s3", "coupling_hz"):
+            if not np.isfinite(getattr(self, name)):
+                raise IdentificationError(f"{name}: is {getattr(self, name):g}, must be finite")
 
     def factor(self, frequency_hz: ArrayLike) -> Complex:
-        """complex, like ``frequency_hz``: amplitude at the amplifier over the recorded one."""
-        ratio = np.asarray(frequency_hz, dtype=np.float64) / self.sample_rate_hz
-        return np.asarray(np.sinc(ratio) * np.exp(-2j * np.pi * ratio * self.delay_samples))
+        """complex, like ``frequency_hz`` (Hz, above zero): amplitude at the amplifier over the recorded one."""
+        frequency = np.asarray(frequency_hz, dtype=np.float64)
+        s = 2j * np.pi * frequency
+        late = np.sinc(frequency / self.sample_rate_hz) * np.exp(s * (s**2 * self.dispersion_s3 - self.delay_s))
+        return np.asarray(late * s / (s + 2.0 * np.pi * self.coupling_hz))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,7 +102,7 @@ class Exciter:
         Band that the parameters were found in.
     fit_residual
         Root of the mean square of misfit over expected error; 1 where nothing but noise is left; NaN if unknown.
-    hold
+    path
         What becomes of a recorded voltage.
     source
         Rig and exciter that the parameters belong to; they hold for no other.
@@ -115,7 +126,7 @@ class Exciter:
     lowest_hz: float = np.nan
     highest_hz: float = np.nan
     fit_residual: float = np.nan
-    hold: Hold = Hold()
+    path: VoltagePath = VoltagePath()
     source: str = ""
     notes: tuple[str, ...] = ()
 
@@ -157,12 +168,12 @@ class Exciter:
     def force(self, voltage: ArrayLike, acceleration: ArrayLike, frequency_hz: ArrayLike) -> Complex:
         """complex: force (N) for amplitudes of recorded voltage (V) and drive-point acceleration (m/s^2); they broadcast.
 
-        ``(1 + Z / k_s) F = g_e V - Z A / s^2``; the voltage is passed through ``hold``.
+        ``(1 + Z / k_s) F = g_e V - Z A / s^2``; the voltage is passed through ``path``.
         """
         frequency = np.asarray(frequency_hz, dtype=np.float64)
         s = 2j * np.pi * frequency
         stiffness = self.dynamic_stiffness(s)
-        driving = self.force_per_volt(s) * self.hold.factor(frequency) * np.asarray(voltage)
+        driving = self.force_per_volt(s) * self.path.factor(frequency) * np.asarray(voltage)
         reaction = stiffness * np.asarray(acceleration) / s**2
         return np.asarray((driving - reaction) / (1.0 + stiffness * self.stinger_compliance_m_n))
 
@@ -182,9 +193,9 @@ class Exciter:
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Arrays by name, and the attributes (ready for JSON) that go with them."""
         numbers = (self.lowest_hz, self.highest_hz, self.fit_residual)
-        hold = np.array([self.hold.sample_rate_hz, self.hold.delay_samples])
+        path = np.array(astuple(self.path))
         arrays = {"values": self.values, "covariance": np.asarray(self.covariance), "fit": np.array(numbers)}
-        return arrays | {"hold": hold}, {"source": self.source, "notes": list(self.notes)}
+        return arrays | {"path": path}, {"source": self.source, "notes": list(self.notes)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Exciter":
@@ -192,14 +203,13 @@ class Exciter:
         try:
             values = finite_array("values", arrays["values"], np.float64, 1)
             lowest, highest, residual = np.asarray(arrays["fit"], dtype=np.float64).tolist()
-            rate, delay = np.asarray(arrays["hold"], dtype=np.float64).tolist()
             return cls(
                 **dict(zip(PARAMETERS, values.tolist(), strict=True)),
                 covariance=arrays["covariance"],
                 lowest_hz=lowest,
                 highest_hz=highest,
                 fit_residual=residual,
-                hold=Hold(rate, delay),
+                path=VoltagePath(*np.asarray(arrays["path"], dtype=np.float64).tolist()),
                 source=attributes["source"],
                 notes=tuple(attributes["notes"]),
             )

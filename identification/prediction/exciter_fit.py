@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.multisine.spectra import PeriodicSpectra
-from identification.prediction.exciter import PARAMETERS, Exciter, Hold
+from identification.prediction.exciter import PARAMETERS, Exciter, VoltagePath
 from identification.validation import positive
 
 __all__ = ["identify_exciter"]
@@ -30,6 +30,8 @@ __all__ = ["identify_exciter"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
+_COMPLIANCE = PARAMETERS.index("stinger_compliance_m_n")
+_BACK_EMF = PARAMETERS.index("back_emf_damping_n_s_m")
 _FEWEST_LINES = 20
 _POOLED_LINES = 21
 _UNSURE = 0.5
@@ -42,8 +44,10 @@ def identify_exciter(
     lowest_hz: float | None = None,
     highest_hz: float | None = None,
     voltage: str = "voltage",
-    hold: Hold | None = None,
+    sample_rate_hz: float | None = None,
     stinger_stiffness_n_m: float | None = None,
+    resistance_ohm: float | None = None,
+    amplifier_gain: float = 1.0,
     source: str = "",
 ) -> Exciter:
     """Exciter from a multisine's spectra.
@@ -58,10 +62,15 @@ def identify_exciter(
         Part of the band to use, both ends included.
     voltage
         Name of the channel that holds the voltage.
-    hold
-        What becomes of the recorded voltage; as it is if None.
+    sample_rate_hz
+        Rate of the converter that held the voltage; None where the voltage was measured at the amplifier. Delay, dispersion
+        and coupling of the `VoltagePath` are estimated along.
     stinger_stiffness_n_m
         k_s if it is known (E A / l); else it is estimated, and taken as rigid where the data do not tell it.
+    resistance_ohm, amplifier_gain
+        Resistance R of coil, cable and amplifier, if a meter has told it, and gain of a voltage amplifier (V/V). Then
+        ``b = g^2 R / gain^2``. Without R, suspension damping and back-EMF are told apart by the coil's inductance alone,
+        which takes a band of several hundred hertz; their sum is found either way, and is all that a prediction needs.
     source
         Rig and exciter that the result belongs to.
 
@@ -75,30 +84,38 @@ def identify_exciter(
     IdentificationError
         For a single period, too few lines, missing channels, a voltage that is zero.
     """
-    data = _lines(spectra, voltage, hold or Hold(), lowest_hz, highest_hz)
+    rate = np.inf if sample_rate_hz is None else positive("sample_rate_hz", sample_rate_hz, "Hz")
+    data = _lines(spectra, voltage, rate, lowest_hz, highest_hz)
     start = _regression(data)
     if stinger_stiffness_n_m is not None:
-        start[-1] = 1.0 / positive("stinger_stiffness_n_m", stinger_stiffness_n_m, "N/m")
+        start[_COMPLIANCE] = 1.0 / positive("stinger_stiffness_n_m", stinger_stiffness_n_m, "N/m")
+    known = set() if stinger_stiffness_n_m is None else {_COMPLIANCE}
+    per_square = None
+    if resistance_ohm is not None:
+        known.add(_BACK_EMF)
+        per_square = positive("resistance_ohm", resistance_ohm, "ohm") / positive("amplifier_gain", amplifier_gain) ** 2
+    free = [index for index in range(start.size) if index not in known]
+    values, covariance, residual = _fit(data, start, free, per_square)
     notes: tuple[str, ...] = ()
-    free = list(range(len(PARAMETERS) if stinger_stiffness_n_m is None else len(PARAMETERS) - 1))
-    values, covariance, residual = _fit(data, start, free)
-    if stinger_stiffness_n_m is None and values[-1] < np.sqrt(covariance[-1, -1]) / _UNSURE:
-        start[-1] = 0.0
-        values, covariance, residual = _fit(data, start, free[:-1])
+    if stinger_stiffness_n_m is None and values[_COMPLIANCE] < np.sqrt(covariance[_COMPLIANCE, _COMPLIANCE]) / _UNSURE:
+        free.remove(_COMPLIANCE)
+        values, covariance, residual = _fit(data, start, free, per_square)
         notes += ("the stinger's compliance cannot be told from these data: taken as rigid; give its stiffness",)
+    if resistance_ohm is None:
+        notes += ("suspension damping and back-EMF are told apart by the coil's inductance alone: trust their sum",)
     spread = np.sqrt(np.diag(covariance))
-    for name, value, std in zip(PARAMETERS, values, spread, strict=True):
+    for name, value, std in zip(PARAMETERS, values, spread, strict=False):
         if std > _UNSURE * abs(value):
             notes += (f"{name}: {value:.3g} with a standard error of {std:.2g}; a wider band tells it better",)
     if residual > _MISFIT:
         notes += (f"misfit is {residual:.1f} times the noise: amplifier or exciter are not linear, or not in step",)
     return Exciter(
-        **dict(zip(PARAMETERS, values.tolist(), strict=True)),
-        covariance=covariance,
+        **dict(zip(PARAMETERS, values.tolist(), strict=False)),
+        covariance=covariance[: len(PARAMETERS), : len(PARAMETERS)],
         lowest_hz=float(data.frequency_hz[0]),
         highest_hz=float(data.frequency_hz[-1]),
         fit_residual=residual,
-        hold=hold or Hold(),
+        path=VoltagePath(rate, *_path(values)),
         source=source,
         notes=notes,
     )
@@ -111,6 +128,7 @@ class _Lines:
     frequency_hz: Float
     signals: Complex
     noise: Complex
+    rate_hz: float
 
     @cached_property
     def s(self) -> Complex:
@@ -119,10 +137,10 @@ class _Lines:
 
     def coefficients(self, p: Float) -> Complex:
         """complex[3, n_lines]: what force, acceleration and voltage are multiplied with in ``e``."""
-        g, tau, m, c, k, b, compliance = p
-        s = self.s
+        g, tau, m, c, k, b, compliance = p[: len(PARAMETERS)]
+        s, path = self.s, VoltagePath(self.rate_hz, *_path(p))
         stiffness = (1.0 + s * tau) * ((s * m + c) * s + k) + s * b
-        return np.array([1.0 + s * tau + stiffness * compliance, stiffness / s**2, np.full(s.size, -g)])
+        return np.array([1.0 + s * tau + stiffness * compliance, stiffness / s**2, -g * path.factor(self.frequency_hz)])
 
     def residuals(self, p: Float) -> Float:
         """float[2 n_realisations n_lines]: ``e`` over the standard deviation of its real part."""
@@ -133,8 +151,13 @@ class _Lines:
         return np.concatenate([scaled.real.ravel(), scaled.imag.ravel()])
 
 
-def _lines(spectra: PeriodicSpectra, voltage: str, hold: Hold, lowest: float | None, highest: float | None) -> _Lines:
-    """The excited lines of the band; the voltage as it is at the amplifier, the motion as acceleration."""
+def _path(p: Float) -> list[float]:
+    """Delay, dispersion and coupling of the voltage's path, the last of the parameters of the fit."""
+    return [float(value) for value in p[len(PARAMETERS) :]]
+
+
+def _lines(spectra: PeriodicSpectra, voltage: str, rate_hz: float, lowest: float | None, highest: float | None) -> _Lines:
+    """The excited lines of the band; the motion as acceleration."""
     low, high = 0.0 if lowest is None else lowest, np.inf if highest is None else highest
     used = spectra.excited & (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high) & (spectra.frequency_hz > 0)
     if np.count_nonzero(used) < _FEWEST_LINES:
@@ -150,13 +173,12 @@ def _lines(spectra: PeriodicSpectra, voltage: str, hold: Hold, lowest: float | N
     frequency = spectra.frequency_hz[used]
     signals = spectra.spectra[:, :, rows][..., used]
     signals[:, :, 1] *= (2j * np.pi * frequency) ** (2 - MOTION_ORDER[spectra.channels[drive].motion])
-    signals[:, :, 2] *= hold.factor(frequency)
     mean = signals.mean(axis=1)
     if np.any(mean[:, 2] == 0.0):
         raise IdentificationError(f"{voltage}: is zero at an excited line; is it the output that was played?")
     scatter = signals - mean[:, None]
     noise = np.einsum("rpik,rpjk->kij", scatter, np.conj(scatter)) / ((periods - 1) * signals.shape[0] * periods)
-    return _Lines(frequency, np.moveaxis(mean, 1, 0), _pooled(noise, mean[:, 0]))
+    return _Lines(frequency, np.moveaxis(mean, 1, 0), _pooled(noise, mean[:, 0]), rate_hz)
 
 
 def _pooled(noise: Complex, force: Complex) -> Complex:
@@ -172,8 +194,9 @@ def _pooled(noise: Complex, force: Complex) -> Complex:
 
 def _regression(data: _Lines) -> Float:
     """Start of the fit: linear least squares, which noise biases."""
+    delay = 0.5 / data.rate_hz
     f, a, v = data.signals
-    s = data.s
+    s, v = data.s, v * VoltagePath(data.rate_hz, delay).factor(data.frequency_hz)
     columns = np.array([v, -s * f, -s * a, -a, -a / s, -a / s**2]).reshape(6, -1).T
     scale = np.linalg.norm(columns, axis=0)
     stacked = np.concatenate([columns.real, columns.imag]) / scale
@@ -181,29 +204,41 @@ def _regression(data: _Lines) -> Float:
         np.linalg.lstsq(stacked, np.concatenate([f.real.ravel(), f.imag.ravel()]), rcond=None)[0] / scale
     )
     shortest = 1e-3 / (2.0 * np.pi * data.frequency_hz[-1])
-    return np.array([g, max(tau, shortest), mass, 0.5 * damping, stiffness, 0.5 * damping, 0.0])
+    return np.array([g, max(tau, shortest), mass, 0.5 * damping, stiffness, 0.5 * damping, 0.0, delay, 0.0, 0.0])
 
 
-def _fit(data: _Lines, start: Float, free: list[int]) -> tuple[Float, Float, float]:
-    """Maximum-likelihood values, covariance (zero where not free), and root of the mean squared weighted residual."""
+def _fit(
+    data: _Lines, start: Float, free: list[int], back_emf_per_square: float | None
+) -> tuple[Float, Float, float]:
+    """Maximum-likelihood values, covariance (zero where not free), and root of the mean squared weighted residual.
+
+    ``back_emf_per_square`` is ``R / gain^2`` of a back-EMF that follows from g.
+    """
     from scipy.optimize import least_squares
 
     scale = np.abs(start)
     top = 2.0 * np.pi * data.frequency_hz[-1]
-    scale[-1] = 0.01 / (scale[2] * top**2)  # a compliance that the moving mass would feel by a hundredth
+    # What a hundredth of a radian at the top, or of the mass's inertia, or of a turn at the bottom would take.
+    scale[_COMPLIANCE:] = 0.01 / (scale[2] * top**2), 0.01 / top, 0.01 / top**3, 0.01 * data.frequency_hz[0]
     scale = np.maximum(scale, 1e-300)
 
-    def residuals(free_values: Float) -> Float:
+    def full(free_values: Float) -> Float:
         p = start.copy()
         p[free] = free_values * scale[free]
-        return data.residuals(p)
+        if back_emf_per_square is not None:
+            p[_BACK_EMF] = back_emf_per_square * p[0] ** 2
+        return p
 
-    result: Any = least_squares(residuals, start[free] / scale[free], method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12)
-    values = start.copy()
-    values[free] = result.x * scale[free]
+    begin = start[free] / scale[free]
+    result: Any = least_squares(
+        lambda values: data.residuals(full(values)), begin, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12
+    )
+    values = full(result.x)
     freedom = max(result.fun.size - len(free), 1)
     mean_square = float(np.sum(result.fun**2)) / freedom
-    covariance = np.zeros((start.size, start.size))
+    column = np.zeros((start.size, len(free)))
+    column[free, range(len(free))] = scale[free]
+    if back_emf_per_square is not None:
+        column[_BACK_EMF] = 2.0 * back_emf_per_square * values[0] * column[0]
     inverse = np.linalg.pinv(result.jac.T @ result.jac, hermitian=True) * max(mean_square, 1.0)
-    covariance[np.ix_(free, free)] = inverse * np.outer(scale[free], scale[free])
-    return values, covariance, float(np.sqrt(mean_square))
+    return values, column @ inverse @ column.T, float(np.sqrt(mean_square))
