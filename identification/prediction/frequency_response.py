@@ -1,6 +1,7 @@
 """Predicted frequency responses at constant force, from a nonlinear mode."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -9,19 +10,14 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
-from identification.prediction.properties import (
-    FLAGGED_BEYOND,
-    REFUSED_BEYOND,
-    ExtrapolationError,
-    ModalProperties,
-)
+from identification.prediction.motion import fundamental_motion, range_notes
+from identification.prediction.properties import ExtrapolationError, ModalProperties
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.prediction.steady_states import OneMode, Path
 from identification.validation import positive
 
-__all__ = ["HeldForce", "frequency_response", "frequency_responses"]
+__all__ = ["HeldForce", "frequency_response", "steady_predictions"]
 
-Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 HeldForce = Literal["fundamental", "rms", "pure-sine"]
 
@@ -85,16 +81,11 @@ def frequency_response(
     )
     one = OneMode(properties, _fundamental(mode, level, force))
     paths, notes = _branches(one, level)
-    # An odd number of points has the largest modal amplitude among them.
-    s = [_parameters(path, points | 1, lowest_share) for path in paths]
+    s = [_parameters(one, path, points | 1, lowest_share) for path in paths]  # odd: the largest q is among them
     q, sign = np.concatenate([path.at(each) for path, each in zip(paths, s, strict=True)], axis=1)
     omega = one.omega(q, sign)
-    branch = np.repeat(np.arange(len(paths)), [each.size for each in s])
-    found = np.isfinite(omega)
-    q, omega, branch = q[found], omega[found], branch[found]
-    trace, determinant = one.jacobian(q, omega)
     folds = np.concatenate([_folds(one, path, each) for path, each in zip(paths, s, strict=True)], axis=0)
-    channels, motion = _motion(mode, one, q, omega, modes, residuals)
+    channels, motion = fundamental_motion(mode, properties, q, omega, one.fundamental_n(q), modes, residuals)
     return SteadyPrediction(
         force_n=level,
         force=force,
@@ -103,17 +94,17 @@ def frequency_response(
         modal_amplitude=q,
         fundamental_n=one.fundamental_n(q),
         displacement_m=motion,
-        stable=(trace < 0.0) & (determinant > 0.0),
-        branch=branch,
+        stable=one.stable(q, omega),
+        branch=np.repeat(np.arange(len(paths)), [each.size for each in s]),
         range_use=properties.range_use(q),
         fold_frequency_hz=folds[:, 1] / (2.0 * np.pi),
         fold_amplitude_m=properties.drive_shape(folds[:, 0]) * folds[:, 0],
         fold_modal_amplitude=folds[:, 0],
-        notes=(*notes, *_range_notes(properties, q)),
+        notes=(*notes, *range_notes(properties, q)),
     )
 
 
-def frequency_responses(
+def steady_predictions(
     mode: NonlinearMode,
     forces_n: Sequence[float],
     *,
@@ -134,7 +125,7 @@ def frequency_responses(
 def _fundamental(mode: NonlinearMode, level: float, force: HeldForce) -> Callable[[Float], Float]:
     """Peak of the fundamental of the force over q."""
     if force != "rms":
-        return lambda q: np.full(np.shape(q), level)
+        return partial(np.full_like, fill_value=level)
     share = np.abs(mode.force_harmonics[:, 1]) / np.linalg.norm(mode.force_harmonics[:, 1:], axis=1)
     q = np.where(np.isfinite(mode.modal_amplitude), mode.modal_amplitude, mode.amplitude_m * mode.apparent_mass_kg**0.5)
     known = np.isfinite(share) & np.isfinite(q)
@@ -168,11 +159,11 @@ def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
     return paths, notes
 
 
-def _parameters(path: Path, points: int, lowest_share: float) -> Float:
-    if path.closed:
-        return np.linspace(0.0, 2.0 * np.pi, points)
-    first = np.arcsin(lowest_share)
-    return np.linspace(first, np.pi - first, points)
+def _parameters(one: OneMode, path: Path, points: int, lowest_share: float) -> Float:
+    """Path parameters of the points of a branch, without those that no frequency belongs to."""
+    first = 0.0 if path.closed else float(np.arcsin(lowest_share))
+    s = np.linspace(first, 2.0 * np.pi if path.closed else np.pi - first, points)
+    return np.asarray(s[np.isfinite(one.omega(*path.at(s)))])
 
 
 def _folds(one: OneMode, path: Path, s: Float) -> Float:
@@ -185,49 +176,7 @@ def _folds(one: OneMode, path: Path, s: Float) -> Float:
 
     q, sign = path.at(s)
     values = one.jacobian(q, one.omega(q, sign))[1]
-    with np.errstate(invalid="ignore"):
-        changes = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+    changes = np.flatnonzero(values[1:] * values[:-1] < 0.0)
     roots = np.array([brentq(determinant, s[k], s[k + 1], xtol=1e-12) for k in changes])
     q, sign = path.at(roots)
     return np.column_stack([q, one.omega(q, sign)]) if roots.size else np.zeros((0, 2))
-
-
-def _motion(
-    mode: NonlinearMode, one: OneMode, q: Float, omega: Float, modes: LinearModes | None, residuals: bool
-) -> tuple[tuple[str, ...], Complex]:
-    """Names of the channels, drive point first, and complex[n, n_channels] displacement against the force."""
-    lag = one.lag_rad(q, omega) + _turn_rad(mode, q)
-    drive = one.properties.drive_shape(q) * q * np.exp(-1j * lag)
-    if modes is None:
-        return ("drive",), drive[:, None]
-    frequency = omega / (2.0 * np.pi)
-    tested = modes.nearest(float(mode.modal_frequency_hz[int(np.argmin(mode.amplitude_m))]))
-    order = [modes.drive_row, *(row for row in range(len(modes.channels)) if row != modes.drive_row)]
-    ratio = modes.shapes[order, tested] / modes.drive_shape[tested]
-    motion = drive[:, None] * ratio
-    names = tuple(modes.channels[row].name for row in order)
-    if residuals:
-        others = np.column_stack([modes.receptance(frequency, name, without=tested) for name in names])
-        motion = motion + others * one.fundamental_n(q)[:, None]
-    return names, motion
-
-
-def _turn_rad(mode: NonlinearMode, q: Float) -> Float:
-    """float[n]: turn of the modal constant over q, which a fit of stepped sines has found; else zero."""
-    if mode.source != "stepped sine":
-        return np.zeros_like(q)
-    at = mode.amplitude_m * np.sqrt(mode.apparent_mass_kg)
-    order = np.argsort(at, kind="stable")
-    return np.asarray(np.interp(q, at[order], np.radians(mode.phase_lag_deg[order] - 90.0)))
-
-
-def _range_notes(properties: ModalProperties, q: Float) -> list[str]:
-    use = float(properties.range_use(np.max(q)))
-    notes = []
-    if use > REFUSED_BEYOND:
-        notes.append(f"reaches {use:.2f} times the largest modal amplitude identified: not to be trusted")
-    elif use > FLAGGED_BEYOND:
-        notes.append(f"reaches {use:.2f} times the largest modal amplitude identified: extrapolated")
-    if np.max(q) < properties.q_range[0]:
-        notes.append("stays below the lowest level identified: modal properties are those of the lowest level")
-    return notes

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from identification.prediction.peaks import peak_of
 
 __all__ = ["Peak", "SteadyPrediction"]
 
@@ -94,16 +95,6 @@ class SteadyPrediction:
 
     def peak(self, channel: str | None = None) -> Peak:
         """Largest amplitude on the main branch, by a parabola through the three highest points."""
-        main = np.flatnonzero(self.branch == 0)
-        amplitude = self.amplitude_m(channel)[main]
-        top = int(np.argmax(amplitude))
-        columns = np.column_stack(
-            [amplitude, self.frequency_hz[main], self.phase_lag_deg(channel)[main], self.modal_amplitude[main]]
-        )
-        if not 0 < top < main.size - 1:
-            return Peak(*columns[top].tolist())
-        before, here, after = amplitude[top - 1 : top + 2]
-        bend = before - 2.0 * here + after
-        shift = 0.0 if bend == 0.0 else 0.5 * (before - after) / bend
-        weights = np.array([0.5 * shift * (shift - 1.0), 1.0 - shift**2, 0.5 * shift * (shift + 1.0)])
-        return Peak(*(weights @ columns[top - 1 : top + 2]).tolist())
+        main = self.branch == 0
+        columns = (self.amplitude_m(channel), self.frequency_hz, self.phase_lag_deg(channel), self.modal_amplitude)
+        return Peak(*peak_of(*(column[main] for column in columns)))

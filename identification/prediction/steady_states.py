@@ -27,13 +27,19 @@ from numpy.typing import NDArray
 
 from identification.prediction.properties import ModalProperties
 
-__all__ = ["OneMode", "Path"]
+__all__ = ["OneMode", "Path", "modal_stiffness"]
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _LOWEST_SHARE = 1e-4
 _GRID = 4000
+
+
+def modal_stiffness(properties: ModalProperties, q: Float, omega: Float) -> Complex:
+    """complex[n]: ``D = w^2 - W^2 + 2 i W w z``; its angle is the lag of the modal coordinate behind the force."""
+    w, z = properties.frequency_rad_s(q), properties.damping_ratio(q)
+    return np.asarray(w**2 - omega**2 + 2j * omega * w * z)
 
 
 @dataclass(frozen=True)
@@ -92,25 +98,31 @@ class OneMode:
         opened = ends.pop() if inside[-1] else None
         return [Path(low, high, low > 0.0) for low, high in zip(ends[::2], ends[1::2], strict=True)], opened
 
+    def amplitudes(self, omega: float, highest_q: float) -> Float:
+        """float[n]: all modal amplitudes up to ``highest_q`` that are steady states at the frequency ``omega``, rising."""
+        from scipy.optimize import brentq
+
+        def surplus(q: Float) -> Float:
+            return np.asarray(np.abs(modal_stiffness(self.properties, q, np.array(omega))) * q - self.modal_force(q))
+
+        grid = highest_q * np.geomspace(_LOWEST_SHARE, 1.0, _GRID)
+        values = surplus(grid)
+        changes = np.flatnonzero((values[1:] > 0.0) != (values[:-1] > 0.0))
+        return np.array(
+            [brentq(lambda q: float(surplus(np.array(q))), grid[k], grid[k + 1], rtol=1e-12) for k in changes]
+        )
+
     def omega(self, q: Float, sign: Float) -> Float:
         """float[n]: frequency W of the vibration, rad/s; NaN where that branch has none (below its static deflection)."""
         w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
         squared = w**2 * (1.0 - 2.0 * z**2) + sign * np.sqrt(np.maximum(self.discriminant(q), 0.0))
         return np.asarray(np.sqrt(np.where(squared > 0.0, squared, np.nan)))
 
-    def lag_rad(self, q: Float, omega: Float) -> Float:
-        """float[n]: lag psi of the modal coordinate behind the force, 0 to pi."""
-        return np.asarray(np.angle(self._stiffness(q, omega)))
-
-    def _stiffness(self, q: Float, omega: Float) -> Complex:
-        w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
-        return np.asarray(w**2 - omega**2 + 2j * omega * w * z)
-
     def jacobian(self, q: Float, omega: Float) -> tuple[Float, Float]:
         """Trace and determinant, float[n] each, of the slow flow linearised at the solutions."""
         w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
         dw, dz, _ = self.properties.slopes(q)
-        stiffness = self._stiffness(q, omega)
+        stiffness = modal_stiffness(self.properties, q, omega)
         slope = 2.0 * w * dw + 2j * omega * (dw * z + w * dz)
         step = 1e-6 * q
         upper = np.minimum(q + step, self.properties.highest_q)
@@ -120,3 +132,8 @@ class OneMode:
         by_v = -1j * stiffness / inertia
         trace = by_u.real + by_v.imag
         return np.asarray(trace), np.asarray(by_u.real * by_v.imag - by_v.real * by_u.imag)
+
+    def stable(self, q: Float, omega: Float) -> NDArray[np.bool_]:
+        """bool[n]: whether both eigenvalues of the linearised slow flow have negative real parts."""
+        trace, determinant = self.jacobian(q, omega)
+        return np.asarray((trace < 0.0) & (determinant > 0.0))
