@@ -25,7 +25,11 @@ if TYPE_CHECKING:
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
+    from identification.prediction.frequency_response import frequency_response, steady_predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
+    from identification.prediction.recorded_force import recorded_force_response
+    from identification.prediction.steady_prediction import SteadyPrediction
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -35,6 +39,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Backbone",
     "Channel",
+    "Comparison",
     "ExtrapolationError",
     "ForceDropOut",
     "FrequencyResponse",
@@ -50,16 +55,23 @@ __all__ = [
     "NonlinearMode",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "PredictionError",
+    "SteadyPrediction",
     "Transient",
+    "compare",
     "decimated",
     "demodulate",
+    "error_table",
     "force_drop_out",
+    "frequency_response",
     "mac",
     "map_frequency_responses",
     "nonlinear_mode",
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "recorded_force_response",
+    "steady_predictions",
     "stepped_sine_mode",
     "unpack_frequency_responses",
     "zero_crossings",
@@ -68,6 +80,7 @@ __all__ = [
 _MODULE_OF = {
     "Backbone": "backbones",
     "Channel": "channels",
+    "Comparison": "prediction.comparison",
     "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
@@ -83,16 +96,23 @@ _MODULE_OF = {
     "NonlinearMode": "nonlinear.nonlinear_modes",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "PredictionError": "prediction.comparison",
+    "SteadyPrediction": "prediction.steady_prediction",
     "Transient": "signals.transients",
+    "compare": "prediction.comparison",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
+    "error_table": "prediction.comparison",
     "force_drop_out": "signals.sweeps",
+    "frequency_response": "prediction.frequency_response",
     "mac": "nonlinear.mode_shapes",
     "map_frequency_responses": "mapping",
     "nonlinear_mode": "nonlinear.phase_resonance",
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "recorded_force_response": "prediction.recorded_force",
+    "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
     "unpack_frequency_responses": "frequency_responses",
     "zero_crossings": "signals.half_periods",
