@@ -156,7 +156,9 @@ def _path(p: Float) -> list[float]:
     return [float(value) for value in p[len(PARAMETERS) :]]
 
 
-def _lines(spectra: PeriodicSpectra, voltage: str, rate_hz: float, lowest: float | None, highest: float | None) -> _Lines:
+def _lines(
+    spectra: PeriodicSpectra, voltage: str, rate_hz: float, lowest: float | None, highest: float | None
+) -> _Lines:
     """The excited lines of the band; the motion as acceleration."""
     low, high = 0.0 if lowest is None else lowest, np.inf if highest is None else highest
     used = spectra.excited & (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high) & (spectra.frequency_hz > 0)
@@ -207,9 +209,7 @@ def _regression(data: _Lines) -> Float:
     return np.array([g, max(tau, shortest), mass, 0.5 * damping, stiffness, 0.5 * damping, 0.0, delay, 0.0, 0.0])
 
 
-def _fit(
-    data: _Lines, start: Float, free: list[int], back_emf_per_square: float | None
-) -> tuple[Float, Float, float]:
+def _fit(data: _Lines, start: Float, free: list[int], back_emf_per_square: float | None) -> tuple[Float, Float, float]:
     """Maximum-likelihood values, covariance (zero where not free), and root of the mean squared weighted residual.
 
     ``back_emf_per_square`` is ``R / gain^2`` of a back-EMF that follows from g.
@@ -229,10 +229,11 @@ def _fit(
             p[_BACK_EMF] = back_emf_per_square * p[0] ** 2
         return p
 
+    def residuals(free_values: Float) -> Float:
+        return data.residuals(full(free_values))
+
     begin = start[free] / scale[free]
-    result: Any = least_squares(
-        lambda values: data.residuals(full(values)), begin, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12
-    )
+    result: Any = least_squares(residuals, begin, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12)
     values = full(result.x)
     freedom = max(result.fun.size - len(free), 1)
     mean_square = float(np.sum(result.fun**2)) / freedom
