@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
+    from identification.linear.modal_analysis import ModalAnalysis
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.mapping import FrequencyResponseMapping, map_frequency_responses
@@ -30,9 +31,11 @@ if TYPE_CHECKING:
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.frequency_response import frequency_response, steady_predictions
+    from identification.prediction.predictions import Predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
     from identification.prediction.steady_prediction import SteadyPrediction
+    from identification.prediction.sweep_prediction import SweepPrediction
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -53,6 +56,7 @@ __all__ = [
     "IdentificationError",
     "InstrumentResponse",
     "LinearModes",
+    "ModalAnalysis",
     "ModalProperties",
     "ModeShapes",
     "MultisineDesign",
@@ -60,7 +64,9 @@ __all__ = [
     "PeriodicSpectra",
     "PeriodicVibration",
     "PredictionError",
+    "Predictions",
     "SteadyPrediction",
+    "SweepPrediction",
     "Transient",
     "best_linear_approximation",
     "coherence",
@@ -98,6 +104,7 @@ _MODULE_OF = {
     "IdentificationError": "errors",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
+    "ModalAnalysis": "linear.modal_analysis",
     "ModalProperties": "prediction.properties",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
@@ -105,7 +112,9 @@ _MODULE_OF = {
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
     "PredictionError": "prediction.comparison",
+    "Predictions": "prediction.predictions",
     "SteadyPrediction": "prediction.steady_prediction",
+    "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
     "best_linear_approximation": "multisine.best_linear_approximation",
     "coherence": "multisine.coherences",

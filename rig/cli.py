@@ -8,7 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from rig.cli_analyse import app as analyse_app
+from rig.cli_identify import identify, predict
 from rig.cli_list import list_
+from rig.cli_options import Json, Output, Overwrite, Realtime, keep_existing
 
 __all__ = ["app", "main"]
 
@@ -20,11 +22,6 @@ app = typer.Typer(
 
 app.add_typer(analyse_app, name="analyse")
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
-Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
-Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
-
 
 @app.callback()
 def _common(
@@ -34,6 +31,8 @@ def _common(
 
 
 app.command("list")(list_)
+app.command()(identify)
+app.command()(predict)
 
 
 @app.command()
@@ -118,44 +117,6 @@ def show(
         print_summary(summary)
 
 
-@app.command()
-def identify(
-    file: Annotated[Path, typer.Argument(help="Backbone recording or imported frequency responses.")],
-    output: Output,
-    model: Annotated[str, typer.Option(help="Kind of model: nonlinear-mode.")] = "nonlinear-mode",
-    overwrite: Overwrite = False,
-    json: Json = False,
-) -> None:
-    """Turn a recording into a model."""
-    from rig.console import print_json
-    from rig.errors import ConfigurationError
-    from rig.models.files import save
-    from rig.models.identify import identify_nonlinear_mode
-    from rig.summary import summarise
-    from rig.tables import print_summary
-
-    if model != "nonlinear-mode":
-        raise ConfigurationError(f"--model = {model!r}: allowed is nonlinear-mode")
-    _keep_existing(file, output, overwrite)
-    save(identify_nonlinear_mode(file), output)
-    summary = summarise(output)
-    if json:
-        print_json(summary)
-    else:
-        print_summary(summary)
-
-
-def _keep_existing(source: Path, output: Path, overwrite: bool) -> None:
-    from rig.errors import RecordingError
-
-    if output.is_dir():
-        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
-    if output.exists() and source.exists() and output.samefile(source):
-        raise RecordingError(f"{output}: is the file that is read; choose another name")
-    if output.exists() and not overwrite:
-        raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")
-
-
 @app.command("plot")
 def plot_(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
@@ -186,7 +147,7 @@ def import_(
 
     if format_ != "mat":
         raise ConfigurationError(f"--format = {format_!r}: allowed is mat")
-    _keep_existing(file, output, overwrite)
+    keep_existing([file], output, overwrite)
     save(read_frequency_responses(file, mapping), output)
     summary = summarise(output)
     if json:

@@ -4,14 +4,19 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
+from rig.models.exciter import EXCITER
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.kind import Kind
+from rig.models.linear_modes import LINEAR_MODES
 from rig.models.nonlinear_mode import NONLINEAR_MODE
+from rig.models.predictions import PREDICTIONS
+from rig.models.response_matrix import RESPONSE_MATRIX
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
 
 __all__ = ["KINDS", "load", "load_as", "save"]
 
-KINDS = {kind.name: kind for kind in (NONLINEAR_MODE, FREQUENCY_RESPONSES)}
+_ALL = (NONLINEAR_MODE, LINEAR_MODES, EXCITER, FREQUENCY_RESPONSES, RESPONSE_MATRIX, PREDICTIONS)
+KINDS = {kind.name: kind for kind in _ALL}
 """Every kind of file that is no recording, by its name in the file."""
 
 
