@@ -191,11 +191,12 @@ def _notes(error: Complex, inputs: int) -> list[str]:
     """What is missing of the covariances, and why."""
     realisations, periods, paths = error.shape[:3]
     blocks = realisations // inputs
-    what = "realisation" if inputs == 1 else f"block of {inputs} realisations"
+    plural = "s" if blocks > 1 else ""
+    scatter = f"{blocks} realisation{plural}" if inputs == 1 else f"{blocks} block{plural} of {inputs} realisations"
     found = []
     for name, rank, reason in (
-        ("noise", realisations * (periods - 1), f"{realisations} x {periods} periods"),
-        ("total", blocks - 1, f"{blocks} {what}{'s' if blocks > 1 and inputs == 1 else ''}"),
+        ("noise", realisations * (periods - 1), f"{realisations} x {periods} period{'s' if periods > 1 else ''}"),
+        ("total", blocks - 1, scatter),
     ):
         if rank == 0:
             found.append(f"{name} covariance unknown: {reason} only")
