@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from identification.nonlinear.mode_shapes import ModeShapes, mac
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
+    from identification.nonlinear.repeatability import Repeatability, combined, repeatability
+    from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
@@ -47,7 +49,9 @@ __all__ = [
     "NonlinearMode",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "Repeatability",
     "Transient",
+    "combined",
     "decimated",
     "demodulate",
     "force_drop_out",
@@ -57,6 +61,8 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "repeatability",
+    "single_point_mode",
     "stepped_sine_mode",
     "unpack_frequency_responses",
     "zero_crossings",
@@ -78,7 +84,9 @@ _MODULE_OF = {
     "NonlinearMode": "nonlinear.nonlinear_modes",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "Repeatability": "nonlinear.repeatability",
     "Transient": "signals.transients",
+    "combined": "nonlinear.repeatability",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "force_drop_out": "signals.sweeps",
@@ -88,6 +96,8 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "repeatability": "nonlinear.repeatability",
+    "single_point_mode": "nonlinear.single_points",
     "stepped_sine_mode": "nonlinear.stepped_sine",
     "unpack_frequency_responses": "frequency_responses",
     "zero_crossings": "signals.half_periods",
