@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from identification.nonlinear.mode_shapes import ModeShapes, mac
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
+    from identification.nonlinear.repeatability import Repeatability, combined, repeatability
+    from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.frequency_response import frequency_response, steady_predictions
@@ -65,11 +67,13 @@ __all__ = [
     "PeriodicVibration",
     "PredictionError",
     "Predictions",
+    "Repeatability",
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
     "best_linear_approximation",
     "coherence",
+    "combined",
     "compare",
     "decimated",
     "demodulate",
@@ -84,6 +88,8 @@ __all__ = [
     "periodic_spectra",
     "periodic_vibration",
     "recorded_force_response",
+    "repeatability",
+    "single_point_mode",
     "steady_predictions",
     "stepped_sine_mode",
     "unpack_frequency_responses",
@@ -113,11 +119,13 @@ _MODULE_OF = {
     "PeriodicVibration": "measurements",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
+    "Repeatability": "nonlinear.repeatability",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
     "best_linear_approximation": "multisine.best_linear_approximation",
     "coherence": "multisine.coherences",
+    "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
@@ -132,6 +140,8 @@ _MODULE_OF = {
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
     "recorded_force_response": "prediction.recorded_force",
+    "repeatability": "nonlinear.repeatability",
+    "single_point_mode": "nonlinear.single_points",
     "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
     "unpack_frequency_responses": "frequency_responses",
