@@ -18,7 +18,11 @@ if TYPE_CHECKING:
     from identification.linear.modal_analysis import ModalAnalysis
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
-    from identification.mapping import FrequencyResponseMapping, map_frequency_responses
+    from identification.mapping.backbone import BackboneMapping, map_backbone
+    from identification.mapping.multisine import MultisineMapping, map_multisine
+    from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
+    from identification.mapping.response_matrix import ResponseMatrixMapping, map_response_matrix
+    from identification.mapping.stepped_sine import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
     from identification.multisine.best_linear_approximation import best_linear_approximation
     from identification.multisine.coherences import coherence
@@ -46,6 +50,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Backbone",
+    "BackboneMapping",
     "Channel",
     "Comparison",
     "DistortionLevels",
@@ -62,12 +67,15 @@ __all__ = [
     "ModalProperties",
     "ModeShapes",
     "MultisineDesign",
+    "MultisineMapping",
     "NonlinearMode",
+    "NonlinearModeMapping",
     "PeriodicSpectra",
     "PeriodicVibration",
     "PredictionError",
     "Predictions",
     "Repeatability",
+    "ResponseMatrixMapping",
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
@@ -82,7 +90,11 @@ __all__ = [
     "force_drop_out",
     "frequency_response",
     "mac",
+    "map_backbone",
     "map_frequency_responses",
+    "map_multisine",
+    "map_nonlinear_mode",
+    "map_response_matrix",
     "nonlinear_mode",
     "pack_frequency_responses",
     "periodic_spectra",
@@ -98,13 +110,14 @@ __all__ = [
 
 _MODULE_OF = {
     "Backbone": "backbones",
+    "BackboneMapping": "mapping.backbone",
     "Channel": "channels",
     "Comparison": "prediction.comparison",
     "DistortionLevels": "multisine.distortion",
     "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
-    "FrequencyResponseMapping": "mapping",
+    "FrequencyResponseMapping": "mapping.stepped_sine",
     "FrequencyResponseMatrix": "linear.response_matrix",
     "HalfPeriods": "signals.half_periods",
     "IdentificationError": "errors",
@@ -114,12 +127,15 @@ _MODULE_OF = {
     "ModalProperties": "prediction.properties",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
+    "MultisineMapping": "mapping.multisine",
     "NonlinearMode": "nonlinear.nonlinear_modes",
+    "NonlinearModeMapping": "mapping.nonlinear_mode",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
+    "ResponseMatrixMapping": "mapping.response_matrix",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
@@ -134,7 +150,11 @@ _MODULE_OF = {
     "force_drop_out": "signals.sweeps",
     "frequency_response": "prediction.frequency_response",
     "mac": "nonlinear.mode_shapes",
-    "map_frequency_responses": "mapping",
+    "map_backbone": "mapping.backbone",
+    "map_frequency_responses": "mapping.stepped_sine",
+    "map_multisine": "mapping.multisine",
+    "map_nonlinear_mode": "mapping.nonlinear_mode",
+    "map_response_matrix": "mapping.response_matrix",
     "nonlinear_mode": "nonlinear.phase_resonance",
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",

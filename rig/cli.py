@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from rig.cli_analyse import app as analyse_app
+from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
-from rig.cli_options import Json, Output, Overwrite, Realtime, keep_existing
+from rig.cli_options import Json, Output, Overwrite, Realtime
 
 __all__ = ["app", "main"]
 
@@ -33,6 +34,8 @@ def _common(
 app.command("list")(list_)
 app.command()(identify)
 app.command()(predict)
+app.command("import")(import_)
+app.command("export")(export_)
 
 
 @app.command()
@@ -126,34 +129,6 @@ def plot_(
     from rig.figures.draw import plot
 
     plot(file, output)
-
-
-@app.command("import")
-def import_(
-    file: Annotated[Path, typer.Argument(help="MAT file with stepped-sine measurements.")],
-    mapping: Annotated[Path, typer.Option(help="TOML file that says what is where in it.")],
-    output: Output,
-    format_: Annotated[str, typer.Option("--format", help="Format of the file: mat.")] = "mat",
-    overwrite: Overwrite = False,
-    json: Json = False,
-) -> None:
-    """Bring in measurements from elsewhere."""
-    from rig.console import print_json
-    from rig.errors import ConfigurationError
-    from rig.importing import read_frequency_responses
-    from rig.models.files import save
-    from rig.summary import summarise
-    from rig.tables import print_summary
-
-    if format_ != "mat":
-        raise ConfigurationError(f"--format = {format_!r}: allowed is mat")
-    keep_existing([file], output, overwrite)
-    save(read_frequency_responses(file, mapping), output)
-    summary = summarise(output)
-    if json:
-        print_json(summary)
-    else:
-        print_summary(summary)
 
 
 @app.command()

@@ -17,6 +17,8 @@ _PATH = re.compile(r"([^.\[\]]+|\[\d+\])(\.[^.\[\]]+|\[\d+\])*")
 
 def value_at(data: Any, path: str, where: str) -> Any:
     """Value at ``path`` (``a.b[2].c``) in ``data``; raises `IdentificationError` with ``where`` and what is there."""
+    if isinstance(data, Mapping) and path in data:
+        return data[path]  # a name with dots or brackets of its own
     if not _PATH.fullmatch(path):
         raise IdentificationError(
             f"{where}: '{path}' is no path; write names joined by dots, with [0] for list entries"

@@ -8,9 +8,9 @@ import scipy.io
 
 from identification import stepped_sine_mode
 from rig.errors import ConfigurationError
-from rig.importing import ImportFailed, read_frequency_responses, read_mapping
+from rig.exchange.reading import ImportFailed, read_frequency_responses, read_mapping
 
-EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "brake-reuss-mapping.toml"
+EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "brake-reuss-mapping.toml"
 LEVELS = [5, 20, 30, 40, 50, 60, 70, 80]
 FREQUENCY_HZ = np.arange(79.0, 81.01, 0.05)
 
@@ -61,7 +61,7 @@ def test_a_missing_path_names_both_files_and_what_there_is(mat_path: Path, tmp_p
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('force = "N"', 'force = "lbf"', r"units\.force = 'lbf': allowed is 'N', 'mN' or 'kN'"),
+        ('force = "N"', 'force = "dyn"', r"units\.force = 'dyn': allowed is 'N', 'mN', 'kN', 'lbf' or 'kgf'"),
         ('unit = "rad"', 'unit = "rad"\nsign = 1', r"phase\.sign: unknown key"),
         ('values = "peak"', "", r"units\.values: is missing"),
         ("[5, 20,", "[-5, 20,", r"sets\[1\]\.level_values\[0\] = -5: allowed is greater than 0"),

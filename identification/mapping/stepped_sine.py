@@ -10,52 +10,38 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
 from identification.errors import IdentificationError
 from identification.frequency_responses import Controlled, FrequencyResponse
-from identification.nested import as_levels, numbers, value_at
+from identification.mapping.base import MappingTable, Path
+from identification.mapping.nested import as_levels, numbers, value_at
+from identification.mapping.units import si_of
 
 __all__ = ["FrequencyResponseMapping", "LevelSet", "PhaseConvention", "Units", "map_frequency_responses"]
 
 Complex = NDArray[np.complex128]
-Path = Annotated[str, Field(min_length=1)]
 PositiveFloat = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
-_GRAVITY = 9.80665
 _FREQUENCY: dict[str, float] = {"Hz": 1.0, "rad/s": 1.0 / (2.0 * np.pi)}
-_FORCE: dict[str, float] = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
-_RESPONSE: dict[str, tuple[Motion, float]] = {
-    "m": ("displacement", 1.0),
-    "mm": ("displacement", 1e-3),
-    "um": ("displacement", 1e-6),
-    "m/s": ("velocity", 1.0),
-    "mm/s": ("velocity", 1e-3),
-    "m/s2": ("acceleration", 1.0),
-    "m/s^2": ("acceleration", 1.0),
-    "g": ("acceleration", _GRAVITY),
-}
+_MOTION: dict[str, Motion] = {unit: motion for motion, unit in MOTION_UNIT.items()}
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
-
-
-class Units(_Table):
+class Units(MappingTable):
     """Units of the stored numbers."""
 
     frequency: Literal["Hz", "rad/s"]
     """Unit of the frequencies."""
-    force: Literal["N", "mN", "kN"]
+    force: Literal["N", "mN", "kN", "lbf", "kgf"]
     """Unit of the forces."""
-    response: Literal["m", "mm", "um", "m/s", "mm/s", "m/s2", "m/s^2", "g"]
+    response: Literal["m", "mm", "um", "in", "m/s", "mm/s", "in/s", "m/s2", "m/s^2", "mm/s2", "in/s2", "g"]
     """Unit of the response amplitudes; it also says whether they are displacement, velocity or acceleration."""
     values: Literal["peak", "rms"]
     """Whether forces, responses and level values are stored as peak or as RMS."""
 
 
-class PhaseConvention(_Table):
+class PhaseConvention(MappingTable):
     """What the stored phases mean."""
 
     unit: Literal["deg", "rad"]
@@ -66,7 +52,7 @@ class PhaseConvention(_Table):
     """``response-minus-force`` falls from 0 to -180 degrees through a displacement resonance."""
 
 
-class LevelSet(_Table):
+class LevelSet(MappingTable):
     """Levels that were measured the same way.
 
     Paths are names joined by dots, with ``[3]`` for the fourth entry of a list. With ``levels``, the others start at
@@ -91,9 +77,10 @@ class LevelSet(_Table):
     """Name of each level; ``{value}``, ``{unit}`` (SI, peak) and ``{number}`` (from 1) are filled in."""
 
 
-class FrequencyResponseMapping(_Table):
+class FrequencyResponseMapping(MappingTable):
     """A whole mapping: what the file holds, and in which terms."""
 
+    kind: Literal["frequency-responses"] = "frequency-responses"
     specimen: str = ""
     """Name of what was tested."""
     source: str = ""
@@ -170,7 +157,8 @@ def _response(
     """One level in SI, peak, with the phase in the house's convention."""
     units = mapping.units
     peak = np.sqrt(2.0) if units.values == "rms" else 1.0
-    kind, response_scale = _RESPONSE[units.response]
+    unit, response_scale = si_of(units.response, "units.response")
+    kind, force_scale = _MOTION[unit], si_of(units.force, "units.force")[1]
     sizes = {name: array.size for name, array in stored.items()}
     if len(set(sizes.values())) > 1:
         raise IdentificationError(f"{where}, level {index + 1}: unequal lengths ({sizes})")
@@ -180,20 +168,20 @@ def _response(
     for name in ("force", "response"):
         if not np.iscomplexobj(stored[name]) and np.any(stored[name] < 0.0):
             raise IdentificationError(f"{where}.{name}, level {index + 1}: an amplitude is below zero; check the path")
-    force = np.asarray(stored["force"] * (_FORCE[units.force] * peak), dtype=np.complex128)
+    force = np.asarray(stored["force"] * (force_scale * peak), dtype=np.complex128)
     response = np.asarray(stored["response"] * (response_scale * peak), dtype=np.complex128)
     if group.phase is not None and mapping.phase is not None:
         force, response = np.abs(force) + 0j, np.abs(response) * _turn(stored["phase"], mapping.phase, kind)
     scales: dict[Controlled, tuple[float, float, str]] = {
-        "force": (_FORCE[units.force] * peak, float(np.median(np.abs(force))), "N"),
-        "response": (response_scale * peak, float(np.median(np.abs(response))), MOTION_UNIT[kind]),
+        "force": (force_scale * peak, float(np.median(np.abs(force))), "N"),
+        "response": (response_scale * peak, float(np.median(np.abs(response))), unit),
         "voltage": (1.0, float(index + 1), "V"),
         "none": (1.0, float(index + 1), ""),
     }
-    scale, measured, unit = scales[group.controlled]
+    scale, measured, level_unit = scales[group.controlled]
     level = group.level_values[index] * scale if group.level_values else measured
     try:
-        label = group.label.format(value=level, unit=unit, number=index + 1).strip()
+        label = group.label.format(value=level, unit=level_unit, number=index + 1).strip()
         frequency_hz = stored["frequency"] * _FREQUENCY[units.frequency]
         return FrequencyResponse(
             frequency_hz, force, response, kind, group.controlled, level, label, specimen=mapping.specimen

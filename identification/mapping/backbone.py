@@ -1,0 +1,74 @@
+"""Backbones that others measured, as a table of fundamentals, as `Backbone`."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from identification.backbones import Backbone
+from identification.errors import IdentificationError
+from identification.mapping.base import ChannelMapping, ComplexPaths, MappingTable, Path, complex_at, in_si
+from identification.mapping.nested import numbers, value_at
+from identification.measurements import PeriodicVibration
+
+__all__ = ["BackboneMapping", "map_backbone"]
+
+
+class FundamentalMapping(ChannelMapping):
+    """A channel and its fundamental at every point."""
+
+    value: Path | ComplexPaths
+    """Path of complex numbers, or paths of their parts; columns of a matrix are the harmonics 1, 2, ..."""
+
+
+class BackboneMapping(MappingTable):
+    """Where a backbone is and what it means."""
+
+    kind: Literal["backbone"]
+    specimen: str = ""
+    """Name of what was tested."""
+    source: str = ""
+    """Where the data comes from; for the reader."""
+    frequency: Path
+    """Path of the frequencies."""
+    frequency_unit: Literal["Hz", "rad/s"] = "Hz"
+    """Unit of the frequencies."""
+    values: Literal["peak", "rms"]
+    """Whether amplitudes are stored as peak or as RMS."""
+    sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
+    """Convention of the stored complex numbers and phases: with the first, what lags has the smaller phase."""
+    periods: Annotated[int, Field(ge=1)] = 1
+    """Periods that every point was taken from."""
+    drive_mode_shape: float | None = None
+    """Mass-normalised shape of the tested mode at the drive point, kg^-1/2."""
+    channels: Annotated[tuple[FundamentalMapping, ...], Field(min_length=2)]
+    """The channels: one of role ``force``, one ``drive``."""
+
+
+def map_backbone(data: Any, mapping: BackboneMapping) -> Backbone:
+    """The backbone in ``data``: SI, peak; without static parts, standard errors and residuals.
+
+    Raises `IdentificationError` on a path that is not there, unequal lengths, NaN, or missing roles.
+    """
+    frequency = np.asarray(numbers(value_at(data, mapping.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
+    if mapping.frequency_unit == "rad/s":
+        frequency = frequency / (2.0 * np.pi)
+    channels, factors = in_si(mapping.channels)
+    stored = [complex_at(data, c.value, 2, f"channels.{c.name}") for c in mapping.channels]
+    for channel, values in zip(channels, stored, strict=True):
+        if len(values) != frequency.size:
+            raise IdentificationError(f"channels.{channel.name}: {len(values)} points for {frequency.size} frequencies")
+    width = max(values.shape[1] for values in stored)
+    harmonics = np.zeros((frequency.size, len(channels), width + 1), dtype=np.complex128)
+    scale = np.sqrt(2.0) if mapping.values == "rms" else 1.0
+    for row, values in enumerate(stored):
+        harmonics[:, row, 1 : values.shape[1] + 1] = values * (factors[row] * scale)
+    if mapping.sense == "exp(-iwt)":
+        harmonics = np.conj(harmonics)
+    points = []
+    for number, (hz, values) in enumerate(zip(frequency, harmonics, strict=True)):
+        try:
+            points.append(PeriodicVibration(channels, float(hz), values, mapping.periods, np.zeros(len(channels))))
+        except IdentificationError as error:
+            raise IdentificationError(f"point {number + 1}: {error}") from None
+    return Backbone(tuple(points), mapping.specimen, mapping.drive_mode_shape)

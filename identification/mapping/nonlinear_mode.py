@@ -1,0 +1,106 @@
+"""Nonlinear modes that others identified, as a table over the level, as `NonlinearMode`."""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.mapping.base import MappingTable, Path
+from identification.mapping.nested import numbers, value_at
+from identification.mapping.units import si_of
+from identification.nonlinear.nonlinear_modes import NonlinearMode
+
+__all__ = ["NonlinearModeMapping", "map_nonlinear_mode"]
+
+_ORDER = {"m": 0, "m/s": 1, "m/s2": 2}
+
+
+class NonlinearModeMapping(MappingTable):
+    """Where the properties of a nonlinear mode are and what they mean."""
+
+    kind: Literal["nonlinear-mode"]
+    specimen: str = ""
+    """Name of what was tested."""
+    source: str = "imported"
+    """Where the data comes from."""
+    values: Literal["peak", "rms"]
+    """Whether amplitudes and forces are stored as peak or as RMS."""
+    frequency: Path
+    """Path of the modal frequencies."""
+    frequency_unit: Literal["Hz", "rad/s"] = "Hz"
+    """Unit of the frequencies."""
+    damping: Path
+    """Path of the modal damping ratios."""
+    damping_unit: Literal["1", "%"]
+    """Unit of the damping ratios."""
+    amplitude: Path
+    """Path of the amplitudes of the drive point."""
+    amplitude_unit: str
+    """Unit of the amplitudes; it also says whether they are displacement, velocity or acceleration."""
+    force: Path | None = None
+    """Path of the fundamental forces."""
+    force_unit: str = "N"
+    """Unit of the forces."""
+    drive_mode_shape: float | None = None
+    """Mass-normalised shape at the drive point, kg^-1/2; with it the modal amplitude is known."""
+
+
+def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMode:
+    """The mode in ``data``: SI, peak; what the table does not say is NaN.
+
+    Raises `IdentificationError` on a path that is not there, unequal lengths, NaN, or a unit that is not understood.
+    """
+    columns = {"frequency": mapping.frequency, "damping": mapping.damping, "amplitude": mapping.amplitude}
+    if mapping.force is not None:
+        columns["force"] = mapping.force
+    stored = {}
+    for name, path in columns.items():
+        stored[name] = np.asarray(numbers(value_at(data, path, name), 1, f"{name} '{path}'"), dtype=np.float64)
+        if not np.all(np.isfinite(stored[name])):
+            raise IdentificationError(
+                f"{name} '{path}': is not finite at [{int(np.argmin(np.isfinite(stored[name])))}]"
+            )
+    if len({array.size for array in stored.values()}) > 1:
+        sizes = ", ".join(f"{name} {array.size}" for name, array in stored.items())
+        raise IdentificationError(f"columns: unequal lengths ({sizes})")
+    frequency = stored["frequency"] / (1.0 if mapping.frequency_unit == "Hz" else 2.0 * np.pi)
+    damping = stored["damping"] * (0.01 if mapping.damping_unit == "%" else 1.0)
+    peak = np.sqrt(2.0) if mapping.values == "rms" else 1.0
+    unit, factor = si_of(mapping.amplitude_unit, "amplitude_unit")
+    if unit not in _ORDER:
+        raise IdentificationError(
+            f"amplitude_unit: is '{mapping.amplitude_unit}', needs a displacement, velocity or acceleration"
+        )
+    amplitude = stored["amplitude"] * factor * peak / (2.0 * np.pi * frequency) ** _ORDER[unit]
+    force_unit, force_factor = si_of(mapping.force_unit, "force_unit")
+    if force_unit != "N":
+        raise IdentificationError(f"force_unit: is '{mapping.force_unit}', needs a force")
+    force = stored["force"] * force_factor * peak if "force" in stored else np.full(frequency.size, np.nan)
+    return _mode(mapping, frequency, damping, amplitude, force)
+
+
+def _mode(mapping: NonlinearModeMapping, frequency: Any, damping: Any, amplitude: Any, force: Any) -> NonlinearMode:
+    unknown = np.full(frequency.size, np.nan)
+    shape = mapping.drive_mode_shape
+    nothing = np.zeros(frequency.size, dtype=np.complex128)
+    columns = {
+        "force_n": force,
+        "frequency_hz": frequency,
+        "phase_lag_deg": np.full(frequency.size, 90.0),
+        "amplitude_m": amplitude,
+        "modal_frequency_hz": frequency,
+        "damping_ratio": damping,
+        "modal_amplitude": unknown if shape is None else amplitude / abs(shape),
+        "apparent_mass_kg": unknown if shape is None else np.full(frequency.size, 1.0 / shape**2),
+        "force_harmonics": np.stack([nothing, force + 0j], axis=1),
+        "response_harmonics_m": np.stack([nothing, -1j * amplitude], axis=1),
+    }
+    columns |= dict.fromkeys(_UNKNOWN, unknown)
+    texts = {"source": mapping.source, "specimen": mapping.specimen}
+    return NonlinearMode.from_arrays(columns, {**texts, "notes": ["imported: only what the table says is known"]})
+
+
+_UNKNOWN = (
+    *("modal_frequency_std_hz", "damping_ratio_std", "damping_ratio_total_power", "damping_ratio_uncorrected"),
+    *("mac", "force_purity", "response_purity", "fit_residual"),
+)

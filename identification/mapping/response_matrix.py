@@ -1,0 +1,100 @@
+"""Frequency responses that others estimated, as a `FrequencyResponseMatrix`."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from identification.errors import IdentificationError
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.mapping.base import ChannelMapping, ComplexPaths, MappingTable, Path, complex_at, in_si
+from identification.mapping.nested import numbers, value_at
+
+__all__ = ["ResponseMatrixMapping", "map_response_matrix"]
+
+
+class PathMapping(MappingTable):
+    """Frequency response of one output to one input."""
+
+    output: str
+    """Name of one of the outputs."""
+    input: str
+    """Name of one of the inputs."""
+    value: Path | ComplexPaths
+    """Path of complex numbers, or paths of their parts; in unit of the output over unit of the input."""
+
+
+class ResponseMatrixMapping(MappingTable):
+    """Where frequency responses are and what they mean."""
+
+    kind: Literal["frequency-response-matrix"]
+    specimen: str = ""
+    """Name of what was tested."""
+    source: str = ""
+    """Where the data comes from; for the reader."""
+    estimator: str = "imported"
+    """How the responses were estimated: ``H1``, ``H2`` ..."""
+    frequency: Path
+    """Path of the frequencies."""
+    frequency_unit: Literal["Hz", "rad/s"] = "Hz"
+    """Unit of the frequencies."""
+    sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
+    """Convention of the stored responses; with the first, displacement lags behind the force by a negative argument."""
+    outputs: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
+    """The responding channels."""
+    inputs: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
+    """The exciting channels."""
+    matrix: Path | None = None
+    """Path of an array frequencies x outputs x inputs (the last left out for one input); or give ``paths``."""
+    paths: tuple[PathMapping, ...] = ()
+    """One entry for every output and input."""
+
+
+def map_response_matrix(data: Any, mapping: ResponseMatrixMapping) -> FrequencyResponseMatrix:
+    """Frequency responses in ``data`` in SI, lines in rising order.
+
+    Raises `IdentificationError` on a path that is not there, on shapes or numbers that do not fit, on a missing response.
+    """
+    frequency = np.asarray(numbers(value_at(data, mapping.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
+    outputs, out_factors = in_si(mapping.outputs)
+    inputs, in_factors = in_si(mapping.inputs)
+    value = (
+        _matrix(data, mapping, frequency.size) if mapping.matrix is not None else _paths(data, mapping, frequency.size)
+    )
+    value = value * (out_factors[:, None] / in_factors)
+    return FrequencyResponseMatrix(
+        outputs=outputs,
+        inputs=inputs,
+        frequency_hz=frequency / (1.0 if mapping.frequency_unit == "Hz" else 2.0 * np.pi),
+        value=value if mapping.sense == "exp(+iwt)" else np.conj(value),
+        estimator=mapping.estimator,
+        specimen=mapping.specimen,
+    )
+
+
+def _matrix(data: Any, mapping: ResponseMatrixMapping, lines: int) -> Any:
+    array = np.asarray(value_at(data, str(mapping.matrix), "matrix"))
+    wanted = (lines, len(mapping.outputs), len(mapping.inputs))
+    if array.dtype.kind not in "iufc" or array.size != np.prod(wanted) or array.shape[0] != lines:
+        raise IdentificationError(f"matrix '{mapping.matrix}': shape {array.shape}, needs {wanted}")
+    return array.reshape(wanted).astype(np.complex128)
+
+
+def _paths(data: Any, mapping: ResponseMatrixMapping, lines: int) -> Any:
+    outputs, inputs = ([channel.name for channel in group] for group in (mapping.outputs, mapping.inputs))
+    value = np.full((lines, len(outputs), len(inputs)), complex(np.nan, np.nan))
+    for number, path in enumerate(mapping.paths):
+        where = f"paths[{number}]"
+        for name, names in ((path.output, outputs), (path.input, inputs)):
+            if name not in names:
+                raise IdentificationError(f"{where}: '{name}' is none of {', '.join(names)}")
+        response = complex_at(data, path.value, 1, f"{where}.value")
+        if response.size != lines:
+            raise IdentificationError(f"{where}.value: {response.size} values for {lines} frequencies")
+        if not np.all(np.isfinite(response)):
+            raise IdentificationError(f"{where}.value: is not finite at [{int(np.argmin(np.isfinite(response)))}]")
+        value[:, outputs.index(path.output), inputs.index(path.input)] = response
+    missing = [f"{o} to {i}" for k, o in enumerate(outputs) for j, i in enumerate(inputs) if np.isnan(value[0, k, j])]
+    if missing:
+        raise IdentificationError(f"paths: the response of {', '.join(missing)} is missing")
+    return value

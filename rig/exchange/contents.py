@@ -1,0 +1,80 @@
+"""What is exchanged, in one form for all formats: named arrays with units, and attributes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Contents", "Labels", "unit_of"]
+
+Array = NDArray[Any]
+Labels = tuple[tuple[str, ...], ...]
+
+_SUFFIXES = {
+    **{"_hz": "Hz", "_n": "N", "_m": "m", "_kg": "kg", "_deg": "deg", "_s": "s", "_v": "V", "_rad": "rad"},
+    **{"modal_amplitude": "kg^0.5 m", "force_harmonics": "N", "shapes": "kg^-0.5"},
+}
+
+
+def unit_of(name: str) -> str:
+    """SI unit of an array by the end of its name (``damping_ratio_std`` has that of ``damping_ratio``); 1 without any."""
+    for end in ("_std", "_low", "_high", "_total_power", "_uncorrected"):
+        name = name.removesuffix(end)
+    return next((unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix)), "1")
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """One object, taken apart.
+
+    Parameters
+    ----------
+    kind
+        Kind of the object, for example ``nonlinear-mode``.
+    title
+        What it is of, for a person: specimen, point or level.
+    arrays
+        Its arrays by name.
+    attributes
+        Everything else, ready for JSON.
+    rows
+        For every array that belongs into a table: its axis along the table's rows.
+    units
+        Units of arrays, one or several that fit the axes other than the rows; by `unit_of` where there is none.
+    labels
+        Names along the axes other than the rows.
+    """
+
+    kind: str
+    title: str
+    arrays: Mapping[str, Array]
+    attributes: Mapping[str, Any]
+    rows: Mapping[str, int]
+    units: Mapping[str, str | Array] = field(default_factory=dict)
+    labels: Mapping[str, Labels] = field(default_factory=dict)
+
+    def unit(self, name: str) -> str | Array:
+        """Unit of an array, or those of its columns."""
+        return self.units.get(name, unit_of(name))
+
+    def summary(self) -> dict[str, Any]:
+        """Kind, title, number of rows and names of the arrays."""
+        rows = next((np.shape(self.arrays[name])[axis] for name, axis in self.rows.items()), 0)
+        return {"kind": self.kind, "title": self.title, "rows": int(rows), "arrays": list(self.arrays)}
+
+    def columns(self, name: str) -> list[tuple[str, str, Array]]:
+        """Name, unit and values of every column of an array; real and imaginary part are columns of their own."""
+        table = np.moveaxis(np.asarray(self.arrays[name]), self.rows[name], 0)
+        units = np.broadcast_to(np.asarray(self.unit(name)), table.shape[1:])
+        labels = self.labels.get(name) or tuple(tuple(map(str, range(size))) for size in table.shape[1:])
+        out = []
+        for index in np.ndindex(table.shape[1:]):
+            marks = ":".join(axis[i] for axis, i in zip(labels, index, strict=True))
+            title, unit, values = f"{name}[{marks}]" if marks else name, str(units[index]), table[(slice(None), *index)]
+            if np.iscomplexobj(table):
+                out += [(f"{title}.re", unit, values.real), (f"{title}.im", unit, values.imag)]
+            else:
+                out.append((title, unit, values))
+        return out

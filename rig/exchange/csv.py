@@ -1,0 +1,135 @@
+"""CSV files: two comment lines, a line of names, a line of units, one row of numbers per line.
+
+The comments hold the kind and, as JSON, everything that is not in the table. Numbers are written with as many digits
+as make them the same when they are read.
+"""
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.exchange.contents import Contents
+from rig.exchange.mat import ImportFailed
+
+__all__ = ["read_csv", "table_of_ours", "write_csv"]
+
+_KIND, _OTHERS = "# vibrolock: ", "# others: "
+
+
+def write_csv(items: Sequence[Contents], path: Path) -> None:
+    """Write the one table; raises `RecordingError` where there are several."""
+    if len(items) > 1:
+        titles = "; ".join(f"{number} ({item.title})" for number, item in enumerate(items, 1))
+        raise RecordingError(f"a CSV file holds one table, here are {len(items)}: choose by --item one of {titles}")
+    item = items[0]
+    columns = [column for name in item.arrays if name in item.rows for column in item.columns(name)]
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        stream.write(f"{_KIND}{item.kind}\n{_OTHERS}{json.dumps(_others(item))}\n")
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([name for name, _, _ in columns])
+        writer.writerow([unit for _, unit, _ in columns])
+        writer.writerows(zip(*(values.tolist() for _, _, values in columns), strict=True))
+
+
+def _others(item: Contents) -> dict[str, Any]:
+    """What is not in the table; and of what is, in which order its columns make arrays."""
+    loose = {}
+    for name, array in item.arrays.items():
+        if name not in item.rows:
+            pairs = np.stack([np.real(array), np.imag(array)], -1) if np.iscomplexobj(array) else np.asarray(array)
+            loose[name] = {"complex": bool(np.iscomplexobj(array)), "values": pairs.tolist()}
+    table = {
+        name: {
+            "axis": axis,
+            "shape": list(np.shape(item.arrays[name])),
+            "complex": bool(np.iscomplexobj(item.arrays[name])),
+        }
+        for name, axis in ((name, item.rows[name]) for name in item.arrays if name in item.rows)
+    }
+    return {"attributes": dict(item.attributes), "table": table, "arrays": loose}
+
+
+def table_of_ours(path: Path) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
+    """Kind, arrays and attributes in a file that `write_csv` wrote; None for others; `ImportFailed` on damaged ones."""
+    lines = _lines(path)
+    if not lines or not lines[0].startswith(_KIND):
+        return None
+    try:
+        others = json.loads(lines[1].removeprefix(_OTHERS))
+        rows = np.array([[float(cell) for cell in row] for row in csv.reader(lines[4:])])
+        arrays: dict[str, Any] = {}
+        column = 0
+        for name, told in others["table"].items():
+            shape = list(told["shape"])
+            axis = told["axis"]
+            trailing = [size for dimension, size in enumerate(shape) if dimension != axis]
+            width = int(np.prod(trailing, dtype=int)) * (2 if told["complex"] else 1)
+            block = rows[:, column : column + width]
+            column += width
+            if told["complex"]:
+                block = block[:, ::2] + 1j * block[:, 1::2]
+            arrays[name] = np.moveaxis(block.reshape(len(rows), *trailing), 0, axis)
+        if column != rows.shape[1]:
+            raise ValueError(f"{rows.shape[1]} columns, the comment tells of {column}")
+        arrays |= {name: _loose(told) for name, told in others["arrays"].items()}
+        return lines[0].removeprefix(_KIND).strip(), arrays, others["attributes"]
+    except (ValueError, KeyError, IndexError, TypeError) as error:
+        raise ImportFailed(f"{path}: is a damaged or changed CSV file of ours ({error})") from None
+
+
+def _loose(told: dict[str, Any]) -> Any:
+    values = np.array(told["values"])
+    return values[..., 0] + 1j * values[..., 1] if told["complex"] else values
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise ImportFailed(f"{path}: is no text, a CSV file in UTF-8 is wanted") from None
+    except OSError as error:
+        raise ImportFailed(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def read_csv(path: Path) -> dict[str, Any]:
+    """Columns of any CSV file by name: comma, semicolon or tab; a first line of names; lines with ``#`` are left out.
+
+    Lines right after the names without any number (units) are passed over. Raises `ImportFailed`, with the line, on
+    anything that is no number, on rows of unequal length, and on decimal commas.
+    """
+    lines = [(number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#")]
+    if len(lines) < 2:
+        raise ImportFailed(f"{path}: holds no table; wanted is a line of names, then rows of numbers")
+    comma = max(",;\t", key=lines[0][1].count)
+    names = [name.strip() for name in next(csv.reader([lines[0][1]], delimiter=comma))]
+    if len(set(names)) < len(names) or any(_number(name) is not None for name in names):
+        raise ImportFailed(
+            f"{path}: the first line must name every column, each differently; it is '{lines[0][1][:60]}'"
+        )
+    rows: list[list[float | None]] = []
+    for number, line in lines[1:]:
+        cells = next(csv.reader([line], delimiter=comma))
+        values = [_number(cell) for cell in cells]
+        if not rows and all(value is None for value in values):
+            continue
+        if len(cells) != len(names) or None in values:
+            wrong = next((cell for cell, value in zip(cells, values, strict=True) if value is None), None)
+            what = f"{len(cells)} values for {len(names)} names" if wrong is None else f"'{wrong}' is no number"
+            hint = "; write decimals with a point" if wrong is not None and "," in wrong else ""
+            raise ImportFailed(f"{path}, line {number}: {what}{hint}")
+        rows.append(values)
+    if not rows:
+        raise ImportFailed(f"{path}: holds names, but no row of numbers")
+    return dict(zip(names, np.array(rows, dtype=np.float64).T, strict=True))
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell)
+    except ValueError:
+        return None

@@ -1,0 +1,163 @@
+"""The kinds of objects that are exchanged: how each is taken apart, put together again, and kept in a file of ours."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification import (
+    Backbone,
+    FrequencyResponse,
+    FrequencyResponseMatrix,
+    IdentificationError,
+    LinearModes,
+    NonlinearMode,
+    Transient,
+    pack_frequency_responses,
+    unpack_frequency_responses,
+)
+from identification.channels import MOTION_UNIT
+from rig.errors import RecordingError
+from rig.exchange.backbone_table import backbone_from, backbone_parts
+from rig.exchange.contents import Contents
+from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
+from rig.exchange.time_data import TimeData
+from rig.recording.arrays import write_arrays
+
+__all__ = ["KINDS", "described", "put_together", "restored", "save", "taken_apart"]
+
+
+def _nonlinear_mode(mode: NonlinearMode) -> Contents:
+    arrays, attributes = mode.to_arrays()
+    size = len(mode.force_n)
+    rows = {name: 0 for name, array in arrays.items() if array.ndim and array.shape[0] == size}
+    return Contents("nonlinear-mode", mode.specimen, arrays, attributes, rows, {"apparent_mass_kg": "kg"})
+
+
+def _linear_modes(modes: LinearModes) -> Contents:
+    arrays, attributes = modes.to_arrays()
+    names = tuple(channel.name for channel in modes.channels)
+    shapes = {name: 1 for name in arrays if name.startswith("shapes")}
+    rows = {name: 0 for name, array in arrays.items() if array.shape == modes.frequency_hz.shape and name not in _SIDES}
+    units = {"lower": "1/kg", "upper": "s2/kg", "force_rms_n": "N"}
+    labels = dict.fromkeys(shapes, (names,))
+    return Contents("linear-modes", modes.specimen, arrays, attributes, rows | shapes, units, labels)
+
+
+_SIDES = ("lower", "upper")  # one value per channel, not per mode
+
+
+def _response_matrix(matrix: FrequencyResponseMatrix) -> Contents:
+    arrays, attributes = matrix.to_arrays()
+    outputs, inputs = (tuple(c.name for c in channels) for channels in (matrix.outputs, matrix.inputs))
+    ratio = np.array([[f"{o.unit}/{i.unit}" for i in matrix.inputs] for o in matrix.outputs])
+    flat, paths = ratio.ravel(), tuple(f"{o}/{i}" for o in outputs for i in inputs)
+    covariance = np.array([[f"({a})({b})" for b in flat] for a in flat])
+    kinds = ("noise_covariance", "total_covariance")
+    units = {"value": ratio, **dict.fromkeys(kinds, covariance)}
+    labels = {"value": (outputs, inputs), **dict.fromkeys(kinds, (paths, paths))}
+    rows = dict.fromkeys(arrays, 0)
+    return Contents("frequency-response-matrix", _level(matrix), arrays, attributes, rows, units, labels)
+
+
+def _level(matrix: FrequencyResponseMatrix) -> str:
+    levels = ", ".join(f"{rms:.4g} {i.unit} RMS" for rms, i in zip(matrix.input_rms, matrix.inputs, strict=False))
+    return ", ".join(text for text in (matrix.specimen, levels) if text)
+
+
+def _frequency_responses(responses: tuple[FrequencyResponse, ...]) -> Contents:
+    arrays, attributes = pack_frequency_responses(responses)
+    arrays["number"] = np.repeat(np.arange(1, len(responses) + 1), arrays["points_per_level"])
+    kinds = sorted({MOTION_UNIT[response.kind] for response in responses})
+    rows = dict.fromkeys(("number", "frequency_hz", "force", "response"), 0)
+    units: dict[str, Any] = {"force": "N", "response": " or ".join(kinds), "level": "of what was controlled"}
+    return Contents("frequency-responses", responses[0].specimen, arrays, attributes, rows, units)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How objects of one type are taken apart and put together.
+
+    ``name`` stands in exchanged files, ``stored`` in files of ours (empty where there are none of that kind).
+    """
+
+    name: str
+    type: type
+    apart: Callable[[Any], Contents]
+    together: Callable[[Mapping[str, Any], Mapping[str, Any]], Any]
+    stored: str
+
+
+KINDS = (
+    Kind("backbone", Backbone, backbone_parts, backbone_from, "measured-backbone"),
+    Kind("frequency-responses", tuple, _frequency_responses, unpack_frequency_responses, "frequency-responses"),
+    Kind(
+        "frequency-response-matrix",
+        FrequencyResponseMatrix,
+        _response_matrix,
+        FrequencyResponseMatrix.from_arrays,
+        "frequency-response-matrix",
+    ),
+    Kind("linear-modes", LinearModes, _linear_modes, LinearModes.from_arrays, "linear-modes"),
+    Kind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays, "nonlinear-mode"),
+    Kind("time-data", TimeData, time_data_parts, time_data_from, ""),
+    Kind("sweep", Transient, transient_parts, transient_from, ""),
+)
+
+
+def taken_apart(value: Any) -> Contents:
+    """An object as arrays and attributes; raises `IdentificationError` for a type that is not exchanged."""
+    for kind in KINDS:
+        if isinstance(value, kind.type):
+            return kind.apart(value)
+    names = ", ".join(kind.name for kind in KINDS)
+    raise IdentificationError(f"{type(value).__name__}: is not exchanged; what is: {names}")
+
+
+def put_together(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Any:
+    """Inverse of `taken_apart`; raises `IdentificationError` on an unknown kind and on what does not fit."""
+    for known in KINDS:
+        if known.name == kind:
+            try:
+                return known.together(arrays, attributes)
+            except (KeyError, TypeError, ValueError) as error:
+                raise IdentificationError(f"{kind}: does not fit together ({error})") from None
+    raise IdentificationError(f"kind: is '{kind}', known are {', '.join(kind.name for kind in KINDS)}")
+
+
+def save(value: Any, path: Path) -> None:
+    """Write an imported object to a file of ours; raises `RecordingError` where that cannot be done."""
+    kind = next((kind for kind in KINDS if isinstance(value, kind.type)), None)
+    if kind is None or not kind.stored:
+        raise RecordingError(f"{path}: {type(value).__name__} has no file of its own; give a mapping that evaluates it")
+    contents = kind.apart(value)
+    write_arrays(path, kind.stored, contents.arrays, contents.attributes)
+
+
+def restored(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Any:
+    """The object in a file of ours that `save` wrote, by the kind that the file says; None for other kinds."""
+    for known in KINDS:
+        if known.stored == kind:
+            return known.together(arrays, attributes)
+    return None
+
+
+def described(value: Any) -> dict[str, Any]:
+    """Kind of an object as its file says it, its title, and in ``holds`` what a line can say of it."""
+    contents = taken_apart(value)
+    summary = contents.summary()
+    kind = next(kind for kind in KINDS if isinstance(value, kind.type))
+    if isinstance(value, tuple):
+        return {**summary, "kind": kind.stored, "holds": f"{len(value)} levels"}
+    if isinstance(value, FrequencyResponseMatrix):
+        names = [", ".join(channel.name for channel in channels) for channels in (value.outputs, value.inputs)]
+        band = f"{value.frequency_hz[0]:g} to {value.frequency_hz[-1]:g} Hz"
+        return {
+            **summary,
+            "kind": kind.stored,
+            "holds": f"{summary['rows']} lines, {band}, of {names[0]} to {names[1]}",
+        }
+    what = "modes" if isinstance(value, LinearModes) else "points"
+    return {**summary, "kind": kind.stored, "holds": f"{summary['rows']} {what}"}

@@ -1,0 +1,107 @@
+"""MAT files of version 5, which MATLAB, Octave and SciPy read: one structure, or an array of them.
+
+A structure holds the arrays by name, ``units`` of the same names, ``channels`` where there are any, and two texts:
+``vibrolock_kind``, and ``attributes_json`` with everything else, from which the file is read back as it was.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.errors import RigError
+from rig.exchange.contents import Contents
+
+__all__ = ["ImportFailed", "read_mat", "structures_of_ours", "write_mat"]
+
+_KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
+_LONGEST = 31  # characters of a field's name that every reader of version 5 takes
+
+
+class ImportFailed(RigError):  # noqa: N818 (says what happened)
+    """A file of measurements cannot be read, or does not hold what its mapping says; the message names both."""
+
+
+def write_mat(items: Sequence[Contents], path: Path) -> None:
+    """Write one structure, or a 1 x n array of them, under the name of their kind; may raise anything SciPy does."""
+    from scipy.io import savemat
+
+    name = items[0].kind.replace("-", "_")
+    structures = [_structure(item) for item in items]
+    value: Any = structures[0]
+    if len(structures) > 1:
+        value = np.empty((1, len(structures)), dtype=[(key, object) for key in _names(structures)])
+        for column, structure in enumerate(structures):
+            value[0, column] = tuple(structure.get(key, np.zeros((0, 0))) for key in value.dtype.names)
+    savemat(str(path), {name: value}, appendmat=False, oned_as="column", long_field_names=False)
+
+
+def _names(structures: Sequence[Mapping[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(key for structure in structures for key in structure))
+
+
+def _structure(item: Contents) -> dict[str, Any]:
+    shapes = {name: list(np.shape(array)) for name, array in item.arrays.items()}
+    out: dict[str, Any] = {"title": item.title}
+    out |= {name[:_LONGEST]: np.asarray(array) for name, array in item.arrays.items()}
+    out["units"] = {name[:_LONGEST]: _text(item.unit(name)) for name in item.arrays}
+    for name in ("channels", "outputs", "inputs"):
+        if name in item.attributes:
+            out[name] = _table(item.attributes[name])
+    out[_KIND] = item.kind
+    out[_ATTRIBUTES] = json.dumps({"shapes": shapes, "attributes": item.attributes})
+    return out
+
+
+def _text(unit: Any) -> Any:
+    """A unit as text, several as a cell array of the shape of what they belong to."""
+    return unit if isinstance(unit, str) else np.asarray(unit).astype(object)
+
+
+def _table(channels: Sequence[Mapping[str, str]]) -> Any:
+    """Channels as a structure array."""
+    table = np.empty(len(channels), dtype=[(key, object) for key in ("name", "role", "unit")])
+    for row, channel in enumerate(channels):
+        table[row] = (channel["name"], channel["role"], channel["unit"])
+    return table
+
+
+def read_mat(path: Path) -> dict[str, Any]:
+    """Everything in a MAT file (up to version 7) as nested dictionaries, lists and arrays; raises `ImportFailed`."""
+    from scipy.io import loadmat
+
+    if not path.is_file():
+        raise ImportFailed(f"{path}: there is no such file")
+    try:
+        data: dict[str, Any] = loadmat(str(path), simplify_cells=True, appendmat=False)
+    except NotImplementedError:
+        raise ImportFailed(f"{path}: is a MAT file of version 7.3; save it in MATLAB with save(..., '-v7')") from None
+    except OSError as error:
+        raise ImportFailed(f"{path}: cannot be read ({error.strerror or error})") from None
+    except Exception as error:  # the parser fails on damaged bytes in many ways, of no common class
+        raise ImportFailed(f"{path}: is no MAT file, or a damaged one ({error})") from None
+    return data
+
+
+def structures_of_ours(data: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Kind, arrays and attributes of every structure that `write_mat` wrote; raises `ImportFailed` on damaged ones."""
+    found = []
+    for value in data.values():
+        for entry in value if isinstance(value, list | np.ndarray) else [value]:
+            if isinstance(entry, Mapping) and _KIND in entry:
+                found.append(_restored(entry))
+    return found
+
+
+def _restored(entry: Mapping[str, Any]) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    try:
+        told = json.loads(str(entry[_ATTRIBUTES]))
+        arrays = {name: np.asarray(entry[name[:_LONGEST]]).reshape(shape) for name, shape in told["shapes"].items()}
+        return str(entry[_KIND]), arrays, told["attributes"]
+    except (KeyError, ValueError, TypeError) as error:
+        raise ImportFailed(
+            f"the structure of kind {entry[_KIND]} was changed: {error}; its arrays must keep their names and sizes, "
+            "or give a mapping"
+        ) from None

@@ -1,0 +1,195 @@
+"""Reading measurements and models from files of other programs."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.configuration import read_toml, validated
+from rig.errors import ConfigurationError
+from rig.exchange.mat import ImportFailed, read_mat, structures_of_ours
+
+if TYPE_CHECKING:
+    from identification import FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra
+
+__all__ = [
+    "FORMATS",
+    "ImportFailed",
+    "format_of",
+    "import_file",
+    "read_frequency_responses",
+    "read_mapping",
+    "response_matrix",
+]
+
+FORMATS = {"mat": (".mat",), "uff": (".uff", ".unv", ".uf", ".bunv"), "csv": (".csv", ".txt")}
+"""Formats, and the endings by which they are known."""
+
+_DEFAULT_KIND = "frequency-responses"
+
+
+def format_of(path: Path, given: str, option: str) -> str:
+    """A format as given, else by the ending of ``path``; raises `ConfigurationError` where that says nothing."""
+    if given:
+        if given not in FORMATS:
+            raise ConfigurationError(f"{option} = {given!r}: allowed is {', '.join(FORMATS)}")
+        return given
+    for name, endings in FORMATS.items():
+        if path.suffix.lower() in endings:
+            return name
+    raise ConfigurationError(f"{path}: the ending says no format; give {option}, one of {', '.join(FORMATS)}")
+
+
+def import_file(
+    path: Path, format_: str = "", mapping: Path | None = None, *, units: str = "", drive: str = "", item: int = 0
+) -> Any:
+    """The measurement or model in a file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    format_
+        ``mat``, ``uff`` or ``csv``; by the ending of ``path`` if empty.
+    mapping
+        TOML file that says what is where; wanted unless this package wrote the file, or it is a universal file with
+        frequency responses or modes.
+    units
+        Universal files: ``labels``, ``file`` or ``si`` where labels and dataset 164 disagree or are missing.
+    drive
+        Universal files with modes: the degree of freedom where the force acts, such as ``1+Z``.
+    item
+        Which of several, from 1; 0 where there is one.
+
+    Raises
+    ------
+    ConfigurationError
+        If the mapping cannot be read or holds a value that is not allowed.
+    ImportFailed
+        If the file cannot be read or does not hold what the mapping says.
+    """
+    from identification.errors import IdentificationError
+
+    reader = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}[format_of(path, format_, "--format")]
+    try:
+        return reader(path, mapping, {"units": units, "drive": drive, "item": item})
+    except IdentificationError as error:
+        fit = "" if mapping is None else f" does not fit {mapping}"
+        raise ImportFailed(f"{path}{fit}: {error}") from None
+
+
+def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> "tuple[FrequencyResponse, ...]":
+    """Stepped-sine frequency responses in a MAT file (up to version 7), in SI; raises as `import_file`."""
+    found: tuple[FrequencyResponse, ...] = import_file(Path(mat_path), "mat", Path(mapping_path))
+    return found
+
+
+def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
+    """Model and reader of every kind of mapping."""
+    import identification as i
+
+    return {
+        _DEFAULT_KIND: (i.FrequencyResponseMapping, i.map_frequency_responses),
+        "frequency-response-matrix": (i.ResponseMatrixMapping, i.map_response_matrix),
+        "multisine": (i.MultisineMapping, i.map_multisine),
+        "backbone": (i.BackboneMapping, i.map_backbone),
+        "nonlinear-mode": (i.NonlinearModeMapping, i.map_nonlinear_mode),
+    }
+
+
+def read_mapping(path: str | Path) -> Any:
+    """Read a mapping from TOML; raises `ConfigurationError` that names each wrong key and its value."""
+    table = read_toml(Path(path))
+    kind, known = table.get("kind", _DEFAULT_KIND), _mappings()
+    if kind not in known:
+        raise ConfigurationError(f"{path}: kind = {kind!r}: allowed is {', '.join(known)}")
+    return validated(known[kind][0], table, str(path))
+
+
+def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
+    """What a mapping makes of data; spectra become frequency responses."""
+    mapping = read_mapping(mapping_path)
+    _check_units(data, mapping)
+    found = _mappings()[mapping.kind][1](data, mapping)
+    return response_matrix(found, mapping.instrument, mapping.specimen) if mapping.kind == "multisine" else found
+
+
+def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
+    """Universal files say their units, which are SI by now: a mapping may not say others."""
+    for channel in getattr(mapping, "channels", ()):
+        told = data["units"].get(channel.value) if isinstance(data.get("units"), dict) else None
+        if isinstance(told, str) and told and told != channel.unit:
+            raise ImportFailed(
+                f"channels.{channel.name}.unit = '{channel.unit}': the file's own units make it {told}; write that"
+            )
+
+
+def response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str) -> "FrequencyResponseMatrix":
+    """Frequency responses of all motions to the force: by an instrument, or H1 (the force as its own instrument)."""
+    import numpy as np
+
+    from identification import FrequencyResponseMatrix
+
+    force = next(channel for channel in spectra.channels if channel.role == "force")
+    outputs = tuple(channel for channel in spectra.channels if channel.role in ("drive", "response"))
+    found = [spectra.frequency_response(output.name, instrument=instrument or force.name) for output in outputs]
+    return FrequencyResponseMatrix(
+        outputs=outputs,
+        inputs=(force,),
+        frequency_hz=found[0].frequency_hz,
+        value=np.array([response.value for response in found]).T[:, :, None],
+        estimator="instrument" if instrument else "H1",
+        input_rms=(spectra.rms(force.name),),
+        specimen=specimen,
+    )
+
+
+def _chosen(found: list[Any], path: Path, item: int) -> Any:
+    if not 0 <= item <= len(found) or (item == 0 and len(found) > 1):
+        raise ImportFailed(f"{path}: holds {len(found)} objects; choose by --item 1 to {len(found)}")
+    return found[max(item - 1, 0)]
+
+
+def _from_mat(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
+    from rig.exchange.kinds import put_together
+
+    if mapping is not None:
+        read_mapping(mapping)  # named before the file, which may be large
+        return _mapped(read_mat(path), mapping)
+    ours = structures_of_ours(read_mat(path))
+    if not ours:
+        raise ImportFailed(f"{path}: was not written by this package; say by --mapping what is where in it")
+    return put_together(*_chosen(ours, path, options["item"]))
+
+
+def _from_csv(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
+    from rig.exchange.csv import read_csv, table_of_ours
+    from rig.exchange.kinds import put_together
+
+    if mapping is not None:
+        read_mapping(mapping)
+        return _mapped(read_csv(path), mapping)
+    ours = table_of_ours(path)
+    if ours is None:
+        raise ImportFailed(f"{path}: was not written by this package; say by --mapping what is in its columns")
+    return put_together(*ours)
+
+
+def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
+    from rig.exchange.uff.reading import modes_in, read_uff, responses_in, time_data_in
+
+    units = options["units"]
+    if units not in ("", "labels", "file", "si"):
+        raise ConfigurationError(f"--units = {units!r}: allowed is labels, file or si")
+    if mapping is not None:
+        read_mapping(mapping)
+    datasets = read_uff(path)
+    if mapping is not None:
+        return _mapped(time_data_in(datasets, units), mapping)
+    kinds = {(dataset["type"], dataset.get("func_type", 0)) for dataset in datasets}
+    if (58, 4) in kinds:
+        return responses_in(datasets, units)
+    if (55, 0) in kinds:
+        return modes_in(datasets, units, options["drive"])
+    if (58, 1) in kinds:
+        raise ImportFailed(f"{path}: holds time data; say by --mapping with kind = 'multisine' what was played")
+    raise ImportFailed(f"{path}: holds neither frequency responses (58, type 4), modes (55) nor time data (58, type 1)")

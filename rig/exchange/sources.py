@@ -1,0 +1,92 @@
+"""What a file of ours holds, as objects that can be exchanged."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.campaigns.evaluate import VOLTAGE, channels_of
+from rig.configuration import validated
+from rig.errors import ConfigurationError, RecordingError
+from rig.exchange.kinds import restored
+from rig.exchange.time_data import TimeData
+from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
+from rig.recording.arrays import kind_of, read_arrays
+from rig.recording.reader import Recording
+
+__all__ = ["DATA", "read_objects"]
+
+DATA = ("results", "time")
+"""What can be taken from a recording."""
+
+
+def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) -> list[Any]:
+    """The objects in a file of ours: one, but for the levels of a multisine, sweeps, and time data by point.
+
+    Parameters
+    ----------
+    path
+        A recording, model or imported measurement.
+    data
+        ``results`` (what `rig.measurements` makes of a recording) or ``time`` (the samples of its points).
+    points
+        Numbers of the points whose samples are wanted; all that were recorded if empty.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read, holds no such point or nothing of that kind.
+    """
+    if data not in DATA:
+        raise ConfigurationError(f"--data = {data!r}: allowed is {' or '.join(DATA)}")
+    kind = kind_of(path)
+    if kind in _RESULTS:
+        with Recording(path) as recording:
+            return _time_data(recording, points) if data == "time" else _RESULTS[kind](recording)
+    if data == "time" or points:
+        raise RecordingError(f"{path}: holds a {kind}; samples of points are in recordings")
+    _, arrays, attributes = read_arrays(path)
+    found = restored(kind, arrays, attributes)
+    if found is None:
+        raise RecordingError(f"{path}: holds a {kind}, which is not exchanged")
+    return [found]
+
+
+def _responses(recording: Recording) -> list[Any]:
+    """Frequency responses of every level of a multisine, with the voltage as instrument."""
+    from rig.exchange.reading import response_matrix
+
+    specimen = recording.configuration["bench"]["specimen"]["name"]
+    return [response_matrix(found, VOLTAGE.name, specimen) for found in spectra(recording).values()]
+
+
+def _sweeps(recording: Recording) -> list[Any]:
+    return list(sweeps(recording).values())
+
+
+_RESULTS: dict[str, Callable[[Recording], list[Any]]] = {
+    "backbone": lambda recording: [backbone(recording)],
+    "stepped-sine": lambda recording: [frequency_responses(recording)],
+    "multisine": _responses,
+    "sweep": _sweeps,
+}
+
+
+def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:
+    """Samples of points in SI as they were recorded, with the output's voltage as the last channel."""
+    bench = validated(Bench, recording.configuration["bench"], "bench of the recording")
+    known = sorted({point["number"] for point in recording.points if "end_sample" in point})
+    if unknown := sorted(set(points) - set(known)):
+        raise RecordingError(f"point {unknown[0]}: nothing was recorded of it; there are {', '.join(map(str, known))}")
+    empty = TimeData((*channels_of(bench), VOLTAGE), np.zeros((len(bench.channels) + 1, 1)), bench.sample_rate_hz)
+    out = []
+    for number in points or known:
+        rows = point_rows(recording, number)
+        samples = np.vstack([rows["inputs"].T, rows["output_v"][None]])
+        out.append(replace(empty, samples=samples, point=number, specimen=bench.specimen.name))
+    if not out:
+        raise RecordingError("the recording holds no samples of any point")
+    return out

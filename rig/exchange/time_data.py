@@ -1,0 +1,56 @@
+"""Samples over time of all channels of a recorded point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification import Channel, IdentificationError
+
+__all__ = ["TimeData"]
+
+
+@dataclass(frozen=True, eq=False)
+class TimeData:
+    """Evenly sampled signals.
+
+    Parameters
+    ----------
+    channels
+        One per row of ``samples``.
+    samples
+        float[n_channels, n], in the unit of each channel, SI.
+    sample_rate_hz
+        Samples per second.
+    start_s
+        Time of the first sample.
+    point
+        Number of the point in the plan, 0 where there is none.
+    specimen
+        Name of what was tested.
+
+    Raises
+    ------
+    IdentificationError
+        On shapes that do not agree, NaN or inf, or a rate that is not above zero.
+    """
+
+    channels: tuple[Channel, ...]
+    samples: NDArray[np.floating]
+    sample_rate_hz: float
+    start_s: float = 0.0
+    point: int = 0
+    specimen: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        samples = np.asarray(self.samples)
+        object.__setattr__(self, "samples", samples)
+        if samples.ndim != 2 or samples.shape[0] != len(self.channels) or not samples.size:
+            raise IdentificationError(f"samples: shape {samples.shape} for {len(self.channels)} channels")
+        for channel, row in zip(self.channels, samples, strict=True):
+            if not np.all(np.isfinite(row)):
+                where = int(np.argmin(np.isfinite(row)))
+                raise IdentificationError(f"samples: channel '{channel.name}' is {row[where]} at [{where}]")
+        if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0.0):
+            raise IdentificationError(f"sample_rate_hz: is {self.sample_rate_hz:g} Hz, must be finite and above zero")

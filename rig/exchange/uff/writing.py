@@ -1,0 +1,210 @@
+"""Objects as datasets of a universal file.
+
+Frequency responses are functions of type 4, time data of type 1, modes dataset 55. Whatever is a table over points or
+modes without a type of its own (backbones, nonlinear modes) is a function of type 0 per column over the number of the row.
+"""
+
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification import Channel
+from rig.errors import RecordingError
+from rig.exchange.contents import Contents
+from rig.exchange.uff.codes import WIDTH, axis, channel_lines, degrees_of_freedom, evenly
+
+__all__ = ["write_uff"]
+
+_TIME_RESPONSE, _GENERAL, _RESPONSE_FUNCTION = 1, 0, 4
+_PROGRAM = "vibrolock"
+
+
+def write_uff(items: Sequence[Contents], path: Path) -> None:
+    """Write header, units (SI) and the datasets of all items to an empty file; may raise anything pyuff does.
+
+    Raises `RecordingError` for a kind that has no form in universal files, and for NaN in a function.
+    """
+    import pyuff
+
+    class Writer(pyuff.UFF):  # type: ignore[misc]
+        def refresh(self) -> bool:
+            """Not read the whole file again after every dataset."""
+            return False
+
+    writer = Writer(str(path))
+    for dataset in [*_head(items), *(dataset for item in items for dataset in _DATASETS[item.kind](item))]:
+        if not np.all(np.isfinite(dataset.get("data", 0.0))):
+            raise RecordingError(f"'{dataset['id1']}' holds a number that is not finite, which universal files cannot")
+        writer.write_sets(dataset, "add")
+
+
+def _head(items: Sequence[Contents]) -> list[dict[str, Any]]:
+    now = datetime.now()
+    day, hour = now.strftime("%d-%b-%y"), now.strftime("%H:%M:%S")
+    dates = {f"{what}_{name}": value for name in _DATES for what, value in (("date", day), ("time", hour))}
+    header = {"type": 151, "model_name": _ascii(items[0].title), "description": items[0].kind, "db_app": _PROGRAM}
+    units = {"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1}
+    factors = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
+    return [{**header, **dates, "program": _PROGRAM}, {**units, **factors}]
+
+
+_DATES = ("db_created", "db_saved", "file_written")
+
+
+def _ascii(text: str) -> str:
+    """A line of at most 80 plain characters, ``NONE`` for none."""
+    return text.encode("ascii", "replace").decode().replace("\n", " ")[:WIDTH].strip() or "NONE"
+
+
+def _function(kind: int, number: int, title: str, item: Contents, x: Any, data: Any) -> dict[str, Any]:
+    """A function without its degrees of freedom; one whose header keeps its abscissa has it evenly spaced."""
+    even = evenly(x)
+    abscissa = x if len(x) > 1 else np.array([x[0], x[0] + 1.0])  # the writer wants a step
+    out = {"type": 58, "func_type": kind, "func_id": number, "ver_num": 1, "load_case_id": 0, "binary": 0}
+    texts = {"id1": _ascii(title), "id2": _ascii(item.title), "id4": _ascii(f"{_PROGRAM} {item.kind}"), "id5": "NONE"}
+    texts["id3"] = datetime.now().strftime("%d-%b-%y %H:%M:%S")
+    double = {"x": abscissa if even else x, "data": np.array(data), "abscissa_spacing": int(even)}
+    return {**out, **texts, **double, **axis("orddenom", "", ""), **axis("z_axis", "", "")}
+
+
+def _at(prefix: str, name: str, degree: tuple[int, int]) -> dict[str, Any]:
+    return {f"{prefix}_ent_name": _ascii(name)[:10], f"{prefix}_node": degree[0], f"{prefix}_dir": degree[1]}
+
+
+def _nowhere(*prefixes: str) -> dict[str, Any]:
+    return {key: value for prefix in prefixes for key, value in _at(prefix, "NONE", (0, 0)).items()}
+
+
+def _channels(item: Contents, name: str = "channels") -> list[Channel]:
+    return [Channel(**channel) for channel in item.attributes[name]]
+
+
+def _time_data(item: Contents) -> Iterator[dict[str, Any]]:
+    """Type 1, one function a channel, binary; line 5 keeps the sample rate, of which the header has six digits."""
+    channels, rate = _channels(item), item.attributes["sample_rate_hz"]
+    degrees = degrees_of_freedom(channels)
+    x = item.arrays["time_s"]
+    for number, channel in enumerate(channels):
+        function = _function(
+            _TIME_RESPONSE, item.attributes["point"], channel.name, item, x, item.arrays["samples"][number]
+        )
+        function |= {"binary": 1, "abscissa_spacing": 1, "id5": _ascii(f"sample rate {rate!r} Hz, {channel.role}")}
+        function["data"] = function["data"].astype(np.float64)
+        yield (
+            function
+            | _at("rsp", channel.name, degrees[channel.name])
+            | _nowhere("ref")
+            | {
+                **axis("abscissa", "Time", "s"),
+                **axis("ordinate", channel.name, channel.unit),
+            }
+        )
+
+
+def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
+    """Type 4, one function per output and input; covariances are left to MAT and CSV."""
+    outputs, inputs = _channels(item, "outputs"), _channels(item, "inputs")
+    degrees = degrees_of_freedom([*outputs, *inputs])
+    x = item.arrays["frequency_hz"]
+    for column, source in enumerate(inputs):
+        for row, output in enumerate(outputs):
+            title = f"{output.name} / {source.name}"
+            function = _function(_RESPONSE_FUNCTION, row + 1, title, item, x, item.arrays["value"][:, row, column])
+            function["id5"] = _ascii(
+                f"{output.role} / {source.role}, estimator {item.attributes['estimator'] or 'unknown'}, {item.title}"
+            )
+            function["id2"] = _ascii(item.attributes["specimen"])
+            yield (
+                function
+                | _at("rsp", output.name, degrees[output.name])
+                | _at("ref", source.name, degrees[source.name])
+                | {
+                    **axis("abscissa", "Frequency", "Hz"),
+                    **axis("ordinate", output.name, output.unit),
+                    **axis("orddenom", source.name, source.unit),
+                }
+            )
+
+
+def _table(item: Contents) -> Iterator[dict[str, Any]]:
+    """Type 0, one function a column over the number of the row from 1; rows that are NaN are left out."""
+    number = 0
+    for name in item.rows:
+        for title, unit, values in _complex_columns(item, name):
+            number += 1
+            known = np.isfinite(values)
+            if not known.any():
+                continue
+            rows = np.flatnonzero(known) + 1.0
+            function = _function(_GENERAL, number, title, item, rows, values[known])
+            yield function | _nowhere("rsp", "ref") | axis("abscissa", "Point", "") | axis("ordinate", name, unit)
+
+
+def _complex_columns(item: Contents, name: str) -> Iterator[tuple[str, str, Any]]:
+    columns = item.columns(name)
+    if not np.iscomplexobj(item.arrays[name]):
+        yield from ((title, unit, values.astype(np.float64)) for title, unit, values in columns)
+        return
+    for (title, unit, real), (_, _, imaginary) in zip(columns[::2], columns[1::2], strict=True):
+        yield title.removesuffix(".re"), unit, real + 1j * imaginary
+
+
+def _frequency_responses(item: Contents) -> Iterator[dict[str, Any]]:
+    """Per level: type 4 (response over force) and, as type 0, the force, both over the measured frequencies."""
+    ends = np.cumsum(item.arrays["points_per_level"])
+    for number, end in enumerate(ends):
+        rows = slice(end - item.arrays["points_per_level"][number], end)
+        level = item.attributes["levels"][number]
+        unit = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}[level["kind"]]
+        x, force = item.arrays["frequency_hz"][rows], item.arrays["force"][rows]
+        told = _ascii(f"controlled {level['controlled']}, level {float(item.arrays['level'][number])!r}")
+        ratio = _function(
+            _RESPONSE_FUNCTION, number + 1, level["label"], item, x, item.arrays["response"][rows] / force
+        )
+        forces = _function(_GENERAL, number + 1, level["label"], item, x, force)
+        abscissa, drive = axis("abscissa", "Frequency", "Hz"), _at("rsp", "drive", (1, 3))
+        ratio |= abscissa | axis("ordinate", level["kind"], unit) | axis("orddenom", "force", "N") | drive
+        forces |= abscissa | axis("ordinate", "force", "N") | _at("rsp", "force", (1, 3)) | _nowhere("ref")
+        yield ratio | _at("ref", "force", (1, 3)) | {"id2": _ascii(level["specimen"]), "id5": told}
+        yield forces | {"id2": _ascii(level["specimen"]), "id5": told}
+
+
+def _modes(item: Contents) -> Iterator[dict[str, Any]]:
+    """Dataset 55, one normal mode each: modal mass 1 kg, the shape in +Z; lines 3 to 5 tell the nodes' channels."""
+    channels = _channels(item)
+    degrees = degrees_of_freedom(channels)
+    lines = channel_lines(channels)
+    for mode, frequency in enumerate(item.arrays["frequency_hz"]):
+        shape = np.asarray(item.arrays["shapes"][:, mode], dtype=np.float64)
+        nothing = np.zeros_like(shape)
+        yield {
+            **{"type": 55, "model_type": 1, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "load_case": 1},
+            **{"id1": _ascii(f"mode {mode + 1}, mass-normalised"), "id2": _ascii(item.title)},
+            **dict(zip(("id3", "id4", "id5"), lines, strict=True)),
+            **{"mode_n": mode + 1, "freq": float(frequency), "modal_m": 1.0},
+            **{"modal_damp_vis": float(item.arrays["damping_ratio"][mode]), "modal_damp_his": 0.0},
+            **{
+                "node_nums": [degrees[channel.name][0] for channel in channels],
+                "r1": nothing,
+                "r2": nothing,
+                "r3": shape,
+            },
+        }
+
+
+def _refused(item: Contents) -> Iterator[dict[str, Any]]:
+    raise RecordingError(f"a {item.kind} has no form in universal files; choose mat or csv")
+
+
+_DATASETS = {
+    "backbone": _table,
+    "frequency-responses": _frequency_responses,
+    "frequency-response-matrix": _response_matrix,
+    "linear-modes": _modes,
+    "nonlinear-mode": _table,
+    "sweep": _refused,
+    "time-data": _time_data,
+}

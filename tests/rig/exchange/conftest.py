@@ -1,0 +1,94 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rig
+from identification import Channel, FrequencyResponse, FrequencyResponseMatrix, LinearModes, nonlinear_mode
+from rig.campaigns.plans import load_plan, plan_from
+
+CHANNELS = (
+    Channel("acc_drive", "drive", "m/s2"),
+    Channel("tip, left", "response", "m/s2"),
+    Channel("v", "response", "m/s"),
+)
+
+
+@pytest.fixture(scope="session")
+def backbone_file(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("exchange") / "backbone.h5"
+    table = load_plan("magnet-beam/backbone").model_dump(mode="json") | {"levels_v": [0.4, 0.8], "record_periods": 8}
+    rig.run(plan_from(table, "test"), output=path).close()
+    return path
+
+
+@pytest.fixture(scope="session")
+def multisine_file(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("exchange") / "multisine.h5"
+    table = {
+        **{"kind": "multisine", "bench": "magnet-beam", "levels_rms_v": [0.05, 0.1], "realisations": 2, "periods": 2},
+        **{"lowest_hz": 22.0, "highest_hz": 28.0, "resolution_hz": 0.5, "transient_periods": 2},
+    }
+    rig.run(plan_from(table, "test"), output=path).close()
+    return path
+
+
+@pytest.fixture(scope="session")
+def backbone(backbone_file):
+    with rig.Recording(backbone_file) as recording:
+        return rig.measurements.backbone(recording)
+
+
+@pytest.fixture(scope="session")
+def mode(backbone):
+    return nonlinear_mode(backbone)
+
+
+@pytest.fixture(scope="session")
+def matrix() -> FrequencyResponseMatrix:
+    random = np.random.default_rng(1)
+    lines = 10.0 + 0.05 * np.arange(401)
+    value = random.normal(size=(401, 3, 2)) + 1j * random.normal(size=(401, 3, 2))
+    return FrequencyResponseMatrix(
+        outputs=CHANNELS,
+        inputs=(Channel("force", "force", "N"), Channel("voltage", "monitor", "V")),
+        frequency_hz=lines,
+        value=value,
+        noise_covariance=np.tile(np.eye(6) + 0.1j, (401, 1, 1)),
+        estimator="instrument",
+        input_rms=(0.3, 0.1),
+        specimen="beam",
+        notes=("a remark",),
+    )
+
+
+@pytest.fixture(scope="session")
+def modes() -> LinearModes:
+    return LinearModes(
+        channels=CHANNELS,
+        frequency_hz=[24.1234567, 151.7, 430.0],
+        frequency_std_hz=[1e-3, 2e-3, np.nan],
+        damping_ratio=[0.0041, 0.002, 0.0013],
+        damping_ratio_std=[1e-5, np.nan, 1e-5],
+        shapes=[[0.9, 1.1, 0.5], [1.4, -1.2, 0.1], [-0.3, 0.123456789, 0.7]],
+        shapes_std=np.full((3, 3), 1e-3),
+        phase_collinearity=[1.0, 0.99, np.nan],
+        lower=[1 + 2j, 3.0, 4.0],
+        upper=[1e-6j, 0.0, 1e-7],
+        lowest_hz=10.0,
+        highest_hz=500.0,
+        force_rms_n=0.2,
+        specimen="beam",
+        notes=("first", "second"),
+    )
+
+
+@pytest.fixture(scope="session")
+def responses() -> tuple[FrequencyResponse, ...]:
+    frequency = np.array([23.1, 23.912345678, 24.0, 24.5, 24.3])
+    force = np.array([1.0, 0.2 + 0.1j, 0.5j, 0.3, 0.4])
+    motion = force * np.array([1.0, 30.0 - 2j, 40j, -20.0, 5.0])
+    return (
+        FrequencyResponse(frequency, force, motion, "acceleration", "force", 0.5, "0.5 N", "beam"),
+        FrequencyResponse(frequency[:3], force[:3], motion[:3], "acceleration", "response", 5.0, "5 m/s2", "beam"),
+    )

@@ -1,0 +1,137 @@
+"""What is written in another format is what is read back."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification import NonlinearMode
+from rig.exchange.export import write_contents
+from rig.exchange.kinds import KINDS, put_together, taken_apart
+from rig.exchange.mat import read_mat, structures_of_ours
+from rig.exchange.reading import import_file
+from rig.exchange.time_data import TimeData
+from tests.rig.exchange.conftest import CHANNELS
+
+NAMES = ("backbone", "mode", "matrix", "modes", "responses")
+
+
+def assert_same(found: Any, expected: Any, rtol: float = 0.0) -> None:
+    assert type(found) is type(expected)
+    if isinstance(expected, tuple | list):
+        assert len(found) == len(expected)
+        for one, other in zip(found, expected, strict=True):
+            assert_same(one, other, rtol)
+    elif hasattr(expected, "__dataclass_fields__"):
+        for field in fields(expected):
+            assert_same(getattr(found, field.name), getattr(expected, field.name), rtol)
+    elif isinstance(expected, np.ndarray):
+        assert found.shape == expected.shape
+        np.testing.assert_allclose(found, expected, rtol=rtol, atol=rtol * np.nanmax(np.abs(expected), initial=0.0))
+    elif isinstance(expected, float):
+        assert found == pytest.approx(expected, rel=rtol, abs=0.0, nan_ok=True)
+    else:
+        assert found == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("format_", ["mat", "csv"])
+def test_mat_and_csv_give_back_every_bit(name, format_, request, tmp_path):
+    value = request.getfixturevalue(name)
+    path = tmp_path / f"out.{format_}"
+    write_contents([taken_apart(value)], path, format_)
+    assert_same(import_file(path), value)
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_parts_of_an_object_make_it_again(name, request):
+    value = request.getfixturevalue(name)
+    contents = taken_apart(value)
+    assert_same(put_together(contents.kind, contents.arrays, contents.attributes), value)
+
+
+def test_a_single_point_or_mode_keeps_its_dimensions(mode, tmp_path):
+    arrays, attributes = mode.to_arrays()
+    single = NonlinearMode.from_arrays({name: array[:1] for name, array in arrays.items()}, attributes)
+    for format_ in ("mat", "csv"):
+        path = tmp_path / f"one.{format_}"
+        write_contents([taken_apart(single)], path, format_)
+        assert_same(import_file(path), single)
+
+
+def test_universal_files_keep_frequency_responses_to_twelve_digits(matrix, tmp_path):
+    path = tmp_path / "matrix.uff"
+    write_contents([taken_apart(matrix)], path, "uff")
+    found = import_file(path)
+    np.testing.assert_allclose(found.value, matrix.value, rtol=2e-12, atol=1e-11)
+    np.testing.assert_allclose(found.frequency_hz, matrix.frequency_hz, rtol=1e-12)
+    assert found.outputs == matrix.outputs
+    assert found.inputs == matrix.inputs
+    assert (found.estimator, found.specimen) == ("instrument", "beam")
+
+
+def test_universal_files_keep_modes_to_six_digits(modes, tmp_path):
+    path = tmp_path / "modes.unv"
+    write_contents([taken_apart(modes)], path, "uff")
+    found = import_file(path)
+    assert found.channels == modes.channels
+    for name in ("frequency_hz", "damping_ratio", "shapes"):
+        np.testing.assert_allclose(getattr(found, name), getattr(modes, name), rtol=6e-6)
+
+
+def test_universal_files_keep_stepped_sines_but_for_digits_of_the_frequency(responses, tmp_path):
+    path = tmp_path / "levels.uff"
+    write_contents([taken_apart(responses)], path, "uff")
+    assert_same(import_file(path), responses, rtol=5e-6)
+    found = import_file(path)
+    np.testing.assert_allclose(found[0].force, responses[0].force, rtol=1e-11)
+
+
+@pytest.mark.parametrize("rate_hz", [5000.0, 51200.0, 1000.0 / 3.0])
+def test_time_data_of_universal_files_is_exact_and_so_is_its_rate(tmp_path, rate_hz):
+    from rig.exchange.uff.reading import read_uff, time_data_in
+
+    samples = np.random.default_rng(0).normal(size=(3, 1000))
+    path = tmp_path / "time.uff"
+    write_contents([taken_apart(TimeData(CHANNELS, samples, rate_hz, point=4))], path, "uff")
+    data = time_data_in(read_uff(path))
+    assert data["sample_rate_hz"] == rate_hz
+    for channel, expected in zip(CHANNELS, samples, strict=True):
+        np.testing.assert_array_equal(data[channel.name][:, 0], expected)
+        assert data["units"][channel.name] == channel.unit
+
+
+@pytest.mark.parametrize("format_", ["mat", "csv"])
+def test_time_data_is_kept_with_its_channels(tmp_path, format_):
+    data = TimeData(CHANNELS, np.random.default_rng(0).normal(size=(3, 50)), 5000.0, point=2, specimen="beam")
+    path = tmp_path / f"time.{format_}"
+    write_contents([taken_apart(data)], path, format_)
+    assert_same(import_file(path), data)
+
+
+def test_several_objects_are_a_structure_array_of_which_one_is_chosen(matrix, tmp_path):
+    path = tmp_path / "levels.mat"
+    other = matrix.select(["v"])
+    write_contents([taken_apart(matrix), taken_apart(other)], path, "mat")
+    assert len(structures_of_ours(read_mat(path))) == 2
+    assert_same(import_file(path, item=1), matrix)
+    assert_same(import_file(path, item=2), other)
+
+
+def test_every_kind_has_a_name_of_its_own():
+    assert len({kind.name for kind in KINDS}) == len({kind.type for kind in KINDS}) == len(KINDS)
+
+
+def test_numbers_of_a_table_are_those_that_numpy_reads(backbone, tmp_path):
+    path = Path(tmp_path / "backbone.csv")
+    write_contents([taken_apart(backbone)], path, "csv")
+    names = path.read_text().splitlines()[2].split(",")
+    table = np.loadtxt(path, delimiter=",", skiprows=4)
+    np.testing.assert_array_equal(table[:, names.index("force_n")], backbone.force_n)
+    row = names.index(f"harmonics[{backbone.channels[0].name}:1].re")
+    np.testing.assert_array_equal(
+        table[:, row] + 1j * table[:, row + 1], [point.harmonics[0, 1] for point in backbone.points]
+    )
