@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from identification.prediction.recorded_force import recorded_force_response
     from identification.prediction.steady_prediction import SteadyPrediction
     from identification.prediction.sweep_prediction import SweepPrediction
+    from identification.prediction.uncertainty import ResponseBand, response_band
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -75,6 +76,7 @@ __all__ = [
     "PredictionError",
     "Predictions",
     "Repeatability",
+    "ResponseBand",
     "ResponseMatrixMapping",
     "SteadyPrediction",
     "SweepPrediction",
@@ -101,6 +103,7 @@ __all__ = [
     "periodic_vibration",
     "recorded_force_response",
     "repeatability",
+    "response_band",
     "single_point_mode",
     "steady_predictions",
     "stepped_sine_mode",
@@ -135,6 +138,7 @@ _MODULE_OF = {
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
+    "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
@@ -161,6 +165,7 @@ _MODULE_OF = {
     "periodic_vibration": "signals.fourier",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
+    "response_band": "prediction.uncertainty",
     "single_point_mode": "nonlinear.single_points",
     "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
