@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
-    from identification.linear.modal_analysis import ModalAnalysis
+    from identification.linear.analysis import ModalAnalysis
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.mapping.backbone import BackboneMapping, map_backbone
@@ -126,7 +126,7 @@ _MODULE_OF = {
     "IdentificationError": "errors",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
-    "ModalAnalysis": "linear.modal_analysis",
+    "ModalAnalysis": "linear.analysis",
     "ModalProperties": "prediction.properties",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
