@@ -19,7 +19,7 @@ Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
 _ORDERS = tuple(range(2, 41, 2))
-_LARGEST_DAMPING = 0.2
+_LARGEST_DAMPING = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,7 +65,7 @@ class StabilisationDiagram:
         """bool[n]: physical, and stable in frequency, damping and shape."""
         return np.asarray(self.physical & self.shape_stable)
 
-    def columns(self, *, share: float = 0.35) -> NDArray[np.int64]:
+    def columns(self, *, share: float = 0.5) -> NDArray[np.int64]:
         """int[n_modes]: the pole of highest order of every column of stable poles, lowest frequency first.
 
         Poles are of one column where their frequencies differ by less than 1 %, or by less than a tenth of it where their
