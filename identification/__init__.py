@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
+    from identification.linear.analysis import ModalAnalysis
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.mapping.backbone import BackboneMapping, map_backbone
@@ -23,12 +24,25 @@ if TYPE_CHECKING:
     from identification.mapping.response_matrix import ResponseMatrixMapping, map_response_matrix
     from identification.mapping.stepped_sine import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
+    from identification.multisine.best_linear_approximation import best_linear_approximation
+    from identification.multisine.coherences import coherence
     from identification.multisine.design import MultisineDesign
+    from identification.multisine.distortion import DistortionLevels, distortion_levels
     from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
     from identification.nonlinear.mode_shapes import ModeShapes, mac
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
+    from identification.nonlinear.repeatability import Repeatability, combined, repeatability
+    from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
+    from identification.prediction.frequency_response import frequency_response, steady_predictions
+    from identification.prediction.predictions import Predictions
+    from identification.prediction.properties import ExtrapolationError, ModalProperties
+    from identification.prediction.recorded_force import recorded_force_response
+    from identification.prediction.steady_prediction import SteadyPrediction
+    from identification.prediction.sweep_prediction import SweepPrediction
+    from identification.prediction.uncertainty import ResponseBand, response_band
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -39,6 +53,9 @@ __all__ = [
     "Backbone",
     "BackboneMapping",
     "Channel",
+    "Comparison",
+    "DistortionLevels",
+    "ExtrapolationError",
     "ForceDropOut",
     "FrequencyResponse",
     "FrequencyResponseMapping",
@@ -47,6 +64,8 @@ __all__ = [
     "IdentificationError",
     "InstrumentResponse",
     "LinearModes",
+    "ModalAnalysis",
+    "ModalProperties",
     "ModeShapes",
     "MultisineDesign",
     "MultisineMapping",
@@ -54,11 +73,24 @@ __all__ = [
     "NonlinearModeMapping",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "PredictionError",
+    "Predictions",
+    "Repeatability",
+    "ResponseBand",
     "ResponseMatrixMapping",
+    "SteadyPrediction",
+    "SweepPrediction",
     "Transient",
+    "best_linear_approximation",
+    "coherence",
+    "combined",
+    "compare",
     "decimated",
     "demodulate",
+    "distortion_levels",
+    "error_table",
     "force_drop_out",
+    "frequency_response",
     "mac",
     "map_backbone",
     "map_frequency_responses",
@@ -69,6 +101,11 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "recorded_force_response",
+    "repeatability",
+    "response_band",
+    "single_point_mode",
+    "steady_predictions",
     "stepped_sine_mode",
     "unpack_frequency_responses",
     "zero_crossings",
@@ -78,6 +115,9 @@ _MODULE_OF = {
     "Backbone": "backbones",
     "BackboneMapping": "mapping.backbone",
     "Channel": "channels",
+    "Comparison": "prediction.comparison",
+    "DistortionLevels": "multisine.distortion",
+    "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping.stepped_sine",
@@ -86,6 +126,8 @@ _MODULE_OF = {
     "IdentificationError": "errors",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
+    "ModalAnalysis": "linear.analysis",
+    "ModalProperties": "prediction.properties",
     "ModeShapes": "nonlinear.mode_shapes",
     "MultisineDesign": "multisine.design",
     "MultisineMapping": "mapping.multisine",
@@ -93,11 +135,24 @@ _MODULE_OF = {
     "NonlinearModeMapping": "mapping.nonlinear_mode",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "PredictionError": "prediction.comparison",
+    "Predictions": "prediction.predictions",
+    "Repeatability": "nonlinear.repeatability",
+    "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
+    "SteadyPrediction": "prediction.steady_prediction",
+    "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
+    "best_linear_approximation": "multisine.best_linear_approximation",
+    "coherence": "multisine.coherences",
+    "combined": "nonlinear.repeatability",
+    "compare": "prediction.comparison",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
+    "distortion_levels": "multisine.distortion",
+    "error_table": "prediction.comparison",
     "force_drop_out": "signals.sweeps",
+    "frequency_response": "prediction.frequency_response",
     "mac": "nonlinear.mode_shapes",
     "map_backbone": "mapping.backbone",
     "map_frequency_responses": "mapping.stepped_sine",
@@ -108,6 +163,11 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "recorded_force_response": "prediction.recorded_force",
+    "repeatability": "nonlinear.repeatability",
+    "response_band": "prediction.uncertainty",
+    "single_point_mode": "nonlinear.single_points",
+    "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
     "unpack_frequency_responses": "frequency_responses",
     "zero_crossings": "signals.half_periods",

@@ -100,3 +100,9 @@ class Backbone:
     def settled(self) -> "Backbone":
         """Backbone of the settled points alone."""
         return self.select([point.settled for point in self.points])
+
+    def passes(self) -> tuple["Backbone", ...]:
+        """One backbone per pass through the levels, by direction and repeat, in the order of their first points."""
+        count = len(self.points)
+        labels = list(zip(self.directions or ("",) * count, self.repeats or (0,) * count, strict=True))
+        return tuple(self.select([label == one for label in labels]) for one in dict.fromkeys(labels))

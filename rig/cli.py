@@ -9,7 +9,9 @@ import typer
 
 from rig.cli_analyse import app as analyse_app
 from rig.cli_exchange import export_, import_
+from rig.cli_identify import identify, predict
 from rig.cli_list import list_
+from rig.cli_options import Json, Output, Overwrite, Realtime
 
 __all__ = ["app", "main"]
 
@@ -21,11 +23,6 @@ app = typer.Typer(
 
 app.add_typer(analyse_app, name="analyse")
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
-Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
-Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
-
 
 @app.callback()
 def _common(
@@ -35,6 +32,8 @@ def _common(
 
 
 app.command("list")(list_)
+app.command()(identify)
+app.command()(predict)
 app.command("import")(import_)
 app.command("export")(export_)
 
@@ -121,50 +120,13 @@ def show(
         print_summary(summary)
 
 
-@app.command()
-def identify(
-    file: Annotated[Path, typer.Argument(help="Backbone recording or imported frequency responses.")],
-    output: Output,
-    model: Annotated[str, typer.Option(help="Kind of model: nonlinear-mode.")] = "nonlinear-mode",
-    overwrite: Overwrite = False,
-    json: Json = False,
-) -> None:
-    """Turn a recording into a model."""
-    from rig.console import print_json
-    from rig.errors import ConfigurationError
-    from rig.models import NONLINEAR_MODE, identify_nonlinear_mode, save_model
-    from rig.summary import summarise
-    from rig.tables import print_summary
-
-    if model != NONLINEAR_MODE:
-        raise ConfigurationError(f"--model = {model!r}: allowed is {NONLINEAR_MODE}")
-    _keep_existing(file, output, overwrite)
-    save_model(identify_nonlinear_mode(file), output)
-    summary = summarise(output)
-    if json:
-        print_json(summary)
-    else:
-        print_summary(summary)
-
-
-def _keep_existing(source: Path, output: Path, overwrite: bool) -> None:
-    from rig.errors import RecordingError
-
-    if output.is_dir():
-        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
-    if output.exists() and source.exists() and output.samefile(source):
-        raise RecordingError(f"{output}: is the file that is read; choose another name")
-    if output.exists() and not overwrite:
-        raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")
-
-
 @app.command("plot")
 def plot_(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
 ) -> None:
     """Draw what is in a file."""
-    from rig.figures import plot
+    from rig.figures.draw import plot
 
     plot(file, output)
 

@@ -1,11 +1,19 @@
 """Recordings as measurements in memory, the form that `identification` takes."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from identification import Backbone, FrequencyResponse, IdentificationError, PeriodicSpectra, Transient
+from identification import (
+    Backbone,
+    FrequencyResponse,
+    FrequencyResponseMatrix,
+    IdentificationError,
+    PeriodicSpectra,
+    Transient,
+    best_linear_approximation,
+)
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import backbone_of
@@ -17,7 +25,16 @@ from rig.configuration import validated
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
-__all__ = ["backbone", "frequency_responses", "load_backbone", "point_rows", "spectra", "sweeps"]
+__all__ = [
+    "backbone",
+    "bench_of_recording",
+    "frequency_responses",
+    "load_backbone",
+    "point_rows",
+    "response_matrices",
+    "spectra",
+    "sweeps",
+]
 
 
 def backbone(recording: Recording) -> Backbone:
@@ -26,7 +43,7 @@ def backbone(recording: Recording) -> Backbone:
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
     _expect(recording, "backbone")
-    bench = _bench(recording)
+    bench = bench_of_recording(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
     return backbone_of(
         _by_number(recording).values(),
@@ -43,7 +60,9 @@ def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
     _expect(recording, "stepped-sine")
-    return frequency_responses_of(_by_number(recording).values(), recording.channels, _bench(recording).specimen.name)
+    return frequency_responses_of(
+        _by_number(recording).values(), recording.channels, bench_of_recording(recording).specimen.name
+    )
 
 
 def sweeps(recording: Recording) -> dict[int, Transient]:
@@ -52,7 +71,7 @@ def sweeps(recording: Recording) -> dict[int, Transient]:
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any sweep.
     """
     _expect(recording, "sweep")
-    bench = _bench(recording)
+    bench = bench_of_recording(recording)
     return {number: transient_of(bench, point_rows(recording, number)) for number in _accepted(recording)}
 
 
@@ -62,12 +81,26 @@ def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
     """
     _expect(recording, "multisine")
-    bench = _bench(recording)
+    bench = bench_of_recording(recording)
     plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
     levels: dict[float, dict[int, np.ndarray]] = {}
     for number, point in _accepted(recording).items():
         levels.setdefault(point["level"], {})[point["realisation"]] = point_rows(recording, number)
     return {level: spectra_of(bench, plan, records) for level, records in levels.items()}
+
+
+def response_matrices(
+    recording: Recording, *, estimator: Literal["instrument", "H1", "H2"] = "instrument"
+) -> dict[float, FrequencyResponseMatrix]:
+    """Frequency responses from the force to every motion, by level (V RMS), with their covariance.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
+    """
+    specimen = bench_of_recording(recording).specimen.name
+    return {
+        level: best_linear_approximation(measured, estimator=estimator, specimen=specimen)
+        for level, measured in spectra(recording).items()
+    }
 
 
 def point_rows(recording: Recording, number: int) -> np.ndarray:
@@ -95,7 +128,8 @@ def _expect(recording: Recording, kind: str) -> None:
         raise RecordingError(f"the recording is a {recording.kind}, wanted is a {kind}")
 
 
-def _bench(recording: Recording) -> Bench:
+def bench_of_recording(recording: Recording) -> Bench:
+    """The bench as it was."""
     return validated(Bench, recording.configuration["bench"], "bench of the recording")
 
 

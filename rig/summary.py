@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from rig.campaigns.kinds import KINDS
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
-from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
+from rig.models.files import KINDS, load
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
@@ -20,8 +20,8 @@ QUALITY = ("settled", "accepted", "reason", "periods", "settle_periods", "warnin
 def summarise(path: Path) -> dict[str, Any]:
     """What a recording, an imported measurement or a model holds; `RecordingError` where it is none of them."""
     kind = kind_of(path)
-    if kind in (NONLINEAR_MODE, FREQUENCY_RESPONSES):
-        return _summarise_arrays(path, kind)
+    if kind in KINDS:
+        return {"kind": kind, **KINDS[kind].summarise(load(path))}
     with Recording(path) as recording:
         return summarise_recording(recording)
 
@@ -61,7 +61,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
 
 def _shown(point: dict[str, Any], kind: str) -> dict[str, Any]:
     """A point without what is bulky; what a failed one does not have is None."""
-    expected = dict.fromkeys([*(column.key for column in KINDS[kind].columns), *QUALITY])
+    expected = dict.fromkeys([*(column.key for column in CAMPAIGNS[kind].columns), *QUALITY])
     return {**expected, **{key: value for key, value in point.items() if key not in BULKY}}
 
 
@@ -77,29 +77,4 @@ def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, An
         "wall_s": wall,
         "realtime_factor": samples / rate_hz / busy if busy > 0 else None,
         "end_to_end_factor": samples / rate_hz / wall if wall > 0 else None,
-    }
-
-
-def _summarise_arrays(path: Path, kind: str) -> dict[str, Any]:
-    if kind == NONLINEAR_MODE:
-        model = load_model(path)
-        return {
-            "kind": kind,
-            "specimen": model.specimen,
-            "source": model.source,
-            "frequency_shift": model.frequency_shift,
-            "points": model.table(),
-            "notes": list(model.notes),
-        }
-    return {
-        "kind": kind,
-        "responses": [
-            {
-                "label": response.label,
-                "samples": int(response.frequency_hz.size),
-                "lowest_hz": float(response.frequency_hz.min()),
-                "highest_hz": float(response.frequency_hz.max()),
-            }
-            for response in load_frequency_responses(path)
-        ],
     }

@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from rig.campaigns.kinds import KINDS
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.console import number, print_table
+from rig.models.files import KINDS
 
 __all__ = ["print_summary", "say_how_it_ended"]
 
@@ -25,23 +26,15 @@ def say_how_it_ended(summary: dict[str, Any]) -> None:
 
 def print_summary(summary: dict[str, Any]) -> None:
     """What `rig.summary.summarise` found in a file."""
-    if "responses" in summary:
-        print(f"{summary['kind']}: {len(summary['responses'])} levels")
-        print_table(
-            ("level", "samples", "from Hz", "to Hz"),
-            [
-                (r["label"], str(r["samples"]), number(r["lowest_hz"], ".2f"), number(r["highest_hz"], ".2f"))
-                for r in summary["responses"]
-            ],
-        )
-        return
     print(f"{summary['kind']} of {summary['specimen'] or 'an unnamed specimen'}")
-    if "loop" not in summary:
-        _print_mode(summary)
+    if summary["kind"] in KINDS:
+        KINDS[summary["kind"]].say(summary)
+        for note in summary["notes"]:
+            print(f"note: {note}")
         return
     loop = summary["loop"]
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
-    columns = KINDS[summary["kind"]].columns
+    columns = CAMPAIGNS[summary["kind"]].columns
     print_table(
         ("level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality"),
         [
@@ -65,25 +58,3 @@ def print_summary(summary: dict[str, Any]) -> None:
     print(line)
     for index, part in enumerate(summary["parts"]):
         print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}")
-
-
-def _print_mode(summary: dict[str, Any]) -> None:
-    print_table(
-        ("force N", "amplitude mm", "modal frequency Hz", "+-", "damping %", "+-", "all harmonics %", "phase lag deg"),
-        [
-            (
-                number(p["force_n"], ".4f"),
-                number(p["amplitude_m"], ".5f", 1e3),
-                number(p["modal_frequency_hz"], ".4f"),
-                number(p["modal_frequency_std_hz"], ".4f", 1.96),
-                number(p["damping_ratio"], ".4f", 100.0),
-                number(p["damping_ratio_std"], ".4f", 196.0),
-                number(p["damping_ratio_total_power"], ".4f", 100.0),
-                number(p["phase_lag_deg"], ".2f"),
-            )
-            for p in summary["points"]
-        ],
-    )
-    print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
-    for note in summary["notes"]:
-        print(f"note: {note}")

@@ -2,10 +2,12 @@
 
 The accelerance is, with ``s = i W``,
 
-    H_o(s) = sum_k phi_ok phi_dk s^2 / (s^2 + 2 z_k w_k s + w_k^2) + L_o + U_o s^2,
+    H_o(s) = sum_k phi_ok phi_dk s^2 / (s^2 + 2 z_k w_k s + w_k^2) + L_o + U_o s^2 / (1 + s^2 / w_u^2),
 
 phi mass-normalised shapes at the channel o and at the drive point d, L_o what lower modes and rigid-body motion leave
-in the band (inertia), U_o what higher modes leave (stiffness).
+in the band (inertia), U_o what higher modes leave (stiffness, growing towards the
+nearest of them, at w_u; a plain stiffness where w_u is infinite). Complex residues ``rho_ok`` in place of ``phi_ok phi_dk`` turn
+a term into ``s^2 (a + b s) / (s^2 + 2 z w s + w^2)`` with ``rho = a + b p`` at the pole ``p = -z w + i w sqrt(1 - z^2)``.
 """
 
 from collections.abc import Mapping
@@ -29,7 +31,8 @@ Float = NDArray[np.float64]
 _POLES = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "phase_collinearity")
 _SHAPES = ("shapes", "shapes_std")
 _RESIDUALS = ("lower", "upper")
-_SCALARS = ("lowest_hz", "highest_hz", "force_rms_n", "fit_residual")
+_OPTIONAL = ("covariance", "residues")
+_SCALARS = ("lowest_hz", "highest_hz", "upper_hz", "force_rms_n", "fit_residual")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,8 +55,15 @@ class LinearModes:
         complex[n_channels], residual terms L (1/kg) and U (s^2/kg) of the accelerance.
     lowest_hz, highest_hz
         Band that the model was fitted in.
+    upper_hz
+        ``w_u / 2 pi``, above the band.
     force_rms_n
         RMS of the force in that band, the level of the test; 0 where it was extrapolated to zero, NaN if unknown.
+    covariance
+        float[m, m] of ``(frequency_hz, damping_ratio, shapes row by row)``; None if unknown.
+    residues
+        complex[n_channels, n_modes], residues rho (1/kg) where they were fitted as complex; None for normal modes, where
+        they are ``phi_o phi_d``.
     fit_residual
         Root of the mean square of misfit over expected error; 1 where nothing but noise is left; NaN if unknown.
     specimen
@@ -79,8 +89,11 @@ class LinearModes:
     upper: Complex
     lowest_hz: float
     highest_hz: float
+    upper_hz: float = np.inf
     force_rms_n: float = np.nan
     fit_residual: float = np.nan
+    covariance: Float | None = None
+    residues: Complex | None = None
     specimen: str = ""
     notes: tuple[str, ...] = ()
 
@@ -89,12 +102,17 @@ class LinearModes:
         object.__setattr__(self, "notes", tuple(self.notes))
         self.drive_row  # noqa: B018 (refuses channels without a drive point)
         modes, rows = np.size(self.frequency_hz), len(self.channels)
+        parameters = modes * (2 + rows)
         for names, shape, dtype in (
             (_POLES, (modes,), np.float64),
             (_SHAPES, (rows, modes), np.float64),
             (_RESIDUALS, (rows,), np.complex128),
+            (("covariance",), (parameters, parameters), np.float64),
+            (("residues",), (rows, modes), np.complex128),
         ):
             for name in names:
+                if name in _OPTIONAL and getattr(self, name) is None:
+                    continue
                 array = np.array(getattr(self, name), dtype=dtype)
                 if array.shape != shape:
                     raise IdentificationError(f"{name}: shape {array.shape}, needs {shape}")
@@ -133,11 +151,15 @@ class LinearModes:
         s = 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))[:, None]
         omega = 2.0 * np.pi * self.frequency_hz
         modal = s**2 / (s**2 + 2.0 * self.damping_ratio * omega * s + omega**2)
-        residues = self.shapes * self.drive_shape
         if without is not None:
-            residues = np.delete(residues, without, axis=1)
-            modal = np.delete(modal, without, axis=1)
-        return np.asarray(modal @ residues.T + self.lower + self.upper * s**2)
+            modal[:, without] = 0.0
+        if self.residues is None:
+            modes = modal @ (self.shapes * self.drive_shape).T
+        else:
+            slope = self.residues.imag / (omega * np.sqrt(1.0 - self.damping_ratio**2))
+            constant = self.residues.real + slope * self.damping_ratio * omega
+            modes = modal @ constant.T + (s * modal) @ slope.T
+        return np.asarray(modes + self.lower + self.upper * s**2 / (1.0 + (s / (2.0 * np.pi * self.upper_hz)) ** 2))
 
     def receptance(self, frequency_hz: ArrayLike, output: str | None = None, *, without: int | None = None) -> Complex:
         """complex[n]: displacement of a channel (the drive point if None) over drive force, m/N."""
@@ -172,6 +194,7 @@ class LinearModes:
         """Arrays by name, and the attributes (ready for JSON) that go with them."""
         arrays = {name: getattr(self, name) for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
         arrays |= {name: np.array(getattr(self, name)) for name in _SCALARS}
+        arrays |= {name: getattr(self, name) for name in _OPTIONAL if getattr(self, name) is not None}
         channels = [vars(channel) for channel in self.channels]
         return arrays, {"channels": channels, "specimen": self.specimen, "notes": list(self.notes)}
 
@@ -181,7 +204,8 @@ class LinearModes:
         try:
             channels = tuple(Channel(**channel) for channel in attributes["channels"])
             values: dict[str, Any] = {name: arrays[name] for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
-            values |= {name: float(arrays[name]) for name in _SCALARS}
+            values |= {name: float(arrays[name]) for name in _SCALARS if name in arrays or name != "upper_hz"}
+            values |= {name: arrays.get(name) for name in _OPTIONAL}
             return cls(channels=channels, **values, specimen=attributes["specimen"], notes=tuple(attributes["notes"]))
         except (KeyError, TypeError) as error:
             raise IdentificationError(f"linear modes: {error} is missing or unknown") from None

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +96,17 @@ class FrequencyResponseMatrix:
         if covariance is None:
             return np.full(self.value.shape, np.nan)
         return np.asarray(np.sqrt(np.einsum("kii->ki", covariance).real).reshape(self.value.shape))
+
+    def covariance(self, kind: Literal["noise", "total"]) -> Complex:
+        """complex[n_lines, m, m]: ``noise_covariance`` or ``total_covariance``; raises `IdentificationError` if unknown."""
+        found = {"noise": self.noise_covariance, "total": self.total_covariance}
+        if kind not in found:
+            raise IdentificationError(f"kind: is '{kind}', allowed are noise, total")
+        covariance = found[kind]
+        if covariance is None:
+            needed = {"noise": "two periods or more", "total": "two realisations or more"}[kind]
+            raise IdentificationError(f"{kind}_covariance: is unknown, a measurement of {needed} has it")
+        return covariance
 
     def path(self, output: str, input: str | None = None) -> Complex:
         """complex[n_lines]: response of ``output`` to ``input`` (the first input if None)."""

@@ -7,18 +7,17 @@ N samples is ``u(n) = sum_k A_k cos(2 pi k n / N + phi_k)`` with ``phi_k`` even 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from identification.multisine.grids import Grid, check_grid, excited_lines
 from identification.validation import finite_array, positive
 
-__all__ = ["Grid", "MultisineDesign"]
+__all__ = ["MultisineDesign"]
 
 Float = NDArray[np.float64]
-Grid = Literal["full", "odd"]
 
 _ROUNDING = 1e-9
 _LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte
@@ -37,11 +36,16 @@ class MultisineDesign:
     lowest_hz, highest_hz
         Band of the excited lines, both ends included.
     grid
-        ``full`` excites every line of the band, ``odd`` the odd multiples of the resolution only.
+        ``full`` excites every line of the band, ``odd`` the odd multiples of the resolution only, ``odd-random`` these but
+        for one of every ``detection_group`` in turn. What is not excited is a detection line.
     rms
         RMS of `realisation`, in the unit of whatever is played.
     relative_amplitudes
         Amplitudes of the excited lines against each other; None for a flat spectrum.
+    detection_group
+        Odd lines of a group, of which ``odd-random`` leaves out one.
+    grid_seed
+        Seed that chooses it: the same lines in all realisations, so that their spectra can be averaged.
 
     Raises
     ------
@@ -56,6 +60,8 @@ class MultisineDesign:
     grid: Grid = "full"
     rms: float = 1.0
     relative_amplitudes: tuple[float, ...] | None = None
+    detection_group: int = 4
+    grid_seed: int = 0
 
     def __post_init__(self) -> None:
         for name in ("sample_rate_hz", "lowest_hz", "highest_hz"):
@@ -63,8 +69,7 @@ class MultisineDesign:
         positive("rms", self.rms)
         if self.period_samples < 3:
             raise IdentificationError(f"period_samples: is {self.period_samples}, needs at least 3")
-        if self.grid not in get_args(Grid):
-            raise IdentificationError(f"grid: is '{self.grid}', allowed are {', '.join(get_args(Grid))}")
+        check_grid(self.grid, self.detection_group, self.grid_seed)
         if self.highest_hz < self.lowest_hz:
             raise IdentificationError(f"highest_hz: is {self.highest_hz:g} Hz, needs lowest_hz = {self.lowest_hz:g} Hz")
         if self.highest_hz >= 0.5 * self.sample_rate_hz:
@@ -73,9 +78,12 @@ class MultisineDesign:
                 f"{0.5 * self.sample_rate_hz:g} Hz"
             )
         if not self.lines.size:
+            group = (
+                f", of which it takes groups of {self.detection_group} odd ones" if self.grid == "odd-random" else ""
+            )
             raise IdentificationError(
                 f"lowest_hz, highest_hz: no line of the {self.grid} grid in {self.lowest_hz:g} to {self.highest_hz:g} Hz; "
-                f"lines are {self.resolution_hz:g} Hz apart"
+                f"lines are {self.resolution_hz:g} Hz apart{group}"
             )
         if self.relative_amplitudes is not None:
             self._check_amplitudes(self.relative_amplitudes)
@@ -101,6 +109,8 @@ class MultisineDesign:
         highest_hz: float,
         grid: Grid = "full",
         rms: float = 1.0,
+        detection_group: int = 4,
+        grid_seed: int = 0,
     ) -> "MultisineDesign":
         """A design by the distance of its lines; refused where a period is not a whole number of samples."""
         samples = positive("sample_rate_hz", sample_rate_hz, "Hz") / positive("resolution_hz", resolution_hz, "Hz")
@@ -114,7 +124,16 @@ class MultisineDesign:
                 f"resolution_hz: is {resolution_hz:g} Hz, a period has {samples:.4f} samples at {sample_rate_hz:g} Hz; "
                 f"needs a whole number, such as {sample_rate_hz / round(samples):.9g} Hz gives"
             )
-        return cls(sample_rate_hz, round(samples), lowest_hz, highest_hz, grid, rms)
+        return cls(
+            sample_rate_hz,
+            round(samples),
+            lowest_hz,
+            highest_hz,
+            grid,
+            rms,
+            detection_group=detection_group,
+            grid_seed=grid_seed,
+        )
 
     @property
     def resolution_hz(self) -> float:
@@ -136,7 +155,22 @@ class MultisineDesign:
     @cached_property
     def lines(self) -> NDArray[np.int64]:
         """int[n_lines]: the excited lines, as multiples of the resolution."""
-        return self.band_lines[self.band_lines % 2 == 1] if self.grid == "odd" else self.band_lines
+        return excited_lines(self.band_lines, self.grid, self.detection_group, self.grid_seed)
+
+    @property
+    def detection_lines_odd(self) -> NDArray[np.int64]:
+        """int[n]: odd lines of the band that are not excited, on which odd nonlinearity is heard."""
+        return np.asarray(np.setdiff1d(self.band_lines[self.band_lines % 2 == 1], self.lines))
+
+    @property
+    def detection_lines_even(self) -> NDArray[np.int64]:
+        """int[n]: even lines of the band that are not excited, on which even nonlinearity is heard."""
+        return np.asarray(np.setdiff1d(self.band_lines[self.band_lines % 2 == 0], self.lines))
+
+    @property
+    def folding_degree(self) -> int:
+        """Lowest degree of nonlinearity of which products lie above half the sample rate and fold back into the band."""
+        return int(np.ceil(self.sample_rate_hz / self.highest_hz - 1.0 - _ROUNDING))
 
     @property
     def frequency_hz(self) -> Float:
@@ -154,14 +188,34 @@ class MultisineDesign:
 
         Realisations of one seed are independent of each other, and none depends on how many are drawn.
         """
+        return np.asarray(self._signals(self._phases(seed, index, 1))[0])
+
+    def orthogonal_realisation(self, seed: int, index: int, n_inputs: int) -> Float:
+        """float[n_inputs, n_inputs, period_samples]: experiments of a block by signals of the inputs, each with RMS ``rms``.
+
+        Input i plays ``phi_i`` with ``exp(2 pi i i e / n_inputs)`` turned upon it in experiment e (the matrix of the discrete
+        Fourier transform): at every line the spectra of the experiments are orthogonal, so that the block can be inverted
+        without loss (Dobrowiecki and Schoukens, Automatica 43, 2007). With one input it is `realisation`.
+        """
+        if n_inputs < 1:
+            raise IdentificationError(f"n_inputs: is {n_inputs}, needs one or more")
+        turns = np.outer(np.arange(n_inputs), np.arange(n_inputs)) * (2.0 * np.pi / n_inputs)
+        phases = self._phases(seed, index, n_inputs)
+        return self._signals(phases + turns[:, :, None])
+
+    def _phases(self, seed: int, index: int, inputs: int) -> Float:
+        """float[inputs, n_lines], even over the circle."""
         for name, value in (("seed", seed), ("index", index)):
             if value < 0:
                 raise IdentificationError(f"{name}: is {value}, needs zero or more")
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
-        spectrum = np.zeros(self.period_samples // 2 + 1, dtype=np.complex128)
-        phases = random.uniform(0.0, 2.0 * np.pi, self.lines.size)
-        spectrum[self.lines] = 0.5 * self.period_samples * self.amplitudes * np.exp(1j * phases)
-        return np.fft.irfft(spectrum, self.period_samples)
+        return random.uniform(0.0, 2.0 * np.pi, (inputs, self.lines.size))
+
+    def _signals(self, phases: Float) -> Float:
+        """float[..., period_samples] from float[..., n_lines]."""
+        spectrum = np.zeros((*phases.shape[:-1], self.period_samples // 2 + 1), dtype=np.complex128)
+        spectrum[..., self.lines] = 0.5 * self.period_samples * self.amplitudes * np.exp(1j * phases)
+        return np.asarray(np.fft.irfft(spectrum, self.period_samples))
 
     def unit_peak(self, seed: int, index: int) -> Float:
         """float[period_samples]: the same period scaled to a largest absolute value of one."""

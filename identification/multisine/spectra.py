@@ -22,6 +22,8 @@ __all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
+_LOW_DEGREE = 3  # what a weak nonlinearity mostly makes
+
 
 @dataclass(frozen=True, eq=False)
 class InstrumentResponse:
@@ -56,14 +58,16 @@ class PeriodicSpectra:
     Parameters
     ----------
     channels
-        Exactly one of role ``force``; the voltage is a channel of role ``monitor``.
+        At least one of role ``force``; the voltage is a channel of role ``monitor``.
     frequency_hz
-        float[n_lines], every line of the band, excited or not.
+        float[n_lines], every line of the band, excited or not: neighbouring multiples of the resolution.
     excited
         bool[n_lines], whether the design excites the line.
     spectra
         complex[n_realisations, n_periods, n_channels, n_lines], peak, in the unit of each channel: ``y = Re sum Y_k
         exp(2 pi i f_k t)`` with t from the start of the period.
+    notes
+        What a user should know about these numbers, one line each.
 
     Raises
     ------
@@ -75,10 +79,13 @@ class PeriodicSpectra:
     frequency_hz: Float
     excited: NDArray[np.bool_]
     spectra: Complex
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
-        find_role(self.channels, "force")
+        object.__setattr__(self, "notes", tuple(self.notes))
+        if all(channel.role != "force" for channel in self.channels):
+            find_role(self.channels, "force")
         object.__setattr__(self, "frequency_hz", finite_array("frequency_hz", self.frequency_hz, np.float64, 1))
         object.__setattr__(self, "excited", finite_array("excited", self.excited, np.bool_, 1))
         object.__setattr__(self, "spectra", finite_array("spectra", self.spectra, np.complex128, 4))
@@ -92,6 +99,17 @@ class PeriodicSpectra:
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
         return find_name(self.channels, name)
+
+    @property
+    def even(self) -> NDArray[np.bool_]:
+        """bool[n_lines], whether a line is an even multiple of the resolution."""
+        steps = np.diff(self.frequency_hz)
+        if not steps.size or np.ptp(steps) > 1e-6 * steps[0]:
+            raise IdentificationError("frequency_hz: needs two lines or more, all neighbours equally far apart")
+        lines = self.frequency_hz / steps.mean()
+        if np.any(np.abs(lines - np.round(lines)) > 1e-3):
+            raise IdentificationError(f"frequency_hz: lines {steps[0]:g} Hz apart are no multiples of that")
+        return np.asarray(np.round(lines) % 2 == 0)
 
     @property
     def mean(self) -> Complex:
@@ -125,30 +143,19 @@ class PeriodicSpectra:
     ) -> InstrumentResponse:
         """Frequency response from ``input`` (the force if None) to ``output`` by ``S_yV / S_FV``.
 
-        The deviations are those of ``Y - H F`` to first order, so that noise common to both is counted rightly.
-        Raises `IdentificationError` where a channel is missing or the instrument does not move the input at a line.
+        One path of `best_linear_approximation`. Raises `IdentificationError` where a channel is missing or the instrument
+        does not move the input at a line.
         """
-        force = self.index(input) if input is not None else find_role(self.channels, "force")
-        rows = [self.index(output), force, self.index(instrument)]
-        y, f, v = np.moveaxis(self.spectra[:, :, rows][..., self.excited], 2, 0)
-        reference = np.conj(v.mean(axis=1))
-        cross = np.sum(f.mean(axis=1) * reference, axis=0)
-        if np.any(cross == 0.0):
-            where = self.frequency_hz[self.excited][int(np.argmax(cross == 0.0))]
-            raise IdentificationError(f"instrument '{instrument}': gives no input at {where:g} Hz")
-        value = np.sum(y.mean(axis=1) * reference, axis=0) / cross
-        residual = (y - value * f) * reference[:, None]
-        realisations, periods = residual.shape[:2]
-        means = residual.mean(axis=1)
-        noise = np.sum(np.abs(residual - means[:, None]) ** 2, axis=(0, 1)) / (periods * max(periods - 1, 1))
-        total = np.sum(np.abs(means) ** 2, axis=0) * realisations / max(realisations - 1, 1)
-        unknown = np.full(value.size, np.nan)
+        from identification.multisine.best_linear_approximation import best_linear_approximation
+
+        force = input if input is not None else self.channels[find_role(self.channels, "force")].name
+        found = best_linear_approximation(self, outputs=(output,), inputs=(force,), instruments=(instrument,))
         return InstrumentResponse(
-            frequency_hz=self.frequency_hz[self.excited],
-            value=value,
-            noise_std=np.sqrt(noise) / np.abs(cross) if periods > 1 else unknown,
-            total_std=np.sqrt(total) / np.abs(cross) if realisations > 1 else unknown,
-            unit=f"{self.channels[rows[0]].unit}/{self.channels[force].unit}",
+            frequency_hz=found.frequency_hz,
+            value=found.path(output),
+            noise_std=found.noise_std[:, 0, 0],
+            total_std=found.total_std[:, 0, 0],
+            unit=f"{found.outputs[0].unit}/{found.inputs[0].unit}",
         )
 
 
@@ -198,6 +205,18 @@ def periodic_spectra(
     return PeriodicSpectra(
         channels=tuple(channels),
         frequency_hz=np.asarray(design.band_lines * design.resolution_hz, dtype=np.float64),
-        excited=np.isin(design.band_lines, design.lines),
+        excited=np.isin(design.band_lines, design.lines[design.amplitudes > 0.0]),
         spectra=np.array(spectra),
+        notes=_folding(design),
+    )
+
+
+def _folding(design: MultisineDesign) -> tuple[str, ...]:
+    """A note where products of low degree come back into the band in what is sampled without a filter."""
+    degree = design.folding_degree
+    if degree > _LOW_DEGREE:
+        return ()
+    return (
+        f"sampled at {design.sample_rate_hz:g} Hz, products of degree {degree} of a band up to {design.highest_hz:g} Hz fold "
+        "back into it unless a filter holds them off: distortion may be theirs",
     )

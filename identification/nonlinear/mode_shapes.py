@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
-from identification.validation import finite_array
+from identification.validation import finite_array, read_only
 
 __all__ = ["ModeShapes", "mac"]
 
@@ -27,11 +27,14 @@ class ModeShapes:
         float[n_channels, n_modes], kg^-1/2; no more modes than channels, linearly independent.
     mode
         Column of the mode that is tested.
+    shapes_std
+        Standard errors of ``shapes``, kg^-1/2, NaN where unknown; None if none is known.
     """
 
     channels: tuple[str, ...]
     shapes: Float
     mode: int = 0
+    shapes_std: Float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
@@ -39,6 +42,10 @@ class ModeShapes:
         object.__setattr__(self, "shapes", shapes)
         if shapes.shape[0] != len(self.channels):
             raise IdentificationError(f"shapes: shape {shapes.shape} for {len(self.channels)} channels")
+        if self.shapes_std is not None:
+            object.__setattr__(self, "shapes_std", read_only(self.shapes_std, np.float64))
+            if np.shape(self.shapes_std) != shapes.shape:
+                raise IdentificationError(f"shapes_std: shape {np.shape(self.shapes_std)}, shapes have {shapes.shape}")
         if not shapes.shape[1] or np.linalg.matrix_rank(shapes) < shapes.shape[1]:
             raise IdentificationError(
                 f"shapes: {shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes"

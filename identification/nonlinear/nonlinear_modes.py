@@ -1,7 +1,7 @@
 """A nonlinear mode as identified: modal frequency and damping ratio over the vibration level."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -10,17 +10,39 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.validation import read_only
 
-__all__ = ["NonlinearMode"]
+__all__ = ["QUANTITIES", "STANDARD_ERRORS", "NonlinearMode"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
+
+STANDARD_ERRORS = {
+    "force_n": "force_std_n",
+    "amplitude_m": "amplitude_std_m",
+    "phase_lag_deg": "phase_lag_std_deg",
+    "modal_frequency_hz": "modal_frequency_std_hz",
+    "damping_ratio": "damping_ratio_std",
+    "damping_ratio_total_power": "damping_ratio_total_power_std",
+    "modal_amplitude": "modal_amplitude_std",
+    "apparent_mass_kg": "apparent_mass_std_kg",
+    "mac": "mac_std",
+    "force_purity": "force_purity_std",
+    "response_purity": "response_purity_std",
+}
+"""Quantities of a nonlinear mode, and the fields that hold their standard errors."""
+QUANTITIES = tuple(STANDARD_ERRORS)
 
 _TABLE = (
     *("force_n", "frequency_hz", "amplitude_m", "phase_lag_deg", "modal_frequency_hz", "modal_frequency_std_hz"),
     *("damping_ratio", "damping_ratio_std", "damping_ratio_total_power", "damping_ratio_uncorrected"),
     *("modal_amplitude", "mac", "force_purity", "response_purity", "fit_residual"),
+    *(name for name in STANDARD_ERRORS.values() if name not in ("modal_frequency_std_hz", "damping_ratio_std")),
 )
 _TEXT = ("source", "specimen")
+
+
+def _unknown() -> Float:
+    """NaN, which becomes an array of as many as there are points."""
+    return np.array(np.nan)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,12 +75,20 @@ class NonlinearMode:
         float[n], MAC of the fundamental of the deflection shape against the linear one.
     force_purity, response_purity
         float[n], ``|Y_1| / sqrt(sum_{h>=1} |Y_h|^2)`` of the force and of the drive-point displacement.
+    force_std_n, amplitude_std_m, phase_lag_std_deg, damping_ratio_total_power_std, modal_amplitude_std,
+    apparent_mass_std_kg, mac_std, force_purity_std, response_purity_std
+        float[n], standard errors of the quantities of these names, everything that is known counted.
+    systematic_std
+        float[n, n_quantities], the part of the standard errors that all points share (shapes, calibration), in the order
+        of `QUANTITIES`; it does not become less by more points. See `systematic` and `random`.
+    interval_95
+        float[n, n_quantities, 2], interval that holds the true value in 95 % of cases; see `interval`.
     fit_residual
         float[n], what a fit leaves of the measured data, relative, RMS; NaN where nothing was fitted.
     force_harmonics, response_harmonics_m
         complex[n, H + 1], N and m at the drive point.
     source
-        ``backbone`` or ``stepped sine``.
+        ``backbone``, ``stepped sine`` or ``several backbones``.
     specimen
         Name of what was tested.
     notes
@@ -86,16 +116,45 @@ class NonlinearMode:
     source: str
     specimen: str = ""
     notes: tuple[str, ...] = ()
+    force_std_n: Float = field(default_factory=_unknown)
+    amplitude_std_m: Float = field(default_factory=_unknown)
+    phase_lag_std_deg: Float = field(default_factory=_unknown)
+    damping_ratio_total_power_std: Float = field(default_factory=_unknown)
+    modal_amplitude_std: Float = field(default_factory=_unknown)
+    apparent_mass_std_kg: Float = field(default_factory=_unknown)
+    mac_std: Float = field(default_factory=_unknown)
+    force_purity_std: Float = field(default_factory=_unknown)
+    response_purity_std: Float = field(default_factory=_unknown)
+    systematic_std: Float = field(default_factory=_unknown)
+    interval_95: Float = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
+        n = len(self.force_n)
+        further = {"systematic_std": (n, len(QUANTITIES)), "interval_95": (n, len(QUANTITIES), 2)}
         for name in _ARRAYS:
             harmonic = name in _HARMONICS
             array = read_only(getattr(self, name), np.complex128 if harmonic else np.float64)
+            if array.ndim == 0:
+                array = read_only(np.full(further.get(name, (n,)), array), np.float64)
             object.__setattr__(self, name, array)
-            if array.ndim != (2 if harmonic else 1) or len(array) != len(self.force_n):
-                raise IdentificationError(f"{name}: shape {array.shape} does not fit {len(self.force_n)} points")
-        if not len(self.force_n):
+            allowed = (n, array.shape[-1]) if harmonic and array.ndim else further.get(name, (n,))
+            if array.shape != allowed:
+                raise IdentificationError(f"{name}: shape {array.shape} does not fit {n} points")
+        if not n:
             raise IdentificationError("force_n: a nonlinear mode needs at least one point")
+
+    def systematic(self, quantity: str) -> Float:
+        """float[n]: standard error of ``quantity`` (a name in `QUANTITIES`) that all points share."""
+        return np.asarray(self.systematic_std[:, _column(quantity)])
+
+    def random(self, quantity: str) -> Float:
+        """float[n]: standard error of ``quantity`` that each point has for itself."""
+        total = np.asarray(getattr(self, STANDARD_ERRORS[QUANTITIES[_column(quantity)]]))
+        return np.asarray(np.sqrt(np.maximum(total**2 - self.systematic(quantity) ** 2, 0.0)))
+
+    def interval(self, quantity: str) -> Float:
+        """float[n, 2]: lower and upper end of the 95 % interval of ``quantity``."""
+        return np.asarray(self.interval_95[:, _column(quantity)])
 
     @property
     def frequency_shift(self) -> float:
@@ -124,17 +183,32 @@ class NonlinearMode:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "NonlinearMode":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
-        missing = [name for name in _ARRAYS if name not in arrays] + [name for name in _TEXT if name not in attributes]
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing.
+
+        Files of earlier versions hold fewer standard errors: the others are NaN then, and a note says so.
+        """
+        needed = [name for name in _ARRAYS if name not in _ADDED]
+        missing = [name for name in needed if name not in arrays] + [name for name in _TEXT if name not in attributes]
         if missing:
             raise IdentificationError(f"nonlinear mode: {', '.join(missing)} missing")
-        values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
+        values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS if name in arrays}
         values |= {name: str(attributes[name]) for name in _TEXT}
-        return cls(**values, notes=tuple(attributes.get("notes", ())))
+        notes = tuple(attributes.get("notes", ()))
+        if any(name not in arrays for name in _ADDED) and _EARLIER not in notes:
+            notes = (*notes, _EARLIER)
+        return cls(**values, notes=notes)
 
 
-_ARRAYS = tuple(field.name for field in fields(NonlinearMode) if field.name not in (*_TEXT, "notes"))
+_ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if entry.name not in (*_TEXT, "notes"))
+_ADDED = tuple(entry.name for entry in fields(NonlinearMode) if entry.default_factory is _unknown)
+_EARLIER = "written by an earlier version: identify the recording again for the standard errors that are missing"
 _HARMONICS = ("force_harmonics", "response_harmonics_m")
+
+
+def _column(quantity: str) -> int:
+    if quantity not in QUANTITIES:
+        raise IdentificationError(f"quantity: is '{quantity}', allowed are {', '.join(QUANTITIES)}")
+    return QUANTITIES.index(quantity)
 
 
 def _number(value: float) -> float | None:

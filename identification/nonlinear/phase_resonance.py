@@ -18,153 +18,170 @@ harmonics, ``P = sum_h 1/2 Re(F_h conj(i h W Q_d,h))``.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.backbones import Backbone
-from identification.channels import Role, find_role
+from identification.channels import find_role
 from identification.errors import IdentificationError
+from identification.linear.modes import LinearModes
 from identification.measurements import PeriodicVibration, wrapped_deg
-from identification.nonlinear.mode_shapes import ModeShapes, mac
+from identification.nonlinear.basis import shapes_for
+from identification.nonlinear.mode_shapes import ModeShapes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
+from identification.nonlinear.properties import States, properties
+from identification.nonlinear.uncertainty import ErrorModel, propagated
 
 __all__ = ["nonlinear_mode"]
 
 Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
 
 _NO_SHAPE = (
     "no mass-normalised mode shape: damping, modal amplitude and the correction for the phase error cannot be had; "
     "give drive_mode_shape or mode_shapes"
 )
 _FAR_FROM_RESONANCE_DEG = 15.0
-
-
-@dataclass(frozen=True)
-class _PointMode:
-    """Modal properties of one point; NaN where they cannot be had."""
-
-    modal_amplitude: float = np.nan
-    modal_frequency_hz: float = np.nan
-    modal_frequency_std_hz: float = np.nan
-    damping_ratio: float = np.nan
-    damping_ratio_std: float = np.nan
-    damping_ratio_total_power: float = np.nan
-    damping_ratio_uncorrected: float = np.nan
-    apparent_mass_kg: float = np.nan
+_FEW_PERIODS = 10
+_DROWNED = 3.0  # standard errors that force and motion have to stand above
 
 
 def nonlinear_mode(
     backbone: Backbone,
     *,
+    modes: LinearModes | None = None,
+    mode: int | None = None,
     mode_shapes: ModeShapes | None = None,
     linear_shape: Mapping[str, float] | None = None,
+    calibration_std: float | Mapping[str, float] = 0.0,
+    phase_skew_std_deg: float | Mapping[str, float] = 0.0,
+    draws: int = 1000,
+    seed: int = 0,
 ) -> NonlinearMode:
-    """Nonlinear mode from a measured backbone.
+    """Nonlinear mode from a measured backbone, every quantity with its standard error.
 
     Parameters
     ----------
     backbone
         Settled points; with ``drive_mode_shape``, from which the modal amplitude is ``|Q_d| / phi_d``.
+    modes
+        Linear modal analysis of the specimen; if given, modal amplitude and MAC come from its shapes, mapped by the
+        names of the channels.
+    mode
+        Index in ``modes`` of the tested mode; the nearest to the lowest level's frequency if None.
     mode_shapes
-        Mass-normalised shapes of a linear modal analysis; if given, the modal amplitude comes from these.
+        Mass-normalised shapes chosen by hand, in place of ``modes``.
     linear_shape
-        Linear deflection shape by channel name, in any scale, for the MAC; else the tested one of ``mode_shapes``.
+        Linear deflection shape by channel name, in any scale, for the MAC; else the tested one of the mode shapes.
+    calibration_std, phase_skew_std_deg
+        Relative standard error of the channels' sensitivities, and of their phase at the fundamental in degrees: one
+        number for all, or by channel name. They are the same at all points.
+    draws, seed
+        Of the Monte Carlo that carries errors through; the same seed gives the same numbers.
 
     Returns
     -------
     NonlinearMode
         In the order of the backbone. Without any mass-normalised shape, damping and modal amplitude are NaN, the modal
-        frequency is that of the vibration, and a note says so. Standard errors are the first-order propagation of
-        those of the Fourier coefficients of force and motion, taken as independent: they hold neither errors of the
-        mode shapes (1 % of phi_d is 2 % of the damping), calibration or phase skew of the sensors, nor run-to-run
-        scatter of the specimen.
+        frequency is that of the vibration, and a note says so. Standard errors hold those of the Fourier coefficients,
+        of the drift, of the shapes (where ``modes`` has them) and what is given here of the sensors. They do not hold
+        what the output's stairs fold into readings without anti-alias filter, or the run-to-run scatter of the
+        specimen (`identification.combined` has that).
 
     Raises
     ------
     IdentificationError
-        On unsettled points, a point without force or motion, a modal frequency that is not real, unknown channels.
+        On unsettled points, a force or motion that is zero or drowns in noise, a modal frequency that is not real, modes
+        or channels that do not fit.
     """
-    shape = _shape_for_mac(mode_shapes, linear_shape)
-    points = [_identify(number, point, backbone, mode_shapes) for number, point in enumerate(backbone.points)]
-    force = np.array([point.force for point in backbone.points])
-    motion = np.array([point.drive_m for point in backbone.points])
+    notes: tuple[str, ...] = ()
+    if modes is not None:
+        if mode_shapes is not None:
+            raise IdentificationError("modes, mode_shapes: both given, allowed is one of them")
+        mode_shapes, _, notes = shapes_for(modes, backbone, mode)
+    elif mode is not None:
+        raise IdentificationError(f"mode: is {mode}, but there are no modes to choose from; give modes")
+    for number, point in enumerate(backbone.points):
+        _refuse(f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)", point)
+    states, rows = _states(backbone, mode_shapes, _shape_for_mac(mode_shapes, linear_shape))
+    found = properties(states)
+    _refuse_unreal(backbone, found)
     return NonlinearMode(
-        **{name: np.array([getattr(point, name) for point in points]) for name in _PointMode.__dataclass_fields__},
-        force_n=backbone.force_n,
+        **found,
+        **propagated(
+            states,
+            backbone,
+            rows,
+            None if mode_shapes is None else mode_shapes.shapes,
+            None if mode_shapes is None else mode_shapes.shapes_std,
+            ErrorModel(calibration_std, phase_skew_std_deg, draws, seed),
+        ),
         frequency_hz=backbone.frequency_hz,
-        phase_lag_deg=np.array([point.phase_lag_deg for point in backbone.points]),
-        amplitude_m=backbone.amplitude_m,
-        mac=np.array([np.nan if shape is None else _mac(shape, point) for point in backbone.points]),
-        force_purity=_purity(force),
-        response_purity=_purity(motion),
-        fit_residual=np.full(len(points), np.nan),
-        force_harmonics=force,
-        response_harmonics_m=motion,
+        fit_residual=np.full(len(backbone.points), np.nan),
+        force_harmonics=states.force,
+        response_harmonics_m=states.drive_m,
         source="backbone",
         specimen=backbone.specimen,
-        notes=_notes(backbone, mode_shapes),
+        notes=(*notes, *_notes(backbone, mode_shapes)),
     )
 
 
-def _identify(number: int, point: PeriodicVibration, backbone: Backbone, shapes: ModeShapes | None) -> _PointMode:
-    """Modal properties of one point, from ``D = (phi_d F / q) exp(i psi) = w^2 + s^2 + 2 s w z`` with ``s = i W + sigma``.
-
-    sigma is the rate at which the fundamental of the motion still drifted, relative to it: what a growing vibration
-    stores, and a decaying one returns, is no damping. To first order ``D = w^2 - W^2 + 2 i W (w z + sigma)``.
-    """
-    name = f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)"
+def _refuse(name: str, point: PeriodicVibration) -> None:
+    """Refuse a point that nothing can be identified from."""
     if not point.settled:
         raise IdentificationError(f"{name}: is not settled; use backbone.settled() to leave such points out")
     if point.force_n == 0.0 or point.amplitude_m == 0.0:
         raise IdentificationError(f"{name}: force or drive-point motion is zero, nothing can be identified")
-    force_std, motion_std = _relative_std(point, "force"), _relative_std(point, "drive")
-    if shapes is not None:
-        q, q_std = shapes.modal_amplitude(point)
-        if q == 0.0:
-            raise IdentificationError(f"{name}: modal amplitude is zero; check the channels of the mode shapes")
-        magnitude_std = float(np.sqrt(force_std**2 + motion_std**2 + (2.0 * q_std / q) ** 2))
-    elif backbone.drive_mode_shape is not None:
-        q = point.amplitude_m / abs(backbone.drive_mode_shape)
-        magnitude_std = float(np.hypot(force_std, motion_std))
-    else:
-        return _PointMode(modal_frequency_hz=point.frequency_hz)
-    omega = 2.0 * np.pi * point.frequency_hz
-    lag = np.radians(point.phase_lag_deg)
-    stiffness = point.amplitude_m * point.force_n / q**2
-    sigma = _drift_rate(point)
-    # The slope of a line over -1/2 ... 1/2 has the variance of its mean times twelve.
-    sigma_std = 0.0 if point.drift is None else np.sqrt(12.0) * motion_std * point.frequency_hz / point.periods
-    squared = omega**2 + stiffness * np.cos(lag) + 2.0 * omega * sigma.imag
-    if squared <= 0.0:
-        raise IdentificationError(
-            f"{name}: phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency, must be near 90 deg; "
-            "check the polarity of force and drive channel"
-        )
-    modal = float(np.sqrt(squared))
-    powers = _active_powers(point)
-    angle_std = float(np.hypot(force_std, motion_std))
-    real_std = stiffness * np.hypot(np.cos(lag) * magnitude_std, np.sin(lag) * angle_std)
-    imag_std = stiffness * np.hypot(np.sin(lag) * magnitude_std, np.cos(lag) * angle_std)
-    modal_std = np.hypot(real_std / (2.0 * modal), sigma_std * omega / modal)
-    scale = omega**2 * modal * q**2
-    stored = sigma.real / modal
-    damping = powers[0] / scale - stored
-    return _PointMode(
-        modal_amplitude=q,
-        modal_frequency_hz=modal / (2.0 * np.pi),
-        modal_frequency_std_hz=float(modal_std / (2.0 * np.pi)),
-        damping_ratio=damping,
-        damping_ratio_std=float(
-            np.sqrt(
-                (imag_std / (2.0 * omega * modal)) ** 2 + (damping * modal_std / modal) ** 2 + (sigma_std / modal) ** 2
+    if point.harmonics_std is None:
+        return
+    for role, what in (("force", "force"), ("drive", "drive-point motion")):
+        row = find_role(point.channels, "force" if role == "force" else "drive")
+        size, std = abs(point.harmonics[row, 1]), point.harmonics_std[row, 1]
+        if size < _DROWNED * std:
+            unit = point.channels[row].unit
+            raise IdentificationError(
+                f"{name}: {what} {size:.3g} {unit} drowns in its standard error of {std:.3g} {unit}; record more periods, "
+                "raise the level, or leave the point out (backbone.select)"
             )
-        ),
-        damping_ratio_total_power=float(np.sum(powers)) / scale - stored,
-        damping_ratio_uncorrected=powers[0] / (omega**3 * q**2),
-        apparent_mass_kg=(q / point.amplitude_m) ** 2,
+
+
+def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
+    """Refuse points without a real modal frequency, or without a modal amplitude."""
+    for number, point in enumerate(backbone.points):
+        name = f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)"
+        if found["modal_amplitude"][number] == 0.0:
+            raise IdentificationError(f"{name}: modal amplitude is zero; check the channels of the mode shapes")
+        if np.isnan(found["modal_frequency_hz"][number]):
+            raise IdentificationError(
+                f"{name}: phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency, must be near 90 deg; "
+                "check the polarity of force and drive channel"
+            )
+
+
+def _states(
+    backbone: Backbone, shapes: ModeShapes | None, linear: Mapping[str, float] | None
+) -> tuple[States, tuple[int, ...]]:
+    """The backbone as arrays, and the channels of its deflection shapes."""
+    names = tuple(dict.fromkeys((*(shapes.channels if shapes is not None else ()), *(linear or ()))))
+    rows = tuple(backbone.points[0].index(name) for name in names)
+    deflection = [[point.displacement_m(name)[1] for name in names] for point in backbone.points]
+    inverse: Float | None = None
+    if shapes is not None:
+        inverse = np.zeros((shapes.shapes.shape[1], len(names)))
+        inverse[:, : len(shapes.channels)] = np.linalg.pinv(shapes.shapes)
+    states = States(
+        frequency_hz=backbone.frequency_hz,
+        force=np.array([point.force for point in backbone.points]),
+        drive_m=np.array([point.drive_m for point in backbone.points]),
+        drift=np.array([_drift_rate(point) for point in backbone.points]),
+        deflection_m=np.array(deflection, dtype=np.complex128).reshape(len(backbone.points), len(names)),
+        inverse=inverse,
+        drive_shape=backbone.drive_mode_shape,
+        linear_shape=np.array(list((linear or {}).values()), dtype=np.float64),
+        linear_columns=tuple(names.index(name) for name in linear or ()),
     )
+    return states, rows
 
 
 def _drift_rate(point: PeriodicVibration) -> complex:
@@ -174,41 +191,24 @@ def _drift_rate(point: PeriodicVibration) -> complex:
     return complex(point.drift[find_role(point.channels, "drive")]) * point.frequency_hz / point.periods
 
 
-def _active_powers(point: PeriodicVibration) -> NDArray[np.float64]:
-    """float[H]: mean power of the force at harmonics 1 to H, W."""
-    motion = point.drive_m[1:]
-    velocity = 2j * np.pi * point.frequency_hz * np.arange(1, motion.size + 1) * motion
-    return np.asarray(0.5 * np.real(point.force[1:] * np.conj(velocity)))
-
-
-def _relative_std(point: PeriodicVibration, role: Role) -> float:
-    """Relative standard error of the fundamental of the channel with ``role``; NaN if unknown."""
-    index = find_role(point.channels, role)
-    if point.harmonics_std is None:
-        return np.nan
-    return float(point.harmonics_std[index, 1] / abs(point.harmonics[index, 1]))
-
-
-def _purity(harmonics: Complex) -> NDArray[np.float64]:
-    """float[n]: share of the fundamental in all harmonics from the first."""
-    return np.asarray(np.abs(harmonics[:, 1]) / np.linalg.norm(harmonics[:, 1:], axis=1))
-
-
 def _shape_for_mac(shapes: ModeShapes | None, linear_shape: Mapping[str, float] | None) -> dict[str, float] | None:
     if linear_shape is not None:
         return dict(linear_shape)
     return None if shapes is None else dict(zip(shapes.channels, shapes.tested.tolist(), strict=True))
 
 
-def _mac(shape: Mapping[str, float], point: PeriodicVibration) -> float:
-    measured = np.array([point.displacement_m(name)[1] for name in shape])
-    return mac(np.array(list(shape.values())), measured)
-
-
 def _notes(backbone: Backbone, shapes: ModeShapes | None) -> tuple[str, ...]:
     notes = []
     if shapes is None and backbone.drive_mode_shape is None:
         notes.append(_NO_SHAPE)
+    if shapes is not None and shapes.shapes_std is not None and np.isnan(shapes.shapes_std).any():
+        notes.append("standard errors of some mode shapes are unknown and not counted")
+    few = [number + 1 for number, point in enumerate(backbone.points) if point.periods < _FEW_PERIODS]
+    if few:
+        notes.append(
+            f"point{'s' if len(few) > 1 else ''} {', '.join(map(str, few))}: fewer than {_FEW_PERIODS} periods, standard "
+            "errors are rough; record more"
+        )
     if any(point.phase_lag_deg < 0.0 for point in backbone.points):
         notes.append(
             "the force draws power from the specimen (negative lag): check the polarity of force and drive channel"

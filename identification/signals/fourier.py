@@ -22,13 +22,14 @@ from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
 from identification.validation import finite_array, positive
 
-__all__ = ["periodic_vibration"]
+__all__ = ["batches_of", "periodic_vibration"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _MAX_BATCHES = 20
 _MIN_BATCHES = 4
+_MANY = 50
 _SAMPLES_TO_SPARE = 3  # that many more are needed to be sure of the last period
 
 
@@ -192,6 +193,11 @@ def _relative_drift(solution: Float, harmonics: int) -> Complex:
     return result
 
 
+def batches_of(periods: int) -> int:
+    """Batches that standard errors from so many periods come from; below four periods, where all samples count, many."""
+    return min(_MAX_BATCHES, periods) if periods >= _MIN_BATCHES else _MANY
+
+
 def _standard_errors(theta: Float, design: Float, residual: Float, periods: int) -> Float:
     """float[n_channels, H + 1]: standard error of Re and of Im of each coefficient."""
     n, columns = design.shape
@@ -200,7 +206,7 @@ def _standard_errors(theta: Float, design: Float, residual: Float, periods: int)
         variance = np.sum(residual**2, axis=0) / max(n - columns, 1)
         white = np.sqrt(np.outer(variance, np.r_[1.0, np.full(harmonics, 2.0)]) / n)
         return np.asarray(white)
-    batches = min(_MAX_BATCHES, periods)
+    batches = batches_of(periods)
     borders = theta[0] + 2.0 * np.pi * np.round(np.linspace(0, periods, batches + 1))
     edges = np.searchsorted(theta, borders)
     means = np.empty((batches, columns, residual.shape[1]))

@@ -33,8 +33,11 @@ class MultisinePlan(OpenLoopPlan):
     """Highest excited frequency, Hz."""
     resolution_hz: float = Field(gt=0)
     """Distance of neighbouring lines, Hz; a period lasts its inverse and must be a whole number of samples."""
-    grid: Literal["full", "odd"] = "full"
-    """Which lines of the band are excited: all, or the odd multiples of the resolution."""
+    grid: Literal["full", "odd", "odd-random"] = "full"
+    """Which lines of the band are excited: all, the odd multiples of the resolution, or these but for a random few, on which
+    odd distortion is heard. Even distortion is heard on even lines that are not excited."""
+    detection_group: int = Field(4, ge=2, le=1000)
+    """Odd lines of a group, of which ``odd-random`` leaves out one, chosen by ``phase_seed``."""
     realisations: int = Field(5, ge=1, le=1000)
     """Number of realisations at each level."""
     periods: int = Field(4, ge=1, le=100_000)
@@ -65,6 +68,8 @@ class MultisinePlan(OpenLoopPlan):
                 lowest_hz=self.lowest_hz,
                 highest_hz=self.highest_hz,
                 grid=self.grid,
+                detection_group=self.detection_group,
+                grid_seed=self.phase_seed,
             )
         except IdentificationError as error:
             raise ConfigurationError(str(error)) from None

@@ -1,16 +1,17 @@
 """Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
-from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, TRACE_BINS
+from rig.figures.nonlinear_mode import draw_properties
+from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
 from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
 from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
-from rig.models import FREQUENCY_RESPONSES, NONLINEAR_MODE, load_frequency_responses, load_model
+from rig.models.files import KINDS, load
 from rig.recording.arrays import kind_of
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -35,10 +36,9 @@ def plot(source: Path, figure: Path) -> None:
     kind = kind_of(source)
     with mpl.rc_context(STYLE):
         page = Figure(figsize=(9.0, 6.4), layout="constrained")
-        if kind == NONLINEAR_MODE:
-            _draw_mode(page, load_model(source))
-        elif kind == FREQUENCY_RESPONSES:
-            _draw_responses(page, source)
+        if kind in KINDS:
+            page.set_size_inches(*KINDS[kind].figure_in)
+            KINDS[kind].draw(page, load(source))
         else:
             with Recording(source) as recording:
                 _DRAW[recording.kind](page, recording)
@@ -48,119 +48,6 @@ def plot(source: Path, figure: Path) -> None:
             raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
 
 
-def _engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
-    """Amplitudes in millimetres or micrometres, whichever reads well."""
-    if amplitude_m.size and np.nanmax(amplitude_m) < 5e-4:
-        return amplitude_m * 1e6, "µm"
-    return amplitude_m * 1e3, "mm"
-
-
-def _properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = MAIN) -> None:
-    """Modal frequency and damping over the amplitude."""
-    order = np.argsort(mode.amplitude_m)
-    amplitude, unit = _engineering(mode.amplitude_m[order])
-    error: dict[str, Any] = {"fmt": "o-", "ms": 4, "color": colour, "capsize": 2, "elinewidth": 0.8}
-    left.errorbar(amplitude, mode.modal_frequency_hz[order], 1.96 * mode.modal_frequency_std_hz[order], **error)
-    left.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
-    if np.isfinite(mode.damping_ratio).any():
-        right.errorbar(
-            amplitude,
-            100 * mode.damping_ratio[order],
-            196 * mode.damping_ratio_std[order],
-            label="active power of the fundamental" if mode.source == "backbone" else "one-mode fit",
-            **error,
-        )
-        if np.isfinite(mode.damping_ratio_total_power).any():
-            right.plot(
-                amplitude,
-                100 * mode.damping_ratio_total_power[order],
-                "s--",
-                ms=3.5,
-                color=SECOND,
-                label="active power of all harmonics",
-            )
-        right.legend(fontsize=8)
-    else:
-        _say(right, "damping needs the specimen's drive_mode_shape")
-    right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping ratio, %")
-    _keep_small_changes_small(right)
-
-
-def _say(axis: "Axes", text: str) -> None:
-    """Why a panel is empty."""
-    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED)
-    axis.set(xticks=[], yticks=[])
-
-
-def _keep_small_changes_small(axis: "Axes") -> None:
-    """Let the axis span a fifth of its middle at the least, so that scatter does not look like a trend."""
-    low, high = axis.get_ylim()
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.1 * abs(low + high))
-    axis.set_ylim(max(0.0, middle - half), middle + half)
-
-
-def _title(page: "Figure", text: str) -> None:
-    page.suptitle(text, fontsize=11, x=0.01, ha="left")
-
-
-def _draw_mode(page: "Figure", mode: NonlinearMode) -> None:
-    axes = page.subplots(2, 2)
-    _properties(axes[0, 0], axes[0, 1], mode)
-    amplitude, unit = _engineering(mode.amplitude_m)
-    order = np.argsort(mode.force_n)
-    axes[1, 0].plot(mode.force_n[order], amplitude[order], "o-", ms=4, color=MAIN)
-    axes[1, 0].set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement amplitude, {unit}")
-    _harmonics(axes[1, 1], mode)
-    _title(page, f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {mode.force_n.size} points")
-
-
-def _harmonics(axis: "Axes", mode: NonlinearMode) -> None:
-    order = np.argsort(mode.force_n)
-    drawn = False
-    for harmonic, marker in ((2, "^"), (3, "v")):
-        if mode.force_harmonics.shape[1] > harmonic and np.isfinite(mode.force_harmonics).any():
-            ratio = np.abs(mode.force_harmonics[:, harmonic]) / np.abs(mode.force_harmonics[:, 1])
-            axis.plot(
-                mode.force_n[order],
-                ratio[order],
-                marker + "-",
-                ms=4,
-                color=MAIN if harmonic == 2 else SECOND,
-                label=f"|F{harmonic}|/|F1|",
-            )
-            drawn = True
-    if drawn:
-        axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of the force")
-        axis.set_ylim(bottom=0.0)
-        axis.legend(fontsize=8)
-        return
-    axis.plot(mode.modal_frequency_hz, _engineering(mode.amplitude_m)[0], "o-", ms=4, color=MAIN)
-    axis.locator_params(axis="x", nbins=5)
-    axis.set(xlabel="modal frequency, Hz", ylabel=f"displacement amplitude, {_engineering(mode.amplitude_m)[1]}")
-
-
-def _draw_responses(page: "Figure", source: Path) -> None:
-    from matplotlib import colormaps
-
-    responses = load_frequency_responses(source)
-    top, bottom = page.subplots(2, 1, sharex=True)
-    everything = np.concatenate([response.amplitude_m for response in responses])
-    unit = _engineering(everything)[1]
-    scale = {"mm": 1e3, "µm": 1e6}[unit]
-    for number, response in enumerate(responses):
-        colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.9)
-        order = np.argsort(response.frequency_hz)
-        label = response.label or f"{response.level:g}"
-        line = ".--" if response.controlled == "force" else ".-"
-        top.semilogy(response.frequency_hz[order], scale * response.amplitude_m[order], line, color=colour, label=label)
-        bottom.plot(response.frequency_hz[order], response.phase_lag_deg[order], line, color=colour)
-    top.set(ylabel=f"displacement amplitude, {unit}")
-    bottom.set(xlabel="frequency, Hz", ylabel="phase lag of displacement, deg")
-    bottom.axhline(90.0, color=REJECTED, lw=0.8)
-    page.legend(fontsize=8, loc="outside right upper")
-    _title(page, f"{responses[0].specimen or 'specimen'}: stepped-sine responses, {len(responses)} levels")
-
-
 def _draw_backbone(page: "Figure", recording: Recording) -> None:
     axes = page.subplots(2, 2)
     try:
@@ -168,15 +55,15 @@ def _draw_backbone(page: "Figure", recording: Recording) -> None:
     except IdentificationError:
         mode = None
     if mode is not None:
-        _properties(axes[0, 0], axes[0, 1], mode)
+        draw_properties(axes[0, 0], axes[0, 1], mode)
     else:
         for axis in axes[0]:
-            _say(axis, "no accepted point")
+            say_why_empty(axis, "no accepted point")
     _draw_history(axes[1, 0], axes[1, 1], recording)
     points = {point["number"]: point for point in recording.points}.values()
     left_out = sum(not point["accepted"] for point in points)
     text = f"{_specimen(recording)}: {recording.kind} test, {len(points)} point{'' if len(points) == 1 else 's'}"
-    _title(page, text + (f", {left_out} not accepted" if left_out else ""))
+    title(page, text + (f", {left_out} not accepted" if left_out else ""))
 
 
 def _specimen(recording: Recording) -> str:

@@ -1,8 +1,14 @@
 """What all figures share: colours, fonts, grid, and how finely a trace is drawn."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["MAIN", "REJECTED", "SECOND", "STYLE", "TRACE_BINS"]
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["MAIN", "REJECTED", "SECOND", "STYLE", "TRACE_BINS", "engineering", "say_why_empty", "title"]
 
 MAIN, SECOND, REJECTED = "#1f4e79", "#c0504d", "#9a9a9a"
 STYLE: dict[Any, Any] = {
@@ -20,3 +26,21 @@ STYLE: dict[Any, Any] = {
 }
 
 TRACE_BINS = 1200
+
+
+def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
+    """Amplitudes in millimetres or micrometres, whichever reads well."""
+    if amplitude_m.size and np.nanmax(amplitude_m) < 5e-4:
+        return amplitude_m * 1e6, "µm"
+    return amplitude_m * 1e3, "mm"
+
+
+def say_why_empty(axis: "Axes", text: str) -> None:
+    """Why a panel is empty."""
+    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED)
+    axis.set(xticks=[], yticks=[])
+
+
+def title(page: "Figure", text: str) -> None:
+    """Title at the top left."""
+    page.suptitle(text, fontsize=11, x=0.01, ha="left")

@@ -27,6 +27,7 @@ __all__ = ["draw_multisine", "draw_stepped_sine", "draw_sweep"]
 
 Float = NDArray[np.float64]
 
+_ODD = "#4f9d69"
 _SYMBOL = {"m/s2": "m/s²", "m/s^2": "m/s²"}
 
 
@@ -160,8 +161,8 @@ def draw_multisine(
 ) -> None:
     """Amplitude spectra of voltage, force and response with their noise levels, and the frequency response with its own.
 
-    ``page`` is an empty figure, about 9 by 6.4 inches. Lines that are not excited are drawn as crosses: what stands there
-    above the noise is nonlinear distortion.
+    ``page`` is an empty figure, about 9 by 6.4 inches. Odd and even lines that are not excited have marks of their own: what
+    stands there above the noise is odd and even nonlinear distortion of the rig, shaker included.
     """
     force = next(channel.name for channel in spectra.channels if channel.role == "force")
     left, right = np.asarray(page.subfigures(1, 2))
@@ -171,7 +172,7 @@ def draw_multisine(
         _spectrum(axis, spectra, name, text)
     axes[0].set_title(_counts(spectra), fontsize=9, loc="left")
     handles, labels = axes[1].get_legend_handles_labels()
-    left.legend(handles, labels, fontsize=8, ncols=3, loc="outside lower center")
+    left.legend(handles, labels, fontsize=8, ncols=2, loc="outside lower center")
     axes[2].set(xlabel="frequency, Hz")
     _response(right, spectra.frequency_response(response, instrument=voltage), f"{response} over {force}")
     _heading(page, title)
@@ -183,11 +184,14 @@ def _spectrum(axis: "Axes", spectra: PeriodicSpectra, name: str, text: str) -> N
     dots = {"ls": "", "ms": 3.0}
     axis.semilogy(spectra.frequency_hz[excited], amplitude[excited], marker="o", color=MAIN, label="excited", **dots)
     floor = 1e-6 * amplitude[excited].max()  # below lies rounding, not noise
-    rest = ~excited & (amplitude > floor)
-    if rest.any():
-        axis.semilogy(
-            spectra.frequency_hz[rest], amplitude[rest], marker="x", color=SECOND, label="not excited", **dots
-        )
+    if not excited.all():
+        for name, marker, colour, parity in (("odd", "x", _ODD, ~spectra.even), ("even", "+", SECOND, spectra.even)):
+            rest = ~excited & parity & (amplitude > floor)
+            label = f"{name}, not excited"
+            if rest.any():
+                axis.semilogy(
+                    spectra.frequency_hz[rest], amplitude[rest], marker=marker, color=colour, label=label, **dots
+                )
     if np.any(noise > floor):
         axis.semilogy(spectra.frequency_hz, noise, color=REJECTED, lw=0.9, label="noise")
     axis.set(ylabel=f"{text}, {_unit(spectra.channels[row].unit)}")

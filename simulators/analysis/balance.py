@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.analysis.condensed import CondensedRig
+from simulators.analysis.condensed import CondensedRig, CondensedStructure
 from simulators.analysis.errors import NotConvergedError
 from simulators.analysis.series import Series
 from simulators.analysis.site_forces import SiteForces
@@ -74,10 +74,13 @@ class Solution:
 
 
 class Balance:
-    """Residual and Jacobian over ``y = [coefficients of every site coordinate, W, U]``."""
+    """Residual and Jacobian over ``y = [coefficients of every site coordinate, W, U]``.
 
-    def __init__(self, rig: VirtualRig, harmonics: int, samples: int) -> None:
-        self.linear = CondensedRig(rig)
+    With ``pure_sine`` U is the amplitude of a sinusoidal force on the structure alone instead.
+    """
+
+    def __init__(self, rig: VirtualRig, harmonics: int, samples: int, *, pure_sine: bool = False) -> None:
+        self.linear = CondensedStructure(rig) if pure_sine else CondensedRig(rig)
         self.sites = SiteForces(rig)
         self.series = Series(harmonics, samples)
         self.n_site = self.linear.n_site

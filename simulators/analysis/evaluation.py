@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.analysis.balance import Balance, Solution
+from simulators.analysis.condensed import CondensedStructure
 from simulators.analysis.responses import PeriodicResponses
 from simulators.analysis.series import Series
 from simulators.layout import Flag
@@ -35,6 +36,8 @@ class Evaluation:
     def __call__(self, solutions: Sequence[Solution], stable: NDArray[np.bool_] | None = None) -> PeriodicResponses:
         """One point per solution (at least one), in their order."""
         omega, voltage = np.array([solution.unknowns[-2:] for solution in solutions]).T
+        if isinstance(self.balance.linear, CondensedStructure):
+            voltage = np.full(voltage.size, np.nan)
         coordinates, forces, outputs, neglected, beyond = zip(*(self._point(one) for one in solutions), strict=True)
         harmonics = np.transpose(np.array(outputs), (1, 0, 2))
         sensors, points = harmonics[2 : 2 + len(self.rig.sensors)], harmonics[2 + len(self.rig.sensors) :]

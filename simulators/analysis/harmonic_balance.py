@@ -11,6 +11,7 @@ Lags are those of the drive point's acceleration behind the stinger force, funda
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +39,7 @@ def phase_resonance_backbone(
     forces_n: ArrayLike | None = None,
     voltages_v: ArrayLike | None = None,
     phase_lag_deg: float = RESONANCE_DEG,
+    excitation: Literal["exciter", "pure-sine"] = "exciter",
     near_hz: float | None = None,
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
@@ -52,6 +54,9 @@ def phase_resonance_backbone(
         Levels: peaks of the fundamental of the stinger force (N), or amplitudes of the voltage (V); one of the two.
     phase_lag_deg
         Lag held, -179 to -1.
+    excitation
+        ``exciter``: the coupled rig under a pure voltage, whose force has harmonics. ``pure-sine``: the structure alone
+        under a sinusoidal force at the drive point, given by ``forces_n``; a property of the structure, of no exciter.
     near_hz
         The linear mode of the structure nearest to this frequency is followed. Default: the lowest that moves a
         nonlinear site.
@@ -67,8 +72,12 @@ def phase_resonance_backbone(
         Where a level is out of reach: says which; the points before it are in ``found``.
     """
     held, values = levels(forces_n, voltages_v)
+    if excitation not in ("exciter", "pure-sine"):
+        raise ValueError(f"excitation = {excitation!r}: allowed is exciter or pure-sine")
+    if excitation == "pure-sine" and held != "force":
+        raise ValueError("voltages_v: allowed with excitation = 'exciter', a pure sine has forces_n")
     lag = float(lags_rad("phase_lag_deg", [phase_lag_deg])[0])
-    study = _Study.of(rig, near_hz, harmonics, samples)
+    study = _Study.of(rig, near_hz, harmonics, samples, pure_sine=excitation == "pure-sine")
     goals = [Conditions(held, float(level), "lag", lag) for level in values]
     return study.evaluation(study.path(goals))
 
@@ -173,8 +182,10 @@ class _Study:
     resonance_rad_s: float
 
     @classmethod
-    def of(cls, rig: VirtualRig, near_hz: float | None, harmonics: int, samples: int) -> "_Study":
-        balance = Balance(rig, *checked_harmonics(harmonics, samples))
+    def of(
+        cls, rig: VirtualRig, near_hz: float | None, harmonics: int, samples: int, *, pure_sine: bool = False
+    ) -> "_Study":
+        balance = Balance(rig, *checked_harmonics(harmonics, samples), pure_sine=pure_sine)
         mode = followed_mode(rig, near_hz)
         resonance = 2.0 * np.pi * float(rig.linear_modes.frequency_hz[mode])
         return cls(balance, Evaluation(rig, balance, mode), resonance)

@@ -22,7 +22,7 @@ class PeriodicResponses:
     frequency_hz: Real
     """Frequency of the vibration [n]."""
     voltage_v: Real
-    """Amplitude U [n] of the voltage."""
+    """Amplitude U [n] of the voltage; NaN where the force itself was imposed."""
     force_n: Real
     """Peak of the fundamental of the stinger force [n]."""
     amplitude_m: Real

@@ -12,7 +12,7 @@ import pytest
 
 from rig.bench import load_bench
 from rig.drivers import make_daq
-from rig.models import load_model
+from rig.models.files import load
 from simulators.analysis import phase_resonance_backbone
 from tests.docs.pages import ROOT, blocks, write
 
@@ -74,7 +74,7 @@ def model(folder):
     for command in ("rig run end-stop-plan.toml -o own.h5", "rig identify own.h5 -o own-model.h5"):
         done = typed(command, folder)
         assert done.returncode == 0, done.stderr
-    return load_model(folder / "own-model.h5")
+    return load(folder / "own-model.h5")
 
 
 def test_the_commands_of_the_page_are_those_typed_here():

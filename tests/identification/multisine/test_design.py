@@ -18,14 +18,14 @@ def component(signal: np.ndarray, line: int) -> complex:
 @given(
     period=st.integers(50, 3000),
     band=st.tuples(st.floats(0.01, 0.2), st.floats(0.25, 0.49)),
-    grid=st.sampled_from(["full", "odd"]),
+    grid=st.sampled_from(["full", "odd", "odd-random"]),
     rms=st.floats(0.01, 10.0),
     seed=st.integers(0, 9),
 )
 def test_power_lies_on_the_excited_lines_only_and_rms_is_as_asked(
     period: int, band: tuple[float, float], grid: str, rms: float, seed: int
 ) -> None:
-    design = MultisineDesign(1000.0, period, 1000.0 * band[0], 1000.0 * band[1], grid, rms)
+    design = MultisineDesign(1000.0, period, 1000.0 * band[0], 1000.0 * band[1], grid, rms, detection_group=2)
     signal = design.realisation(seed, 0)
     assert np.sqrt(np.mean(signal**2)) == pytest.approx(rms)
     spectrum = np.abs(np.fft.rfft(signal)) * 2 / period
@@ -83,7 +83,10 @@ def test_amplitudes_follow_the_given_spectrum() -> None:
         ({"highest_hz": 10.0}, r"highest_hz: is 10 Hz, needs lowest_hz = 15 Hz"),
         ({"lowest_hz": 15.1, "highest_hz": 15.2}, r"no line of the full grid in 15.1 to 15.2 Hz; lines are 1.2207 Hz"),
         ({"lowest_hz": 17.0, "highest_hz": 17.2, "grid": "odd"}, r"no line of the odd grid"),
-        ({"grid": "even"}, r"grid: is 'even', allowed are full, odd"),
+        ({"grid": "even"}, r"grid: is 'even', allowed are full, odd, odd-random"),
+        ({"grid": "odd-random", "detection_group": 9}, r"no line of the odd-random grid .* groups of 9 odd ones"),
+        ({"detection_group": 1}, r"detection_group: is 1, needs at least 2 odd lines"),
+        ({"grid_seed": -1}, r"grid_seed: is -1, needs zero or more"),
         ({"period_samples": 2}, r"period_samples: is 2, needs at least 3"),
         ({"rms": 0.0}, r"rms: is 0, must be finite and above zero"),
         ({"lowest_hz": float("nan")}, r"lowest_hz: is nan Hz"),
@@ -115,3 +118,61 @@ def test_a_resolution_without_a_usable_period_is_refused(resolution_hz: float) -
 def test_seeds_below_zero_are_refused() -> None:
     with pytest.raises(IdentificationError, match="seed: is -1, needs zero or more"):
         DESIGN.realisation(-1, 0)
+
+
+def test_an_odd_random_grid_leaves_out_one_of_every_group_and_the_same_in_all_realisations() -> None:
+    design = MultisineDesign(1000.0, 1000, 20.0, 102.0, "odd-random", detection_group=5, grid_seed=4)
+    odd = np.arange(21, 102, 2)
+    silent = design.detection_lines_odd
+    assert silent.size == odd.size // 5
+    assert np.all((np.searchsorted(odd, silent) // 5) == np.arange(silent.size))
+    assert np.array_equal(design.detection_lines_even, np.arange(20, 103, 2))
+    assert np.array_equal(np.sort(np.concatenate([design.lines, silent])), odd)
+    for index in range(3):
+        spectrum = np.abs(np.fft.rfft(design.realisation(4, index)))
+        assert np.max(spectrum[silent]) < 1e-9 * np.max(spectrum)
+    others = [
+        MultisineDesign(1000.0, 1000, 20.0, 102.0, "odd-random", detection_group=5, grid_seed=s) for s in range(40)
+    ]
+    places = np.array([np.searchsorted(odd, other.detection_lines_odd) % 5 for other in others])
+    counts = np.bincount(places.ravel(), minlength=5)
+    assert np.all(np.abs(counts - places.size / 5) < 4 * np.sqrt(places.size * 0.16))  # every place is as likely
+
+
+def test_detection_lines_are_what_a_grid_leaves_out() -> None:
+    odd = MultisineDesign(1000.0, 1000, 20.0, 30.0, "odd")
+    assert odd.detection_lines_odd.size == 0
+    assert odd.detection_lines_even.tolist() == [20, 22, 24, 26, 28, 30]
+    full = MultisineDesign(1000.0, 1000, 20.0, 30.0)
+    assert full.detection_lines_odd.size + full.detection_lines_even.size == 0
+
+
+@pytest.mark.parametrize("n_inputs", [1, 2, 3, 4])
+def test_orthogonal_realisations_are_orthogonal_at_every_line(n_inputs: int) -> None:
+    block = DESIGN.orthogonal_realisation(3, 1, n_inputs)
+    assert block.shape == (n_inputs, n_inputs, DESIGN.period_samples)
+    np.testing.assert_allclose(np.sqrt(np.mean(block**2, axis=-1)), 0.7)
+    for line in DESIGN.lines:
+        u = np.array([[component(signal, line) for signal in experiment] for experiment in block])
+        np.testing.assert_allclose(
+            np.conj(u.T) @ u, n_inputs * DESIGN.amplitudes[0] ** 2 * np.eye(n_inputs), atol=1e-12
+        )
+    if n_inputs == 1:
+        assert np.array_equal(block[0, 0], DESIGN.realisation(3, 1))
+
+
+def test_inputs_of_an_orthogonal_block_are_unlike_each_other_and_none_are_refused() -> None:
+    block = DESIGN.orthogonal_realisation(3, 1, 3)
+    assert abs(np.corrcoef(block[0, 0], block[0, 1])[0, 1]) < 0.9
+    with pytest.raises(IdentificationError, match="n_inputs: is 0, needs one or more"):
+        DESIGN.orthogonal_realisation(3, 1, 0)
+
+
+@pytest.mark.parametrize("highest_hz", [90.0, 125.0, 126.0, 166.0, 167.0, 240.0])
+def test_products_of_the_folding_degree_and_of_no_lower_one_come_back_into_the_band(highest_hz: float) -> None:
+    design = MultisineDesign(500.0, 500, 20.0, highest_hz)
+    time = np.arange(500) / 500.0
+    for degree in range(2, design.folding_degree + 1):
+        made = np.arange(251, round(degree * highest_hz) + 1)  # above half the sample rate
+        folded = np.abs(np.fft.rfft(np.cos(2 * np.pi * np.outer(made, time)))).argmax(axis=1)
+        assert np.any(folded <= highest_hz) == (degree == design.folding_degree)

@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification import Channel, IdentificationError, MultisineDesign, PeriodicSpectra, periodic_spectra
+from identification import (
+    Channel,
+    IdentificationError,
+    MultisineDesign,
+    PeriodicSpectra,
+    best_linear_approximation,
+    periodic_spectra,
+)
 
 CHANNELS = (
     Channel("voltage", "monitor", "V"),
@@ -138,3 +145,27 @@ def test_records_that_do_not_fit_are_named() -> None:
     silent = [np.array([0 * record[0], record[1], record[2]]) for record in good]
     with pytest.raises(IdentificationError, match="instrument 'voltage': gives no input at 20 Hz"):
         periodic_spectra(silent, CHANNELS, DESIGN).frequency_response("drive")
+
+
+def test_a_band_near_half_the_sample_rate_is_noted() -> None:
+    assert spectra(0.0, 1).notes == ()
+    design = MultisineDesign(1000.0, 500, 20.0, 300.0)
+    near = spectra(0.0, 1, design=design)
+    assert "products of degree 3 of a band up to 300 Hz fold back" in near.notes[0]
+    assert best_linear_approximation(near).notes[0] == near.notes[0]
+
+
+def test_lines_are_even_or_odd_multiples_of_the_resolution() -> None:
+    measured = spectra(0.0, 1)
+    assert measured.frequency_hz[:3].tolist() == [20.0, 22.0, 24.0]
+    assert measured.even[:3].tolist() == [True, False, True]
+    single = MultisineDesign(1000.0, 500, 20.0, 20.0)
+    with pytest.raises(IdentificationError, match="frequency_hz: needs two lines or more"):
+        _ = spectra(0.0, 1, design=single).even
+
+
+def test_lines_of_no_amplitude_are_not_excited() -> None:
+    design = MultisineDesign(1000.0, 500, 20.0, 26.0, relative_amplitudes=(1.0, 0.0, 1.0, 1.0))
+    measured = spectra(0.0, 2, design=design)
+    assert measured.excited.tolist() == [True, False, True, True]
+    assert measured.frequency_response("drive").frequency_hz.tolist() == [20.0, 24.0, 26.0]

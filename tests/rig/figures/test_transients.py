@@ -99,19 +99,20 @@ def measured_multisine(grid: str) -> PeriodicSpectra:
     return periodic_spectra(records, CHANNELS, design)
 
 
-@pytest.mark.parametrize("grid", ["full", "odd"])
+@pytest.mark.parametrize("grid", ["full", "odd", "odd-random"])
 def test_a_multisine_shows_lines_noise_and_frequency_response(page: Figure, grid: str) -> None:
     spectra = measured_multisine(grid)
     draw_multisine(page, spectra, title="a beam: multisine")
     texts = rendered(page)
     voltage, force, _, size, phase = page.axes
-    excited = 11 if grid == "full" else 5
+    excited = {"full": 11, "odd": 5, "odd-random": 4}[grid]
     np.testing.assert_allclose(lines(voltage)["excited"][:, 1], np.sqrt(2 / excited), rtol=1e-9)
     assert set(lines(voltage)) == {"excited"}  # what is commanded has no noise
     expected_noise = 2 * 0.01 / np.sqrt(200 * 4)
     assert np.mean(lines(force)["noise"][:, 1]) == pytest.approx(expected_noise, rel=0.3)
     np.testing.assert_allclose(lines(size)["drive over force"][:, 1], 3.0, rtol=0.5)
     assert np.max(np.abs(phase.get_lines()[0].get_ydata())) < 90.0
-    assert ("not excited" in lines(page.axes[2])) == (grid == "odd")
+    assert ("even, not excited" in lines(page.axes[2])) == (grid != "full")
+    assert ("odd, not excited" in lines(page.axes[2])) == (grid == "odd-random")
     for text in ("a beam: multisine", "frequency response, 1/kg", "amplitude, mean of 3 × 4 periods"):
         assert text in texts

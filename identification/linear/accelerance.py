@@ -1,0 +1,131 @@
+"""Frequency responses as accelerance with the covariance that weights them, line by line.
+
+A sample covariance of few periods or realisations is too scattered to be inverted. Weights come from the mean over
+neighbouring lines, the line itself left out: then weight and error of a line are independent, and
+``sum_k J_k^H W_k C_k W_k J_k`` with the line's own covariance C_k is an unbiased estimate of what the errors do.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER
+from identification.errors import IdentificationError
+from identification.linear.response_matrix import FrequencyResponseMatrix
+
+__all__ = ["WeightedResponses", "Weighting", "weighted_accelerance", "weighted_responses"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+Weighting = Literal["auto", "total", "noise", "relative"]
+
+_NEIGHBOURS = 4
+"""Lines on either side that a weight is the mean of: with five realisations 32 degrees of freedom, a quarter more scatter."""
+_FLOOR = 1e-9
+"""Least eigenvalue of a covariance, relative to its largest: keeps an all but exact line from outweighing all others."""
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedResponses:
+    """Frequency responses ready for a fit.
+
+    Parameters
+    ----------
+    frequency_hz
+        float[n_lines].
+    value
+        complex[n_lines, n_outputs, n_inputs].
+    covariance
+        complex[n_lines, m, m], m = n_outputs n_inputs, as estimated at the line; None where nothing is known.
+    smooth
+        complex[n_lines, m, m], that of the neighbours, which weights are made of; where nothing is known the square of
+        the modulus (errors of equal relative size).
+    kind
+        What the covariance is: ``total``, ``noise`` or ``relative``.
+    """
+
+    frequency_hz: Float
+    value: Complex
+    covariance: Complex | None
+    smooth: Complex
+    kind: str
+
+    @property
+    def s(self) -> Complex:
+        """complex[n_lines]: ``2 pi i f``, rad/s."""
+        return np.asarray(2j * np.pi * self.frequency_hz)
+
+    @property
+    def std(self) -> Float:
+        """float[n_lines, n_outputs, n_inputs]: roots of the diagonal of ``smooth``."""
+        return np.asarray(np.sqrt(np.einsum("kii->ki", self.smooth).real).reshape(self.value.shape))
+
+    @property
+    def whitening(self) -> Complex:
+        """complex[n_lines, m, m]: W with ``W^H W`` the inverse of ``smooth``."""
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.smooth)))
+
+
+def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
+    """Responses with their weights; ``auto`` takes the total covariance if known, else that of noise, else none.
+
+    Raises `IdentificationError` where the covariance asked for is not known or the responses are zero.
+    """
+    known = {"total": responses.total_covariance, "noise": responses.noise_covariance}
+    if weighting not in ("auto", "relative", *known):
+        raise IdentificationError(f"weighting: is '{weighting}', allowed are auto, total, noise, relative")
+    if known.get(weighting, 0) is None:
+        raise IdentificationError(f"weighting: is '{weighting}', but the responses have no {weighting}_covariance")
+    kinds = [kind for kind, value in known.items() if value is not None] if weighting == "auto" else [weighting]
+    kind = kinds[0] if kinds else "relative"
+    covariance = known.get(kind)
+    count = responses.value[0].size
+    modulus = np.abs(responses.value).reshape(-1, count)
+    if not np.all(np.max(modulus, axis=0) > 0.0):
+        raise IdentificationError("value: a response is zero at all lines")
+    if covariance is None or not np.any(covariance):
+        covariance, kind = None, "relative"
+        variance = np.maximum(modulus, 1e-3 * np.max(modulus, axis=0)) ** 2
+        smooth = variance[:, :, None] * np.eye(count, dtype=np.complex128)
+    else:
+        smooth = _neighbours(covariance)
+    return WeightedResponses(responses.frequency_hz, responses.value, covariance, smooth, kind)
+
+
+def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
+    """The same, every output turned into an acceleration (m/s2); raises where an output is no motion or at 0 Hz."""
+    if responses.frequency_hz[0] == 0.0:
+        raise IdentificationError(
+            "frequency_hz: begins at 0 Hz, where no motion is an acceleration; select a band above"
+        )
+    plain = weighted_responses(responses, weighting)
+    order = np.array([2 - MOTION_ORDER[channel.motion] for channel in responses.outputs])
+    factor = plain.s[:, None] ** np.repeat(order, len(responses.inputs))
+
+    def scaled(covariance: Complex) -> Complex:
+        return np.asarray(factor[:, :, None] * covariance * np.conj(factor[:, None, :]))
+
+    return WeightedResponses(
+        plain.frequency_hz,
+        plain.value * factor.reshape(plain.value.shape),
+        None if plain.covariance is None else scaled(plain.covariance),
+        scaled(plain.smooth),
+        plain.kind,
+    )
+
+
+def _neighbours(covariance: Complex) -> Complex:
+    """Mean over the neighbours of each line, its own left out; floored so that it can be inverted."""
+    lines, count = covariance.shape[:2]
+    reach = min(_NEIGHBOURS, lines - 1)
+    number = np.arange(lines)
+    first, last = np.maximum(number - reach, 0), np.minimum(number + reach, lines - 1)
+    running = np.concatenate([np.zeros((1, count, count)), np.cumsum(covariance, axis=0)])
+    total = running[last + 1] - running[first]
+    others = np.maximum(last - first, 1)[:, None, None]
+    smooth = (total - covariance if lines > 1 else total) / others
+    largest = np.einsum("kii->ki", smooth).real
+    floor = _FLOOR * np.maximum(largest, np.max(largest, axis=0) * 1e-12 + 1e-300)
+    return np.asarray(0.5 * (smooth + np.conj(np.swapaxes(smooth, 1, 2))) + floor[:, :, None] * np.eye(count))

@@ -1,0 +1,145 @@
+"""Experimental modal analysis in one call: from frequency responses to mass-normalised modes with their errors."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import find_role
+from identification.errors import IdentificationError
+from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
+from identification.linear.modal_notes import modal_notes
+from identification.linear.modal_parameters import accepted, as_linear_modes
+from identification.linear.modes import LinearModes
+from identification.linear.rational_fractions import ModalFit, fit_modes
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.linear.stabilisation import StabilisationDiagram, diagram
+from identification.validation import finite_array
+
+__all__ = ["linear_modes"]
+
+Float = NDArray[np.float64]
+
+_NEAR = 0.05
+"""A starting frequency takes the nearest pole of the diagram within this part of it."""
+_START_DAMPING = 0.005
+"""Damping ratio to start with where the diagram has no pole near."""
+
+
+def linear_modes(
+    responses: FrequencyResponseMatrix,
+    *,
+    modes: int | Sequence[float] | None = None,
+    lowest_hz: float | None = None,
+    highest_hz: float | None = None,
+    complex_residues: bool = False,
+    weighting: Weighting = "auto",
+    orders: Sequence[int] | None = None,
+) -> LinearModes:
+    """Linear modes from the frequency responses of all motions to the one drive force.
+
+    A frequency-domain subspace of rising order gives poles to start from (`stabilisation`), a weighted least-squares fit
+    of a modal model with residual terms the result; shapes are normalised by the residue at the drive point.
+
+    Parameters
+    ----------
+    responses
+        Motions over the force, one of them of role ``drive``; best by the voltage as instrument.
+    modes
+        None: what the stabilisation diagram shows, without what turns out not to be a mode. A number: the most prominent
+        that many. Frequencies (Hz): a mode near each.
+    lowest_hz, highest_hz
+        Band of the fit; all lines if None.
+    complex_residues
+        Fit residues as complex numbers, for damping that couples modes. Normal modes have half as many unknowns
+        and the smaller errors wherever damping is light; ``phase_collinearity`` tells whether they will do.
+    weighting
+        Covariance that weights the lines: ``total`` (with nonlinear distortion), ``noise``, ``relative`` (none), or
+        the first of these that is known (``auto``).
+    orders
+        Orders of the stabilisation diagram.
+
+    Raises
+    ------
+    IdentificationError
+        Without exactly one drive channel and one force, with too few lines, or where no mode is found.
+    """
+    find_role(responses.outputs, "drive")
+    if len(responses.inputs) != 1 or responses.inputs[0].role != "force":
+        names = ", ".join(f"{channel.name} ({channel.role})" for channel in responses.inputs)
+        raise IdentificationError(f"inputs: are {names}; modes need the responses to one force, at the drive point")
+    band = responses.select(
+        lowest_hz=0.0 if lowest_hz is None else lowest_hz, highest_hz=np.inf if highest_hz is None else highest_hz
+    )
+    data = weighted_accelerance(band, weighting)
+    if isinstance(modes, int) and modes < 1:
+        raise IdentificationError(f"modes: is {modes}, needs at least 1")
+    stable = diagram(data, orders)
+    start = _start(stable, data, None if modes is None or isinstance(modes, int) else modes)
+    fit, rejected = _without_spurious(data, band, start, normal=not complex_residues, modes=modes)
+    result = as_linear_modes(fit, band, data, normal=not complex_residues)
+    return replace(result, notes=(*band.notes, *rejected, *modal_notes(result, data, fit.converged)))
+
+
+def _start(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequence[float] | None) -> Float:
+    """Poles to start from, rad/s and damping ratios."""
+    if wanted is None:
+        columns = stable.columns()
+        if not columns.size:
+            raise IdentificationError(
+                f"modes: no pole is stable over the orders in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz; "
+                "give starting frequencies, a narrower band, or a recording with more periods"
+            )
+        return np.concatenate([2.0 * np.pi * stable.frequency_hz[columns], stable.damping_ratio[columns]])
+    near_hz = np.sort(finite_array("modes", wanted, np.float64, 1))
+    if not near_hz.size or near_hz[0] < data.frequency_hz[0] or near_hz[-1] > data.frequency_hz[-1]:
+        raise IdentificationError(
+            f"modes: frequencies are {', '.join(f'{f:g}' for f in near_hz) or 'none'} Hz, allowed are "
+            f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
+        )
+    frequency, damping, taken = near_hz.copy(), np.full(near_hz.size, _START_DAMPING), set[int]()
+    candidates = np.flatnonzero(stable.stable)
+    for number, wanted_hz in enumerate(near_hz):
+        distance = np.abs(stable.frequency_hz[candidates] - wanted_hz)
+        free = [i for i in np.argsort(distance) if candidates[i] not in taken and distance[i] < _NEAR * wanted_hz]
+        nearest = [i for i in free if np.argmin(np.abs(near_hz - stable.frequency_hz[candidates[i]])) == number]
+        if nearest:
+            close = candidates[[i for i in nearest if distance[i] < 2.0 * distance[nearest[0]] + 1e-3 * wanted_hz]]
+            taken |= set(close.tolist())
+            frequency[number] = np.median(stable.frequency_hz[close])
+            damping[number] = np.median(stable.damping_ratio[close])
+    return np.concatenate([2.0 * np.pi * frequency, damping])
+
+
+def _without_spurious(
+    data: WeightedResponses,
+    band: FrequencyResponseMatrix,
+    poles: Float,
+    *,
+    normal: bool,
+    modes: int | Sequence[float] | None,
+) -> tuple[ModalFit, list[str]]:
+    """Fit; leave out what is no mode, or, if a number was asked for, the least prominent; fit again until all are modes."""
+    notes: list[str] = []
+    drive = find_role(band.outputs, "drive")
+    while True:
+        fit = fit_modes(data, poles, normal=normal)
+        reasons, prominence = accepted(fit, data, drive, normal=normal)
+        count = prominence.size
+        out = {index: reason for index, reason in enumerate(reasons) if reason}
+        if not out and isinstance(modes, int) and count > modes:
+            out = {int(np.argmin(prominence)): "is the least prominent"}
+        names = [f"pole at {fit.omega[index] / (2 * np.pi):.5g} Hz {reason}" for index, reason in out.items()]
+        if (out and not (modes is None or isinstance(modes, int))) or len(out) == count:
+            raise IdentificationError(f"modes: {'; '.join(names)}; no mode there that can be normalised")
+        if not out:
+            if isinstance(modes, int) and count < modes:
+                found = ", ".join(f"{f:.5g}" for f in np.sort(fit.omega) / (2 * np.pi))
+                raise IdentificationError(
+                    f"modes: {modes} wanted, {count} found ({found} Hz); give starting frequencies for the others"
+                )
+            return fit, notes
+        notes += [f"left out: {name}" for name in names]
+        kept = np.array([index for index in range(count) if index not in out])
+        poles = np.concatenate([fit.omega[kept], fit.zeta[kept]])

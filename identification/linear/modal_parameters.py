@@ -1,0 +1,119 @@
+"""From the parameters of a fit to modes: normalisation by the drive-point residue, errors carried over, rejections."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import find_role
+from identification.linear.accelerance import WeightedResponses
+from identification.linear.modes import LinearModes
+from identification.linear.rational_fractions import ModalFit, fit_modes
+from identification.linear.response_matrix import FrequencyResponseMatrix
+
+__all__ = ["accepted", "as_linear_modes", "phase_collinearity"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_SIGNIFICANT = 3.0
+_LARGEST_DAMPING = 0.1
+_LARGEST_DAMPING_ERROR = 0.5
+
+
+def phase_collinearity(residues: Complex) -> Float:
+    """float[n_modes]: how well the residues of each column lie on one line through zero, 1 where they do.
+
+    ``((Sxx - Syy)^2 + 4 Sxy^2) / (Sxx + Syy)^2`` of real and imaginary parts (Pappa, Elliott and Schenk, 1993).
+    """
+    xx, yy = np.sum(residues.real**2, axis=0), np.sum(residues.imag**2, axis=0)
+    xy = np.sum(residues.real * residues.imag, axis=0)
+    return np.asarray(((xx - yy) ** 2 + 4.0 * xy**2) / np.maximum((xx + yy) ** 2, 1e-300))
+
+
+def _residues(poles: Float, terms: Float, normal: bool) -> Complex:
+    """complex[n_outputs, n_modes]: ``rho = a + b p``, 1/kg."""
+    omega, zeta = np.split(poles[:-1], 2)
+    count = omega.size
+    if normal:
+        return terms[:, :count].astype(np.complex128)
+    return np.asarray(terms[:, :count] + terms[:, count : 2 * count] * omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2)))
+
+
+def _modes(poles: Float, terms: Float, drive: int, normal: bool) -> Float:
+    """Frequencies (Hz), damping ratios, shapes row by row."""
+    omega, zeta = np.split(poles[:-1], 2)
+    residues = _residues(poles, terms, normal)
+    shapes = (residues / np.sqrt(residues[drive])).real
+    return np.concatenate([omega / (2.0 * np.pi), zeta, shapes.ravel()])
+
+
+def accepted(fit: ModalFit, data: WeightedResponses, drive: int, *, normal: bool) -> tuple[list[str], Float]:
+    """Why a pole is no mode (empty if it is one), and how prominent each is: its peak at the drive point over its error."""
+    omega, zeta = fit.omega, fit.zeta
+    count, terms = omega.size, fit.terms.shape[1]
+    std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    residue = _residues(fit.poles, fit.terms, normal)[drive].real
+    residue_std = std[fit.poles.size + drive * terms :][:count]
+    band = 2.0 * np.pi * data.frequency_hz[[0, -1]]
+    reasons = []
+    for k in range(count):
+        if zeta[k] > _LARGEST_DAMPING:
+            reasons.append(f"has a damping ratio of {100 * zeta[k]:.3g} %")
+        elif not band[0] <= omega[k] <= band[1]:
+            reasons.append("left the band")
+        elif zeta[k] <= 0.0:
+            reasons.append(f"has a damping ratio of {100 * zeta[k]:.3g} %")
+        elif residue[k] <= _SIGNIFICANT * residue_std[k]:
+            reasons.append(f"has a drive-point residue of {residue[k]:.3g} +- {residue_std[k]:.3g} 1/kg")
+        elif std[count + k] > _LARGEST_DAMPING_ERROR * zeta[k]:
+            reasons.append(f"has a damping ratio of {100 * zeta[k]:.3g} +- {100 * std[count + k]:.3g} %")
+        else:
+            reasons.append("")
+    return reasons, np.abs(residue) / np.maximum(residue_std, 1e-300)
+
+
+def as_linear_modes(
+    fit: ModalFit, band: FrequencyResponseMatrix, data: WeightedResponses, *, normal: bool
+) -> LinearModes:
+    """Modes in rising order of frequency; the covariance by first-order propagation."""
+    drive = find_role(band.outputs, "drive")
+    rows, count, terms = len(band.outputs), fit.omega.size, fit.terms.shape[1]
+    nonlinear = fit.poles.size
+    parameters = np.concatenate([fit.poles, fit.terms.ravel()])
+
+    def modes(values: Float) -> Float:
+        return _modes(values[:nonlinear], values[nonlinear:].reshape(rows, terms), drive, normal)
+
+    std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    steps = np.maximum(1e-3 * std, 1e-9 * np.abs(parameters) + 1e-300)
+    used = list(range(2 * count)) + [nonlinear + o * terms + t for o in range(rows) for t in range(terms - 2)]
+    jacobian = np.zeros((count * (2 + rows), parameters.size))
+    for index in used:
+        step = np.zeros(parameters.size)
+        step[index] = steps[index]
+        jacobian[:, index] = (modes(parameters + step) - modes(parameters - step)) / (2.0 * steps[index])
+    rise = np.argsort(fit.omega, kind="stable")
+    order = np.concatenate([block * count + rise for block in range(2 + rows)])
+    values = modes(parameters)[order]
+    covariance = (jacobian @ fit.covariance @ jacobian.T)[np.ix_(order, order)]
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    loose = fit if not normal else fit_modes(data, fit.poles, normal=False, iterations=0)
+    return LinearModes(
+        channels=band.outputs,
+        frequency_hz=values[:count],
+        frequency_std_hz=errors[:count],
+        damping_ratio=values[count : 2 * count],
+        damping_ratio_std=errors[count : 2 * count],
+        shapes=values[2 * count :].reshape(rows, count),
+        shapes_std=errors[2 * count :].reshape(rows, count),
+        phase_collinearity=phase_collinearity(_residues(loose.poles, loose.terms, False))[rise],
+        lower=fit.terms[:, -2].astype(np.complex128),
+        upper=fit.terms[:, -1].astype(np.complex128),
+        upper_hz=1.0 / (2.0 * np.pi * np.sqrt(fit.poles[-1])) if fit.poles[-1] > 0.0 else np.inf,
+        lowest_hz=float(data.frequency_hz[0]),
+        highest_hz=float(data.frequency_hz[-1]),
+        force_rms_n=band.input_rms[0] if band.input_rms else np.nan,
+        fit_residual=fit.residual,
+        covariance=covariance,
+        residues=None if normal else _residues(fit.poles, fit.terms, False)[:, rise],
+        specimen=band.specimen,
+    )

@@ -1,0 +1,202 @@
+"""Modal model by weighted least squares: common poles by Levenberg-Marquardt, everything linear eliminated.
+
+The accelerance of the channel o is
+
+    H_o = sum_k (a_ok + b_ok s) s^2 / (s^2 + 2 z_k w_k s + w_k^2) + L_o + U_o s^2 / (1 + c s^2),
+
+b = 0 for normal modes; ``c = 1 / w_u^2`` lets the higher modes leave a term that grows towards the nearest of them, at w_u
+(c = 0: a plain stiffness). Given the poles and c, the terms a, b, L and U follow by linear least squares; the poles' step is
+the Schur complement of the full Gauss-Newton step (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973;
+Ruhe and Wedin, SIAM Rev. 22, 1980). With weights P, Jacobian J and ``M = Re sum J^H P J`` the parameters' covariance is
+``M^-1 (1/2 Re sum J^H P C P J) M^-1``: right for the errors C of the lines, whatever the weights are.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.linear.accelerance import WeightedResponses
+
+__all__ = ["ModalFit", "fit_modes", "modal_basis", "pole_derivatives"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_ITERATIONS = 60
+_STEP_STD = 1e-4
+"""Converged where a step moves nothing by more than this part of its standard error."""
+_NEAREST = 0.9
+"""Largest c, relative to that of a mode at the highest line."""
+_PRIOR = 0.25
+"""Where the responses say nothing of c it stays about here, half as wide: a mode at twice the highest line."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModalFit:
+    """Parameters of a modal model and their errors.
+
+    Parameters
+    ----------
+    poles
+        float[2 n_modes + 1], natural angular frequencies (rad/s), damping ratios, c (s^2).
+    terms
+        float[n_outputs, n_terms], a (1/kg) of every mode, then b (s/kg) of every mode if the fit has them, then L (1/kg), U
+        (s^2/kg).
+    covariance
+        float[m, m] of ``(poles, terms row by row)``.
+    residual
+        Root of the mean square of misfit over what its covariance lets expect; NaN where no covariance is known.
+    converged
+        Whether the iteration came to rest.
+    """
+
+    poles: Float
+    terms: Float
+    covariance: Float
+    residual: float
+    converged: bool
+
+    @property
+    def omega(self) -> Float:
+        """float[n_modes], rad/s."""
+        return np.asarray(self.poles[: self.poles.size // 2])
+
+    @property
+    def zeta(self) -> Float:
+        """float[n_modes]."""
+        return np.asarray(self.poles[self.poles.size // 2 : -1])
+
+
+def modal_basis(s: Complex, poles: Float, normal: bool) -> Complex:
+    """complex[n_lines, n_terms]: what the terms multiply."""
+    (omega, zeta), s = np.split(poles[:-1], 2), s[:, None]
+    modal = s**2 / (s**2 + 2.0 * zeta * omega * s + omega**2)
+    rest = [np.ones_like(s), s**2 / (1.0 + poles[-1] * s**2)]
+    return np.hstack([modal, *rest] if normal else [modal, modal * s, *rest])
+
+
+def pole_derivatives(s: Complex, poles: Float, terms: Float, normal: bool) -> Complex:
+    """complex[n_lines, n_outputs, 2 n_modes + 1]: of the accelerance by the poles and c."""
+    (omega, zeta), s = np.split(poles[:-1], 2), s[:, None, None]
+    count = omega.size
+    numerator = terms[None, :, :count] + (0.0 if normal else terms[None, :, count : 2 * count] * s)
+    slope = -numerator * s**2 / (s**2 + 2.0 * zeta * omega * s + omega**2) ** 2
+    upper = -terms[None, :, -1:] * s**4 / (1.0 + poles[-1] * s**2) ** 2
+    return np.concatenate([slope * (2.0 * zeta * s + 2.0 * omega), slope * 2.0 * omega * s, upper], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Normal equations at one set of poles, the terms being the best there."""
+
+    terms: Float
+    cost: float
+    matrix: Float
+    gradient: Float  # of half the cost by the poles
+
+
+class _Problem:
+    """The responses with the precision of every line, and the normal equations that they give."""
+
+    def __init__(self, data: WeightedResponses, normal: bool) -> None:
+        self.data, self.normal, self.s = data, normal, data.s
+        self.value = data.value[:, :, 0]
+        self.precision = np.linalg.inv(data.smooth)
+        self.largest_c = _NEAREST / np.abs(data.s[-1]) ** 2
+        self.prior_c = _PRIOR / np.abs(data.s[-1]) ** 2
+
+    def state(self, poles: Float) -> _State:
+        outputs = self.value.shape[1]
+        basis = modal_basis(self.s, poles, self.normal)
+        size = np.linalg.norm(basis, axis=0)
+        scaled = basis / size
+        terms_count = size.size
+        pairs = (np.conj(scaled)[:, :, None] * scaled[:, None, :]).reshape(self.s.size, -1)
+        linear = (self.precision.reshape(self.s.size, -1).T @ pairs).real
+        linear = linear.reshape(outputs, outputs, terms_count, terms_count).transpose(0, 2, 1, 3)
+        linear = linear.reshape(outputs * terms_count, -1)
+        weighted = np.einsum("kop,kp->ko", self.precision, self.value)
+        unit = 1.0 / np.sqrt(np.diag(linear))
+        known = (weighted.T @ np.conj(scaled)).real.ravel()
+        terms = unit * np.linalg.lstsq(linear * np.outer(unit, unit), unit * known, rcond=1e-15)[0]
+        terms = terms.reshape(outputs, -1) / size
+        misfit = self.value - basis @ terms.T
+        weighted = np.einsum("kop,kp->ko", self.precision, misfit)
+        slopes = pole_derivatives(self.s, poles, terms, self.normal)
+        heavy = self.precision @ slopes
+        poles_count = poles.size
+        matrix = np.empty((poles_count + known.size,) * 2)
+        matrix[:poles_count, :poles_count] = np.tensordot(np.conj(slopes), heavy, ((0, 1), (0, 1))).real
+        cross = np.tensordot(np.conj(basis), heavy, (0, 0)).real.transpose(1, 0, 2).reshape(known.size, poles_count)
+        matrix[poles_count:, :poles_count], matrix[:poles_count, poles_count:] = cross, cross.T
+        both = np.tile(size, outputs)
+        matrix[poles_count:, poles_count:] = linear * np.outer(both, both)
+        gradient = -np.tensordot(np.conj(slopes), weighted, ((0, 1), (0, 1))).real
+        cost = float(np.sum(np.conj(misfit) * weighted).real)
+        off = 2.0 * (poles[-1] - self.prior_c) / self.prior_c
+        gradient[-1] += 2.0 * off / self.prior_c
+        matrix[poles_count - 1, poles_count - 1] += 4.0 / self.prior_c**2
+        return _State(terms, cost + off**2, matrix, gradient)
+
+    def fitted(self, poles: Float, state: _State, converged: bool) -> ModalFit:
+        """The fit with the errors of its parameters."""
+        count, outputs = poles.size, self.value.shape[1]
+        basis = modal_basis(self.s, poles, self.normal)
+        unit = 1.0 / np.sqrt(np.diag(state.matrix))
+        inverse = np.linalg.pinv(state.matrix * np.outer(unit, unit), rcond=1e-14, hermitian=True)
+        misfit = self.value - basis @ state.terms.T
+        squares = float(np.sum(np.conj(misfit) * np.einsum("kop,kp->ko", self.precision, misfit)).real)
+        freedom = max(1.0 - 0.5 * unit.size / misfit.size, 1e-3)
+        if self.data.covariance is None:
+            covariance, residual = 0.5 * squares / (misfit.size * freedom) * inverse, np.nan
+        else:
+            slopes = pole_derivatives(self.s, poles, state.terms, self.normal)
+            whole = np.einsum("op,kt->kopt", np.eye(outputs), basis).reshape(*misfit.shape, -1)
+            jacobian = np.concatenate([slopes, whole], axis=2) * unit
+            heavy = self.precision @ jacobian
+            filling = 0.5 * np.tensordot(np.conj(heavy), self.data.covariance @ heavy, ((0, 1), (0, 1))).real
+            covariance = inverse @ filling @ inverse
+            expected = np.einsum("kop,kpo->", self.precision, self.data.covariance).real
+            residual = float(np.sqrt(squares / (freedom * expected)))
+        covariance = covariance * np.outer(unit, unit)
+        return ModalFit(poles, state.terms, 0.5 * (covariance + covariance.T), residual, converged)
+
+    def allowed(self, poles: Float) -> Float | None:
+        """The poles with c kept in its range; None where a pole is none."""
+        count = poles.size // 2
+        if np.any(poles[:count] <= 0.0) or np.any(np.abs(poles[count:-1]) >= 1.0):
+            return None
+        return np.append(poles[:-1], np.clip(poles[-1], 0.0, self.largest_c))
+
+
+def fit_modes(
+    data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS
+) -> ModalFit:
+    """Weighted least-squares fit of a modal model from starting ``poles``: rad/s, then damping ratios (then c)."""
+    problem, damping = _Problem(data, normal), 1e-3
+    poles = np.append(poles, problem.prior_c) if poles.size % 2 == 0 else poles
+    state, count = problem.state(poles), poles.size | 1
+    for _ in range(iterations):
+        unit = 1.0 / np.sqrt(np.diag(state.matrix))
+        scaled = state.matrix * np.outer(unit, unit)
+        cross = scaled[count:, :count]
+        reduced = scaled[:count, :count] - cross.T @ np.linalg.lstsq(scaled[count:, count:], cross, rcond=1e-15)[0]
+        stretch = 1.0 / np.sqrt(np.maximum(np.diag(reduced), 1e-14))
+        reduced = reduced * np.outer(stretch, stretch)
+        unit = unit[:count] * stretch
+        for _ in range(10):
+            step = -unit * np.linalg.solve(reduced + damping * np.eye(count), unit * state.gradient)
+            trial = problem.allowed(poles + step)
+            if trial is not None and (new := problem.state(trial)).cost <= state.cost * (1.0 + 1e-10):
+                break
+            damping = 10.0 * damping + 1e-6
+        else:
+            return problem.fitted(poles, state, False)
+        moved = np.max(np.abs(trial - poles) / unit)
+        # A misfit of one unit a value is what noise leaves, so that ``unit`` is what the poles' errors are like.
+        rest = moved <= _STEP_STD * np.sqrt(new.cost / problem.value.size + 1e-300)
+        poles, state, damping = trial, new, 0.1 * damping
+        if rest:
+            return problem.fitted(poles, state, True)
+    return problem.fitted(poles, state, iterations == 0)

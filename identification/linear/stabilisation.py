@@ -1,0 +1,180 @@
+"""Stabilisation diagram: poles of models of rising order; what comes back from order to order belongs to the structure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.linear.subspace import observable_space
+from identification.validation import read_only
+
+__all__ = ["StabilisationDiagram", "stabilisation"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+_ORDERS = tuple(range(2, 41, 2))
+_LARGEST_DAMPING = 0.1
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StabilisationDiagram:
+    """Poles of all orders, one entry each, by order and then by frequency.
+
+    Parameters
+    ----------
+    order
+        int[n], order of the model that the pole is of.
+    frequency_hz, damping_ratio
+        float[n], ``|p| / 2 pi`` and ``-Re p / |p|``.
+    shapes
+        complex[n, n_outputs], deflection of the pole as acceleration, length one.
+    frequency_stable, damping_stable, shape_stable
+        bool[n], whether the order before has a pole with a frequency, then also a damping ratio, then also a shape like it.
+    physical
+        bool[n], whether the pole oscillates within the band, decays, and does so slowly enough for a mode.
+    orders
+        int[n_orders], the orders tried.
+    singular_values
+        float[n_singular], of the weighted data; a drop tells the order.
+    """
+
+    order: NDArray[np.int64]
+    frequency_hz: Float
+    damping_ratio: Float
+    shapes: Complex
+    frequency_stable: Bool
+    damping_stable: Bool
+    shape_stable: Bool
+    physical: Bool
+    orders: NDArray[np.int64]
+    singular_values: Float
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            array = getattr(self, name)
+            object.__setattr__(self, name, read_only(array, array.dtype))
+
+    @property
+    def stable(self) -> Bool:
+        """bool[n]: physical, and stable in frequency, damping and shape."""
+        return np.asarray(self.physical & self.shape_stable)
+
+    def columns(self, *, share: float = 0.5) -> NDArray[np.int64]:
+        """int[n_modes]: the pole of highest order of every column of stable poles, lowest frequency first.
+
+        Poles are of one column where their frequencies differ by less than 1 %, or by less than a tenth of it where their
+        shapes differ, and shapes are alike. A column counts if it has stable poles in the given share of the orders above
+        its first.
+        """
+        left = np.flatnonzero(self.stable)[::-1]  # highest order first
+        found: list[int] = []
+        while left.size:
+            head = left[0]
+            near = np.abs(self.frequency_hz[left] / self.frequency_hz[head] - 1.0) < 0.01
+            alike = np.abs(self.shapes[left] @ np.conj(self.shapes[head])) ** 2 > 0.8
+            column = left[near & alike]
+            possible = np.count_nonzero(self.orders > self.order[column[-1]])
+            if np.unique(self.order[column]).size >= max(2.0, share * possible):
+                found.append(int(self._steadiest(column)))
+            left = left[~(near & alike)]
+        return np.array(sorted(found, key=lambda index: self.frequency_hz[index]), dtype=np.int64)
+
+    def _steadiest(self, column: NDArray[np.int64]) -> np.int64:
+        """The pole nearest to the column's median frequency and damping among its upper half."""
+        upper = column[: max(1, (column.size + 1) // 2)]
+        distance = np.zeros(upper.size)
+        for values in (self.frequency_hz[upper] / 0.01, self.damping_ratio[upper] * self.frequency_hz[upper] / 0.05):
+            distance += np.abs(values - np.median(values))
+        return np.int64(upper[int(np.argmin(distance))])
+
+
+def stabilisation(
+    responses: FrequencyResponseMatrix,
+    orders: Sequence[int] | None = None,
+    *,
+    weighting: Weighting = "auto",
+    frequency_tolerance: float = 0.01,
+    damping_tolerance: float = 0.05,
+    lowest_mac: float = 0.95,
+) -> StabilisationDiagram:
+    """Poles of subspace models of rising order, in continuous time.
+
+    The bilinear map ``z = (1 + s/a) / (1 - s/a)`` spreads the band over the unit circle; it takes rational responses to
+    rational ones exactly, as sampling does not.
+
+    Parameters
+    ----------
+    responses
+        One or several inputs and outputs; every output a motion.
+    orders
+        Numbers of states, 2 to 40 in steps of two if None (fewer where there are few lines).
+    weighting
+        As in `linear_modes`.
+    frequency_tolerance, damping_tolerance
+        Largest relative difference from the order before of a stable pole.
+    lowest_mac
+        Least modal assurance criterion between the shapes.
+
+    Raises
+    ------
+    IdentificationError
+        On orders that are not above zero, or too high for the number of lines.
+    """
+    return diagram(
+        weighted_accelerance(responses, weighting), orders, (frequency_tolerance, damping_tolerance, lowest_mac)
+    )
+
+
+def diagram(
+    data: WeightedResponses, orders: Sequence[int] | None, tolerances: tuple[float, float, float] = (0.01, 0.05, 0.95)
+) -> StabilisationDiagram:
+    """`stabilisation` of weighted accelerances."""
+    lines, outputs, inputs = data.value.shape
+    most = 2 * lines * inputs // (outputs + inputs) - 2
+    tried = sorted(set(order for order in _ORDERS if order <= most) if orders is None else set(orders))
+    if not tried or tried[0] < 1:
+        raise IdentificationError(f"orders: {tried or 'none'} for {lines} lines, needs numbers from 1 to {most}")
+    middle = float(np.sqrt(np.abs(data.s[0]) * np.abs(data.s[-1])))
+    space = observable_space(data, np.asarray((1.0 + data.s / middle) / (1.0 - data.s / middle)), max(tried) + 2)
+    band_hz = (data.frequency_hz[0], data.frequency_hz[-1])
+    parts: list[tuple[NDArray[np.generic], ...]] = []
+    before: tuple[Float, Float, Complex] = (np.zeros(0), np.zeros(0), np.zeros((0, outputs), dtype=np.complex128))
+    for order in tried:
+        a, c = space.state_matrices(order)
+        frequency, damping, shapes = now = _poles(a, c, middle)
+        like = _alike(now, before, tolerances)
+        physical = (damping > 0.0) & (damping < _LARGEST_DAMPING)
+        physical &= (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+        parts.append((np.full(frequency.size, order), frequency, damping, shapes, *like, physical))
+        before = now
+    names = ("order", "frequency_hz", "damping_ratio", "shapes", "frequency_stable", "damping_stable", "shape_stable")
+    arrays = dict(zip((*names, "physical"), (np.concatenate(part) for part in zip(*parts, strict=True)), strict=True))
+    return StabilisationDiagram(**arrays, orders=np.array(tried), singular_values=space.singular_values)
+
+
+def _poles(a: Float, c: Float, middle: float) -> tuple[Float, Float, Complex]:
+    """Frequencies (Hz), damping ratios and unit shapes of the oscillating poles, mapped back from the unit circle."""
+    z, vectors = np.linalg.eig(a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        poles = middle * (z - 1.0) / (z + 1.0)
+    kept = np.flatnonzero(np.isfinite(poles) & (poles.imag > 0.0))
+    kept = kept[np.argsort(np.abs(poles[kept]))]
+    shapes = (c @ vectors[:, kept]).T
+    shapes = shapes / np.maximum(np.linalg.norm(shapes, axis=1, keepdims=True), 1e-300)
+    return np.abs(poles[kept]) / (2.0 * np.pi), -poles[kept].real / np.abs(poles[kept]), shapes
+
+
+def _alike(
+    now: tuple[Float, Float, Complex], before: tuple[Float, Float, Complex], tolerances: tuple[float, float, float]
+) -> tuple[Bool, Bool, Bool]:
+    """Whether any pole of the order before agrees in frequency; also in damping; also in shape."""
+    frequency = np.abs(now[0][:, None] - before[0]) <= tolerances[0] * now[0][:, None]
+    damping = frequency & (np.abs(now[1][:, None] - before[1]) <= tolerances[1] * np.abs(now[1][:, None]))
+    shape = damping & (np.abs(now[2] @ np.conj(before[2].T)) ** 2 >= tolerances[2])
+    return frequency.any(axis=1), damping.any(axis=1), shape.any(axis=1)

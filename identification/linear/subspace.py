@@ -1,0 +1,160 @@
+"""Frequency-domain subspace: a discrete-time state-space model straight from frequency responses.
+
+With ``z_k`` on the unit circle, ``H(z) = C (z - A)^-1 B + D`` and ``w(z) = (1, z, ..., z^(r-1))``,
+
+    w(z_k) (x) H_k = O X_k + Gamma (w(z_k) (x) I),   O = (C; C A; ...; C A^(r-1)),
+
+so that what is left of the first block after projecting the second out spans the extended observability matrix
+(McKelvey, Akcay and Ljung, IEEE TAC 41, 1996; with noise weighting Pintelon and Schoukens, 2nd ed., section 9.7 and
+Pintelon, Automatica 38, 2002). Lines may lie anywhere on the circle, equally spaced or not.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.linear.accelerance import WeightedResponses, Weighting, weighted_responses
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.validation import positive
+
+__all__ = ["ObservableSpace", "StateSpace", "observable_space", "subspace"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+class StateSpace(NamedTuple):
+    """``x(k+1) = A x(k) + B u(k)``, ``y(k) = C x(k) + D u(k)``."""
+
+    a: Float
+    b: Float
+    c: Float
+    d: Float
+
+    def response(self, z: Complex) -> Complex:
+        """complex[n, n_outputs, n_inputs]: ``C (z - A)^-1 B + D`` at points z."""
+        left = z[:, None, None] * np.eye(self.a.shape[0]) - self.a
+        return np.asarray(self.c @ np.linalg.solve(left, np.broadcast_to(self.b, (z.size, *self.b.shape))) + self.d)
+
+
+@dataclass(frozen=True, eq=False)
+class ObservableSpace:
+    """What the data say of the extended observability matrix, most prominent direction first.
+
+    Parameters
+    ----------
+    basis
+        float[r n_outputs, n], columns in the order of ``singular_values``.
+    singular_values
+        float[n]; with noise weighting those of noise lie about one level, those of the system above.
+    n_outputs
+        Rows of a block.
+    """
+
+    basis: Float
+    singular_values: Float
+    n_outputs: int
+
+    def state_matrices(self, order: int) -> tuple[Float, Float]:
+        """A and C of a model of the given order, by shifting the observability matrix by one block."""
+        observability = self.basis[:, :order]
+        shifted = np.linalg.lstsq(observability[: -self.n_outputs], observability[self.n_outputs :], rcond=None)[0]
+        return np.asarray(shifted), np.asarray(observability[: self.n_outputs])
+
+
+def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> ObservableSpace:
+    """Extended observability matrix of ``block_rows`` blocks from responses at points ``z`` of the unit circle.
+
+    Raises `IdentificationError` where there are fewer values than unknowns.
+    """
+    lines, outputs, inputs = data.value.shape
+    if 2 * lines * inputs < block_rows * (outputs + inputs):
+        raise IdentificationError(
+            f"frequency_hz: {lines} lines are too few for {block_rows} block rows of {outputs} outputs and {inputs} "
+            f"inputs, needs {-(-block_rows * (outputs + inputs) // (2 * inputs))}; lower the order"
+        )
+    # A weight per line keeps the equations exact; lines of small error count more.
+    weight = 1.0 / np.sqrt(np.mean(data.std**2, axis=(1, 2)))
+    powers = z[:, None] ** np.arange(block_rows) * (weight / np.linalg.norm(weight))[:, None]
+    response = np.einsum("kr,koi->roki", powers, data.value).reshape(block_rows * outputs, -1)
+    excitation = np.einsum("kr,ji->rjki", powers, np.eye(inputs)).reshape(block_rows * inputs, -1)
+    stacked = np.vstack([excitation, response])
+    triangle = np.linalg.qr(np.hstack([stacked.real, stacked.imag]).T, mode="r").T
+    left = block_rows * inputs
+    remainder = triangle[left:, left:]
+    if data.covariance is None:
+        colour = np.eye(block_rows * outputs)
+    else:
+        tensor = data.smooth.reshape(lines, outputs, inputs, outputs, inputs)
+        one = np.einsum("koipi->kop", tensor)
+        spread = np.einsum("kr,ks,kop->rosp", powers, np.conj(powers), one, optimize=True)
+        colour = np.linalg.cholesky(spread.reshape(remainder.shape).real)
+    vectors, values, _ = np.linalg.svd(np.linalg.solve(colour, remainder))
+    return ObservableSpace(np.asarray(colour @ vectors), values, outputs)
+
+
+def subspace(
+    responses: FrequencyResponseMatrix,
+    order: int,
+    *,
+    sample_rate_hz: float,
+    block_rows: int | None = None,
+    weighting: Weighting = "auto",
+) -> StateSpace:
+    """Discrete-time state-space model of given order from frequency responses, weighted by their covariance.
+
+    Parameters
+    ----------
+    responses
+        One or several inputs and outputs, lines below half the sample rate.
+    order
+        Number of states.
+    sample_rate_hz
+        Rate of the model, ``z = exp(2 pi i f / sample_rate_hz)``.
+    block_rows
+        Rows r of the observability matrix; ``order + 2`` if None.
+    weighting
+        Which covariance weights the lines: ``total``, ``noise``, ``relative`` (none), or the first that is known.
+
+    Raises
+    ------
+    IdentificationError
+        On an order below one, too few block rows or lines, or lines at or above half the sample rate.
+    """
+    if order < 1:
+        raise IdentificationError(f"order: is {order}, needs at least 1")
+    if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
+        raise IdentificationError(
+            f"sample_rate_hz: is {sample_rate_hz:g} Hz, needs more than twice {responses.frequency_hz[-1]:g} Hz"
+        )
+    rows = order + 2 if block_rows is None else block_rows
+    if (rows - 1) * len(responses.outputs) < order:
+        raise IdentificationError(
+            f"block_rows: is {rows}, too few for order {order} of {len(responses.outputs)} outputs"
+        )
+    data = weighted_responses(responses, weighting)
+    z = np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz)
+    a, c = observable_space(data, z, rows).state_matrices(order)
+    return _with_inputs(data, z, a, c)
+
+
+def _with_inputs(data: WeightedResponses, z: Complex, a: Float, c: Float) -> StateSpace:
+    """B and D by least squares, given A and C; every response weighted by its own deviation."""
+    order, outputs, inputs = a.shape[0], c.shape[0], data.value.shape[2]
+    left = np.swapaxes(z[:, None, None] * np.eye(order) - a, 1, 2)
+    rows = np.swapaxes(np.linalg.solve(left, np.broadcast_to(c.T, (z.size, order, outputs))), 1, 2)
+    design = np.concatenate([rows, np.broadcast_to(np.eye(outputs), (z.size, outputs, outputs))], axis=2)
+    columns = []
+    for i in range(inputs):
+        weight = 1.0 / data.std[:, :, i] if data.covariance is not None else np.ones((z.size, outputs))
+        scaled = (design * weight[:, :, None]).reshape(-1, order + outputs)
+        value = (data.value[:, :, i] * weight).ravel()
+        real = np.vstack([scaled.real, scaled.imag])
+        size = np.linalg.norm(real, axis=0)
+        solution = np.linalg.lstsq(real / size, np.concatenate([value.real, value.imag]), rcond=None)[0]
+        columns.append(solution / size)
+    both = np.array(columns).T
+    return StateSpace(a, both[:order], c, both[order:])

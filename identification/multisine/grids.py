@@ -1,0 +1,47 @@
+"""Which lines of a band a multisine excites, and which it leaves out to listen for nonlinear distortion.
+
+Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., section 4.3: under odd excitation an
+even nonlinearity is heard on even lines only, an odd one on odd lines, of which a random few are kept silent.
+"""
+
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+
+__all__ = ["Grid", "check_grid", "excited_lines"]
+
+Lines = NDArray[np.int64]
+Grid = Literal["full", "odd", "odd-random"]
+
+_APART = 2**32 - 1  # a key that no realisation has
+
+
+def check_grid(grid: str, detection_group: int, grid_seed: int) -> None:
+    """Refuse a grid that is not known, and groups and seeds that cannot be."""
+    if grid not in get_args(Grid):
+        raise IdentificationError(f"grid: is '{grid}', allowed are {', '.join(get_args(Grid))}")
+    if detection_group < 2:
+        raise IdentificationError(f"detection_group: is {detection_group}, needs at least 2 odd lines")
+    if grid_seed < 0:
+        raise IdentificationError(f"grid_seed: is {grid_seed}, needs zero or more")
+
+
+def excited_lines(band: Lines, grid: Grid, detection_group: int, grid_seed: int) -> Lines:
+    """int[n]: the lines of ``band`` that are excited; empty if there is none, or no detection line where some are asked for.
+
+    ``odd-random`` leaves out one of every ``detection_group`` odd lines in turn; an incomplete last group is excited whole.
+    """
+    if grid == "full":
+        return band
+    odd: Lines = band[band % 2 == 1]
+    if grid == "odd":
+        return odd
+    groups = odd.size // detection_group
+    if not groups:
+        return odd[:0]
+    random = np.random.default_rng(np.random.SeedSequence(grid_seed, spawn_key=(_APART,)))
+    silent = np.arange(groups) * detection_group + random.integers(0, detection_group, groups)
+    return np.asarray(np.delete(odd, silent))

@@ -1,0 +1,241 @@
+"""Several backbones of one specimen: what repeats, what scatters, and one model that holds the scatter.
+
+Runs never meet the same amplitudes. Each run's properties are interpolated (PCHIP) over the drive point's amplitude to
+common levels within the range that all runs cover. What is measured of one run holds its own random error, so the
+variance between runs is the observed one less the mean of these: ``s_between^2 = s_observed^2 - mean s_within^2``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.backbones import Backbone
+from identification.errors import IdentificationError
+from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
+from identification.nonlinear.phase_resonance import nonlinear_mode
+
+__all__ = ["Repeatability", "combined", "repeatability"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Repeatability:
+    """Modal frequency and damping of several runs at common amplitudes.
+
+    Parameters
+    ----------
+    amplitude_m
+        float[n], amplitudes of the drive point that all runs cover.
+    modal_frequency_hz, damping_ratio
+        float[n_runs, n], of each run.
+    modal_frequency_within_hz, damping_ratio_within
+        float[n], random standard error of a single run, root of the mean square over runs; NaN if unknown.
+    specimen
+        Name of what was tested.
+    """
+
+    amplitude_m: Float
+    modal_frequency_hz: Float
+    damping_ratio: Float
+    modal_frequency_within_hz: Float
+    damping_ratio_within: Float
+    specimen: str = ""
+
+    def mean(self, quantity: str) -> Float:
+        """float[n]: mean over runs of ``modal_frequency_hz`` or ``damping_ratio``."""
+        return np.asarray(np.mean(self._runs(quantity), axis=0))
+
+    def std(self, quantity: str) -> Float:
+        """float[n]: standard deviation over runs, as observed."""
+        return np.asarray(np.std(self._runs(quantity), axis=0, ddof=1))
+
+    def range(self, quantity: str) -> Float:
+        """float[n]: largest less smallest run."""
+        return np.asarray(np.ptp(self._runs(quantity), axis=0))
+
+    def between(self, quantity: str) -> Float:
+        """float[n]: standard deviation between runs, the random error within them taken out (as it is if unknown)."""
+        within = self.modal_frequency_within_hz if quantity == "modal_frequency_hz" else self.damping_ratio_within
+        return np.asarray(np.sqrt(np.maximum(self.std(quantity) ** 2 - np.nan_to_num(within) ** 2, 0.0)))
+
+    def scatter(self, quantity: str) -> tuple[float, float, float]:
+        """Relative scatter of whole runs, and the 95 % interval that so few runs leave it.
+
+        Each run's deviation from the mean is averaged over the levels: a specimen that came out stiffer is so at all of
+        them. Its standard deviation over R runs is distributed as chi with R - 1 degrees of freedom.
+        """
+        from scipy.stats import chi2
+
+        runs = self._runs(quantity)
+        shift = np.mean(runs / np.mean(runs, axis=0) - 1.0, axis=1)
+        free = runs.shape[0] - 1
+        size = float(np.std(shift, ddof=1))
+        low, high = (float(size * np.sqrt(free / chi2.ppf(p, free))) for p in (0.975, 0.025))
+        return size, low, high
+
+    def table(self) -> list[dict[str, float | None]]:
+        """One dictionary per common amplitude, ready for JSON."""
+        columns = {"amplitude_m": self.amplitude_m}
+        for name in ("modal_frequency_hz", "damping_ratio"):
+            columns[name] = self.mean(name)
+            columns[f"{name}_std"] = self.std(name)
+            columns[f"{name}_range"] = self.range(name)
+            columns[f"{name}_between"] = self.between(name)
+        return [
+            {name: float(v) if np.isfinite(v := values[row]) else None for name, values in columns.items()}
+            for row in range(self.amplitude_m.size)
+        ]
+
+    def _runs(self, quantity: str) -> Float:
+        if quantity not in ("modal_frequency_hz", "damping_ratio"):
+            raise IdentificationError(f"quantity: is '{quantity}', allowed are modal_frequency_hz, damping_ratio")
+        return np.asarray(getattr(self, quantity))
+
+
+def repeatability(runs: Sequence[NonlinearMode | Backbone]) -> Repeatability:
+    """What repeats over several backbones of the same specimen.
+
+    Parameters
+    ----------
+    runs
+        Nonlinear modes, or backbones (then identified with their ``drive_mode_shape``); a backbone with several passes,
+        up and down or repeated, counts as one run per pass. Two runs at the least.
+
+    Raises
+    ------
+    IdentificationError
+        On fewer than two runs, different specimens or channels, runs without a common range of amplitudes.
+    """
+    modes = _modes(runs)
+    levels = _common_levels(modes)
+    within = {name: np.array([_at(levels, mode, mode.random(name)) for mode in modes]) for name in _COMPARED}
+    return Repeatability(
+        amplitude_m=levels,
+        modal_frequency_hz=np.array([_at(levels, mode, mode.modal_frequency_hz) for mode in modes]),
+        damping_ratio=np.array([_at(levels, mode, mode.damping_ratio) for mode in modes]),
+        modal_frequency_within_hz=np.sqrt(np.mean(within["modal_frequency_hz"] ** 2, axis=0)),
+        damping_ratio_within=np.sqrt(np.mean(within["damping_ratio"] ** 2, axis=0)),
+        specimen=modes[0].specimen,
+    )
+
+
+def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
+    """One nonlinear mode from several runs, with standard errors of what the specimen will do in a further run.
+
+    Properties are means over runs at common amplitudes. Their variance is ``(1 + 1/R) s_observed^2`` over R runs plus that
+    of the systematic errors, which all runs share; intervals use Student's quantile for so few runs. Where one run's own
+    random error is larger than what is observed, it takes the place of the latter. Harmonics are turned so that the
+    drive point's fundamental is real before they are averaged.
+
+    Raises
+    ------
+    IdentificationError
+        As for `repeatability`.
+    """
+    from scipy.stats import t
+
+    modes = _modes(runs)
+    levels = _common_levels(modes)
+    count = len(modes)
+    out: dict[str, Float] = {"amplitude_m": levels}
+    intervals = np.full((levels.size, len(QUANTITIES), 2), np.nan)
+    systematic = np.full((levels.size, len(QUANTITIES)), np.nan)
+    for column, name in enumerate(QUANTITIES):
+        values = np.array([_at(levels, mode, getattr(mode, name)) for mode in modes])
+        own = np.array([_at(levels, mode, mode.random(name)) for mode in modes])
+        shared = np.mean([_at(levels, mode, mode.systematic(name)) for mode in modes], axis=0)
+        mean, scatter = np.mean(values, axis=0), np.std(values, axis=0, ddof=1)
+        if name == "amplitude_m":  # the levels are chosen, not found
+            mean, scatter = levels, np.zeros(levels.size)
+        scatter = np.sqrt((1.0 + 1.0 / count) * np.fmax(scatter**2, np.mean(own**2, axis=0)))
+        out[name], out[STANDARD_ERRORS[name]] = mean, np.hypot(scatter, np.nan_to_num(shared))
+        systematic[:, column] = shared
+        half = np.hypot(t.ppf(0.975, count - 1) * scatter, 1.96 * np.nan_to_num(shared))
+        intervals[:, column] = np.column_stack([mean - half, mean + half])
+        if name in ("mac", "force_purity", "response_purity"):
+            intervals[:, column] = np.clip(intervals[:, column], 0.0, 1.0)
+    for name in ("frequency_hz", "damping_ratio_uncorrected", "fit_residual"):
+        out[name] = np.mean([_at(levels, mode, getattr(mode, name)) for mode in modes], axis=0)
+    harmonics = min(mode.force_harmonics.shape[1] for mode in modes)
+    return NonlinearMode(
+        **out,
+        systematic_std=systematic,
+        interval_95=intervals,
+        force_harmonics=_mean_harmonics(levels, modes, "force_harmonics", harmonics),
+        response_harmonics_m=_mean_harmonics(levels, modes, "response_harmonics_m", harmonics),
+        source="several backbones",
+        specimen=modes[0].specimen,
+        notes=tuple(dict.fromkeys([note for mode in modes for note in mode.notes])),
+    )
+
+
+_COMPARED = ("modal_frequency_hz", "damping_ratio")
+
+
+def _modes(runs: Sequence[NonlinearMode | Backbone]) -> list[NonlinearMode]:
+    """One nonlinear mode per run."""
+    backbones = [run for run in runs if isinstance(run, Backbone)]
+    for number, backbone in enumerate(backbones[1:], 2):
+        if backbone.channels != backbones[0].channels:
+            names = ", ".join(channel.name for channel in backbone.channels)
+            first = ", ".join(channel.name for channel in backbones[0].channels)
+            raise IdentificationError(f"runs: channels of backbone {number} are {names}, of the first {first}")
+    modes = [
+        mode
+        for run in runs
+        for mode in ([run] if isinstance(run, NonlinearMode) else [nonlinear_mode(one) for one in run.passes()])
+    ]
+    if len(modes) < 2:
+        raise IdentificationError(f"runs: {len(modes)} given, repeatability needs two at least")
+    if len(specimens := {mode.specimen for mode in modes}) > 1:
+        raise IdentificationError(f"runs: of different specimens ({', '.join(sorted(specimens))})")
+    if len(sources := {mode.source for mode in modes}) > 1:
+        raise IdentificationError(f"runs: from different kinds of tests ({', '.join(sorted(sources))})")
+    return modes
+
+
+def _common_levels(modes: Sequence[NonlinearMode]) -> Float:
+    """Amplitudes that all runs cover: the mean ones level by level if there are as many in each run, else evenly spread."""
+    amplitudes = [np.sort(mode.amplitude_m) for mode in modes]
+    low, high = max(a[0] for a in amplitudes), min(a[-1] for a in amplitudes)
+    if not low < high:
+        raise IdentificationError(
+            "runs: no common range of amplitudes; "
+            + ", ".join(f"{1e3 * a[0]:.4g} to {1e3 * a[-1]:.4g} mm" for a in amplitudes)
+        )
+    sizes = {a.size for a in amplitudes}
+    levels = np.mean(amplitudes, axis=0) if len(sizes) == 1 else np.geomspace(low, high, min(sizes))
+    return np.unique(np.clip(levels, low, high))
+
+
+def _at(levels: Float, mode: NonlinearMode, values: Float) -> Float:
+    """``values`` of a run at the common levels; NaN where the run does not know them."""
+    from scipy.interpolate import PchipInterpolator
+
+    amplitude, first = np.unique(mode.amplitude_m, return_index=True)
+    if not np.isfinite(values[first]).all():
+        return np.full(levels.size, np.nan)
+    return np.asarray(PchipInterpolator(amplitude, values[first])(levels))
+
+
+def _mean_harmonics(levels: Float, modes: Sequence[NonlinearMode], name: str, harmonics: int) -> Complex:
+    """complex[n, H + 1]: mean over runs, turned so that the drive point's fundamental is real."""
+    out = np.empty((levels.size, harmonics), np.complex128)
+    orders = np.arange(harmonics)
+    turned = [
+        getattr(mode, name)[:, :harmonics] * np.exp(-1j * np.outer(np.angle(mode.response_harmonics_m[:, 1]), orders))
+        for mode in modes
+    ]
+    for h in orders:
+        parts = [
+            [_at(levels, mode, part(rows[:, h])) for mode, rows in zip(modes, turned, strict=True)] for part in _PARTS
+        ]
+        out[:, h] = np.mean(parts[0], axis=0) + 1j * np.mean(parts[1], axis=0)
+    return out
+
+
+_PARTS = (np.real, np.imag)

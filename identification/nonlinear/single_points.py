@@ -1,0 +1,143 @@
+"""A nonlinear mode from single points of stepped-sine tests, whatever was controlled.
+
+Every settled point near resonance obeys the one-mode equation at its own amplitude,
+
+    w^2 - W^2 + 2 i W w z = phi_d^2 F / Q',    Q' = Q - R F,
+
+with Q the displacement at the drive point and R the receptance of all other modes there. Both sides of the resonance pass
+the same amplitudes, so that a level gives every amplitude between its wings and its peak up to twice. Far from resonance
+F / Q is nearly real: then a degree of phase error, or of R, is a large share of the damping. Such points are left out.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.frequency_responses import FrequencyResponse
+from identification.linear.modes import LinearModes
+from identification.nonlinear.nonlinear_modes import NonlinearMode
+
+__all__ = ["single_point_mode"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_FAR_DEG = 30.0
+
+
+def single_point_mode(
+    responses: Sequence[FrequencyResponse],
+    drive_mode_shape: float,
+    *,
+    phase_window_deg: float = 60.0,
+    modes: LinearModes | None = None,
+    mode: int | None = None,
+) -> NonlinearMode:
+    """Nonlinear mode from points near resonance, each by itself.
+
+    Parameters
+    ----------
+    responses
+        Stepped-sine responses at the drive point: force, response, voltage or nothing controlled.
+    drive_mode_shape
+        Mass-normalised shape of the tested mode at the drive point, kg^-1/2.
+    phase_window_deg
+        Points whose phase lag is within this of 90 degrees are used.
+    modes, mode
+        Linear modal analysis whose other modes and residual terms are taken out of the response (R above), and the
+        index of the tested one (the nearest to the points if None). Without it R is zero.
+
+    Returns
+    -------
+    NonlinearMode
+        One entry per point, smallest amplitude first; ``frequency_hz`` and ``phase_lag_deg`` say how far from resonance each
+        is. Standard errors are NaN: fundamentals alone have none. Harmonics, total power, purity and MAC are NaN.
+
+    Raises
+    ------
+    IdentificationError
+        Without a point in the window, on a mode shape of zero, a window that is not allowed.
+    """
+    if not 0.0 < phase_window_deg <= 80.0:
+        raise IdentificationError(f"phase_window_deg: is {phase_window_deg:g}, allowed is above 0 to 80")
+    if not (np.isfinite(drive_mode_shape) and drive_mode_shape):
+        raise IdentificationError(f"drive_mode_shape: is {drive_mode_shape}, must be finite and not zero")
+    if not responses:
+        raise IdentificationError("responses: none given, needs one at least")
+    frequency = np.concatenate([response.frequency_hz for response in responses])
+    force = np.concatenate([response.force for response in responses])
+    motion = np.concatenate([response.displacement_m for response in responses])
+    lag = np.degrees(np.angle(force * np.conj(motion)))
+    near = np.abs(lag - 90.0) <= phase_window_deg
+    if not near.any():
+        raise IdentificationError(
+            f"responses: none of {near.size} points lies within {phase_window_deg:g} deg of phase resonance "
+            f"(lags {lag.min():.0f} to {lag.max():.0f} deg); measure nearer to resonance, or check the polarity"
+        )
+    order = np.flatnonzero(near)[np.argsort(np.abs(motion[near]), kind="stable")]
+    return _identified(
+        responses, drive_mode_shape, frequency[order], force[order], motion[order], near.size, modes, mode
+    )
+
+
+def _identified(
+    responses: Sequence[FrequencyResponse],
+    shape: float,
+    frequency: Float,
+    force: Complex,
+    motion: Complex,
+    given: int,
+    modes: LinearModes | None,
+    mode: int | None,
+) -> NonlinearMode:
+    """The one-mode equation at every point."""
+    omega = 2.0 * np.pi * frequency
+    own = motion
+    if modes is not None:
+        tested = modes.nearest(float(np.median(frequency))) if mode is None else mode
+        own = motion - modes.receptance(frequency, without=tested) * force
+    stiffness = shape**2 * force / own
+    squared = omega**2 + stiffness.real
+    if np.any(squared <= 0.0):
+        worst = int(np.argmin(squared))
+        raise IdentificationError(
+            f"drive_mode_shape: {shape:g} gives no real modal frequency at {frequency[worst]:g} Hz; check it and the units"
+        )
+    modal = np.sqrt(squared)
+    unknown = np.full(frequency.size, np.nan)
+    lag = np.degrees(np.angle(force * np.conj(motion)))
+    q = np.abs(own) / abs(shape)
+    nothing = unknown.astype(np.complex128)
+    far = int(np.count_nonzero(np.abs(lag - 90.0) > _FAR_DEG))
+    notes = ["from single points of stepped sines: no standard errors, harmonics, total power, purity or MAC"]
+    if given > frequency.size:
+        notes.append(f"{given - frequency.size} of {given} points left out: too far from phase resonance")
+    if far:
+        notes.append(
+            f"{far} points are more than {_FAR_DEG:g} deg from phase resonance: their damping is the less certain"
+        )
+    return NonlinearMode(
+        force_n=np.abs(force),
+        frequency_hz=frequency,
+        phase_lag_deg=lag,
+        amplitude_m=np.abs(motion),
+        modal_frequency_hz=modal / (2.0 * np.pi),
+        modal_frequency_std_hz=unknown,
+        damping_ratio=stiffness.imag / (2.0 * omega * modal),
+        damping_ratio_std=unknown,
+        damping_ratio_total_power=unknown,
+        damping_ratio_uncorrected=0.5 * np.imag(force / motion) * np.abs(motion) ** 2 / (omega**2 * q**2),
+        modal_amplitude=q,
+        apparent_mass_kg=np.full(frequency.size, shape**-2),
+        mac=unknown,
+        force_purity=unknown,
+        response_purity=unknown,
+        fit_residual=unknown,
+        force_harmonics=np.column_stack([nothing, force]),
+        response_harmonics_m=np.column_stack([nothing, motion]),
+        source="stepped sine",
+        specimen=responses[0].specimen,
+        notes=tuple(notes),
+    )

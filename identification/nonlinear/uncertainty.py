@@ -1,0 +1,220 @@
+"""Monte Carlo over everything that is measured: which errors go into a nonlinear mode, and what they do to it.
+
+Random errors, of each point for itself: Fourier coefficients of all channels and harmonics, drawn with the tails that a
+standard error from so many batches has (Student), and the slope of the drift. Systematic ones, the same at all points:
+mass-normalised shapes, gains of the channels, phase skew (a delay: harmonic h turns h times as far).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.backbones import Backbone
+from identification.channels import MOTION_ORDER, find_role
+from identification.errors import IdentificationError
+from identification.measurements import PeriodicVibration
+from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
+from identification.nonlinear.properties import States, properties
+from identification.signals.fourier import batches_of
+
+__all__ = ["ErrorModel", "propagated"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_BOUNDED = ("mac", "force_purity", "response_purity")
+_TAILS = (2.5, 97.5)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorModel:
+    """What may be wrong with a backbone, beside the noise that its points know of.
+
+    Parameters
+    ----------
+    calibration_std
+        Relative standard error of the sensitivity of each channel: one number for all, or by channel name.
+    phase_skew_std_deg
+        Standard error of each channel's phase at the fundamental, likewise.
+    draws, seed
+        Of the Monte Carlo; the same seed gives the same numbers.
+    """
+
+    calibration_std: float | Mapping[str, float] = 0.0
+    phase_skew_std_deg: float | Mapping[str, float] = 0.0
+    draws: int = 1000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.draws < 100:
+            raise IdentificationError(f"draws: is {self.draws}, needs at least 100")
+
+    def per_channel(self, name: str, backbone: Backbone) -> Float:
+        """float[n_channels]: the field ``name`` of each channel; raises `IdentificationError` for unknown ones."""
+        given = getattr(self, name)
+        names = [channel.name for channel in backbone.channels]
+        if isinstance(given, Mapping):
+            if unknown := set(given) - set(names):
+                raise IdentificationError(f"{name}: no channel '{sorted(unknown)[0]}'; channels: {', '.join(names)}")
+            values = np.array([float(given.get(channel, 0.0)) for channel in names])
+        else:
+            values = np.full(len(names), float(given))
+        if not np.all(np.isfinite(values) & (values >= 0.0)):
+            raise IdentificationError(f"{name}: is {given}, allowed is 0 or above")
+        return values
+
+
+def propagated(
+    states: States,
+    backbone: Backbone,
+    rows: tuple[int, ...],
+    shapes: Float | None,
+    shapes_std: Float | None,
+    model: ErrorModel,
+) -> dict[str, Float]:
+    """Standard errors, their systematic parts and intervals, by field of `NonlinearMode`.
+
+    ``rows`` are the channels of ``states.deflection_m``; ``shapes`` float[C, M] is what ``states.inverse`` inverts.
+    """
+    estimate = properties(states)
+    rng = np.random.default_rng(model.seed)
+    wrong = _systematic(states, backbone, rows, shapes, shapes_std, model, rng)
+    both = _random(wrong if wrong is not None else _repeated(states, model.draws), states, backbone, rows, rng)
+    total = _deviations(estimate, properties(both))
+    systematic = {name: np.zeros_like(total[name]) for name in total}
+    if wrong is not None:
+        systematic = _deviations(estimate, properties(wrong))
+    known = np.array([point.harmonics_std is not None for point in backbone.points])
+    out: dict[str, Float] = {}
+    intervals = np.empty((len(backbone.points), len(QUANTITIES), 2))
+    for column, name in enumerate(QUANTITIES):
+        out[STANDARD_ERRORS[name]] = np.where(known, _std(total[name]), np.nan)
+        # What the errors do to the estimate they did to the truth: the quantiles of the deviation, turned over.
+        low, high = np.percentile(total[name], _TAILS, axis=0)
+        intervals[:, column] = np.column_stack([estimate[name] - high, estimate[name] - low])
+        if name in _BOUNDED:
+            intervals[:, column] = np.clip(intervals[:, column], 0.0, 1.0)
+    intervals[~known] = np.nan
+    return {
+        **out,
+        "systematic_std": np.column_stack([_std(systematic[n]) for n in QUANTITIES]),
+        "interval_95": intervals,
+    }
+
+
+def _std(deviations: Float) -> Float:
+    return np.asarray(np.std(deviations, axis=0, ddof=1))
+
+
+def _deviations(estimate: Mapping[str, Float], drawn: Mapping[str, Float]) -> dict[str, Float]:
+    """float[draws, n] by quantity."""
+    out = {name: drawn[name] - estimate[name] for name in QUANTITIES}
+    out["phase_lag_deg"] = 180.0 - (180.0 - out["phase_lag_deg"]) % 360.0
+    return out
+
+
+def _repeated(states: States, draws: int) -> States:
+    """The same states once per draw."""
+
+    def often(values: Complex) -> Complex:
+        return np.broadcast_to(values, (draws, *values.shape))
+
+    return replace(
+        states,
+        force=often(states.force),
+        drive_m=often(states.drive_m),
+        drift=often(states.drift),
+        deflection_m=often(states.deflection_m),
+    )
+
+
+def _systematic(
+    states: States,
+    backbone: Backbone,
+    rows: tuple[int, ...],
+    shapes: Float | None,
+    shapes_std: Float | None,
+    model: ErrorModel,
+    rng: np.random.Generator,
+) -> States | None:
+    """States with the errors that all points share; None where there are none."""
+    calibration = model.per_channel("calibration_std", backbone)
+    skew = np.radians(model.per_channel("phase_skew_std_deg", backbone))
+    known = np.nan_to_num(shapes_std) if shapes_std is not None else np.zeros((0, 0))
+    if not (calibration.any() or skew.any() or known.any()):
+        return None
+    count = len(backbone.channels)
+    gain = 1.0 + calibration * rng.standard_normal((model.draws, count))
+    angle = skew * rng.standard_normal((model.draws, count))
+    wrong = _repeated(states, model.draws)
+    delay = np.outer(states.frequency_hz / states.frequency_hz[0], np.arange(states.force.shape[-1]))
+
+    def turned(row: int) -> Complex:
+        return np.asarray(gain[:, row, None, None] * np.exp(1j * angle[:, row, None, None] * delay))
+
+    force, drive = find_role(backbone.channels, "force"), find_role(backbone.channels, "drive")
+    wrong = replace(wrong, force=wrong.force * turned(force), drive_m=wrong.drive_m * turned(drive))
+    if rows:
+        turns = np.stack([turned(row)[..., 1] for row in rows], axis=-1)
+        wrong = replace(wrong, deflection_m=wrong.deflection_m * turns)
+    if shapes is None or not known.any():
+        return wrong
+    drawn = shapes + known * rng.standard_normal((model.draws, *shapes.shape))
+    inverse = np.zeros((model.draws, shapes.shape[1], len(rows)))
+    inverse[..., : shapes.shape[0]] = np.linalg.pinv(drawn)
+    wrong = replace(wrong, inverse=inverse)
+    same = states.linear_columns == tuple(range(shapes.shape[0])) and np.array_equal(states.linear_shape, shapes[:, 0])
+    return replace(wrong, linear_shape=drawn[..., 0]) if same else wrong
+
+
+def _random(
+    wrong: States, states: States, backbone: Backbone, rows: tuple[int, ...], rng: np.random.Generator
+) -> States:
+    """``wrong`` with errors of each point for itself added; the drive's are the same wherever it appears."""
+    draws, points = wrong.force.shape[0], backbone.points
+    freedom = np.array([2 * (batches_of(point.periods) - 1) for point in points], dtype=float)
+
+    def noise(row: int, harmonics: slice) -> Complex:
+        std = np.array([_errors(point)[row, harmonics] for point in points])
+        size = (draws, *std.shape)
+        tails = np.sqrt(freedom[:, None] / rng.chisquare(np.broadcast_to(freedom[:, None], size)))
+        return np.asarray(std * tails * (rng.standard_normal(size) + 1j * rng.standard_normal(size)))
+
+    force, drive = find_role(backbone.channels, "force"), find_role(backbone.channels, "drive")
+    drive_noise = noise(drive, slice(None)) * _to_displacement(points, drive)
+    deflection = wrong.deflection_m.copy()
+    for column, row in enumerate(rows):
+        own = drive_noise if row == drive else noise(row, slice(1, 2)) * _to_displacement(points, row)[:, 1:2]
+        deflection[..., column] += own[..., 1 if row == drive else 0]
+    return replace(
+        wrong,
+        force=wrong.force + noise(force, slice(None)),
+        drive_m=wrong.drive_m + drive_noise,
+        deflection_m=deflection,
+        drift=wrong.drift + _drift_noise(states, backbone, rng, draws),
+    )
+
+
+def _errors(point: PeriodicVibration) -> Float:
+    return np.zeros(point.harmonics.shape) if point.harmonics_std is None else point.harmonics_std
+
+
+def _to_displacement(points: tuple[PeriodicVibration, ...], row: int) -> Float:
+    """float[n, H + 1]: size of the displacement per unit of the channel; 1 for harmonic 0, which is not used."""
+    order = MOTION_ORDER[points[0].channels[row].motion]
+    harmonic = np.maximum(np.arange(points[0].harmonics.shape[1]), 1)
+    return np.asarray([(2.0 * np.pi * point.frequency_hz * harmonic) ** -order for point in points], dtype=np.float64)
+
+
+def _drift_noise(states: States, backbone: Backbone, rng: np.random.Generator, draws: int) -> Complex:
+    """complex[draws, n]: the slope of a line over -1/2 ... 1/2 has the variance of its mean times twelve."""
+    row = find_role(backbone.channels, "drive")
+    relative = [
+        0.0 if point.drift is None else _errors(point)[row, 1] / abs(point.harmonics[row, 1]) / point.periods
+        for point in backbone.points
+    ]
+    std = np.sqrt(12.0) * np.array(relative) * states.frequency_hz
+    size = (draws, std.size)
+    return np.asarray(std * (rng.standard_normal(size) + 1j * rng.standard_normal(size)))

@@ -1,0 +1,1 @@
+"""Predictions from nonlinear modes: steady responses, sweeps, and their comparison with measurements."""

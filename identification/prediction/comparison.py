@@ -1,0 +1,187 @@
+"""How far predictions are from what was measured, or computed by other means: one row per response or sweep."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER
+from identification.errors import IdentificationError
+from identification.frequency_responses import FrequencyResponse
+from identification.prediction.peaks import peak_of
+from identification.prediction.properties import FLAGGED_BEYOND
+from identification.prediction.steady_prediction import SteadyPrediction
+
+__all__ = ["Comparison", "Over", "PredictionError", "compare", "error_table"]
+
+Float = NDArray[np.float64]
+Over = Literal["frequency", "phase"]
+
+
+@dataclass(frozen=True)
+class PredictionError:
+    """Errors of one predicted response or sweep; every error is relative: predicted over reference, minus one.
+
+    Parameters
+    ----------
+    name
+        What was predicted.
+    peak_error, peak_frequency_error
+        Of the largest amplitude, and of the frequency at which it occurs.
+    envelope_error
+        RMS of the difference of the amplitudes over the common part of both, over the reference's largest amplitude.
+    range_use
+        Largest modal amplitude of the prediction over the largest that the model was identified with.
+    notes
+        What a user should know about this comparison, one line each.
+    """
+
+    name: str
+    peak_error: float
+    peak_frequency_error: float
+    envelope_error: float
+    range_use: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Whether the model was asked about what it was identified with."""
+        if self.range_use <= 1.0:
+            return "inside the identified range"
+        return "extrapolated" if self.range_use <= FLAGGED_BEYOND else "extrapolated far"
+
+    def row(self) -> dict[str, float | str | list[str]]:
+        """The errors by name, verdict included: ready for JSON."""
+        return {
+            "name": self.name,
+            "peak_error": self.peak_error,
+            "peak_frequency_error": self.peak_frequency_error,
+            "envelope_error": self.envelope_error,
+            "range_use": self.range_use,
+            "verdict": self.verdict,
+            "notes": list(self.notes),
+        }
+
+
+def error_table(errors: Iterable[PredictionError]) -> str:
+    """Plain-text table, one line per prediction, errors in percent; raises `IdentificationError` if there are none."""
+    rows = list(errors)
+    if not rows:
+        raise IdentificationError("errors: is empty, needs at least one comparison")
+    width = max(len("prediction"), *(len(row.name) for row in rows))
+    lines = [f"{'prediction':{width}}   peak %  frequency %  envelope %  range use  verdict"]
+    for row in rows:
+        lines.append(
+            f"{row.name:{width}}  {100 * row.peak_error:+7.2f}  {100 * row.peak_frequency_error:+11.3f}  "
+            f"{100 * row.envelope_error:10.2f}  {row.range_use:9.2f}  {row.verdict}"
+        )
+    return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A predicted response beside its reference.
+
+    Parameters
+    ----------
+    error
+        The errors, as a row of a table.
+    reference
+        What it was compared with.
+    predicted_amplitude
+        float[n], predicted peak amplitude at each point of the reference, in the unit of its response; NaN where the
+        prediction has none.
+    """
+
+    error: PredictionError
+    reference: FrequencyResponse
+    predicted_amplitude: Float
+
+
+def compare(
+    prediction: SteadyPrediction,
+    reference: FrequencyResponse,
+    *,
+    channel: str | None = None,
+    over: Over = "frequency",
+    phase_window_deg: float = 90.0,
+) -> Comparison:
+    """Errors of a predicted frequency response against a measured, or otherwise computed, one.
+
+    Parameters
+    ----------
+    prediction
+        The prediction.
+    reference
+        What it is held against: amplitudes in its unit, at the frequencies or phase lags of its points.
+    channel
+        Predicted channel that belongs to the response; the drive point if None.
+    over
+        ``frequency``: at each frequency of the reference the stable prediction; where there are two, the nearer one.
+        ``phase``: at each phase lag of the reference, which tells all branches apart, unstable ones included.
+    phase_window_deg
+        Only points of the reference whose lag is within this of 90 degrees count for the envelope error.
+
+    Raises
+    ------
+    IdentificationError
+        If the two have no point in common, or the channel was not predicted.
+    """
+    if over not in get_args(Over):
+        raise IdentificationError(f"over: is '{over}', allowed are {', '.join(get_args(Over))}")
+    order = MOTION_ORDER[reference.kind]
+    scale = (2.0 * np.pi * prediction.frequency_hz) ** order
+    amplitude = prediction.amplitude_m(channel) * scale
+    used = np.abs(reference.phase_lag_deg - 90.0) <= phase_window_deg
+    if over == "phase":
+        predicted = _at_lags(prediction, amplitude, channel, reference.phase_lag_deg)
+    else:
+        predicted = _at_frequencies(prediction, amplitude, reference)
+    used &= np.isfinite(predicted)
+    if not np.any(used):
+        raise IdentificationError(
+            f"reference: no point in common with the prediction over {over}; check ranges and signs"
+        )
+    measured = np.abs(reference.response)
+    main = prediction.branch == 0
+    peak, peak_hz = peak_of(amplitude[main], prediction.frequency_hz[main])
+    top, top_hz = peak_of(measured, reference.frequency_hz)
+    notes = list(prediction.notes)
+    if missing := used.size - int(np.count_nonzero(used)):
+        notes.append(f"{missing} of {used.size} points of the reference are not compared")
+    error = PredictionError(
+        name=reference.label or prediction.name,
+        peak_error=peak / top - 1.0,
+        peak_frequency_error=peak_hz / top_hz - 1.0,
+        envelope_error=float(np.sqrt(np.mean((predicted - measured)[used] ** 2))) / top,
+        range_use=float(np.max(prediction.range_use[main])),
+        notes=tuple(notes),
+    )
+    return Comparison(error, reference, predicted)
+
+
+def _at_lags(prediction: SteadyPrediction, amplitude: Float, channel: str | None, lag_deg: Float) -> Float:
+    """Amplitudes of the main branch at phase lags; NaN outside."""
+    main = prediction.branch == 0
+    lag = prediction.phase_lag_deg(channel)[main]
+    order = np.argsort(lag, kind="stable")
+    return np.asarray(np.interp(lag_deg, lag[order], amplitude[main][order], left=np.nan, right=np.nan))
+
+
+def _at_frequencies(prediction: SteadyPrediction, amplitude: Float, reference: FrequencyResponse) -> Float:
+    """Stable amplitudes at the reference's frequencies, the nearer one to its amplitude; NaN where there is none."""
+    measured = np.abs(reference.response)
+    best = np.full(measured.size, np.nan)
+    frequency, stable = prediction.frequency_hz, prediction.stable
+    linked = stable[1:] & stable[:-1] & (prediction.branch[1:] == prediction.branch[:-1])
+    for k in np.flatnonzero(linked):
+        low, high = sorted((frequency[k], frequency[k + 1]))
+        hit = (reference.frequency_hz >= low) & (reference.frequency_hz <= high)
+        width = frequency[k + 1] - frequency[k]
+        share = (reference.frequency_hz[hit] - frequency[k]) / width if width else 0.0
+        value = amplitude[k] + share * (amplitude[k + 1] - amplitude[k])
+        nearer = ~(np.abs(best[hit] - measured[hit]) <= np.abs(value - measured[hit]))
+        best[hit] = np.where(nearer, value, best[hit])
+    return best

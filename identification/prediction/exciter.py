@@ -1,0 +1,217 @@
+"""An electrodynamic exciter with its amplifier and stinger, as a linear model from voltage and motion to force.
+
+With ``s = i W``, the voltage V at the amplifier's input, the displacements X_d of the drive point and X_a of the armature,
+
+    F = g_e V - Z X_a,    X_a = X_d + F / k_s,    g_e = g / (1 + s tau),    Z = s^2 m + s c + k + s b / (1 + s tau),
+
+g the force per volt of the blocked exciter at low frequency (amplifier gain times G / R), tau = L / R the coil's time
+constant, m moving mass, c and k suspension, b = G^2 / R what the back-EMF damps, 1 / k_s the stinger's compliance. A
+current amplifier is the case b = 0.
+
+The voltage that a recording holds is a number given to a converter, and the inputs have filters of their own.
+`VoltagePath` says what becomes of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+
+__all__ = ["PARAMETERS", "Exciter", "VoltagePath"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+PARAMETERS = (
+    "force_per_volt_n_v",
+    "coil_time_constant_s",
+    "moving_mass_kg",
+    "suspension_damping_n_s_m",
+    "suspension_stiffness_n_m",
+    "back_emf_damping_n_s_m",
+    "stinger_compliance_m_n",
+)
+"""The parameters g, tau, m, c, k, b, 1/k_s, in the order of `Exciter.covariance`."""
+
+
+@dataclass(frozen=True)
+class VoltagePath:
+    """From the recorded voltage to the one at the amplifier, as inputs with their filters show it.
+
+    A number held for a sampling interval T weakens line f by ``sinc(f T)`` and comes half a sample late. A recording pairs
+    inputs with the voltage that was on the converter only up to whole samples of latency; the rest, the delay of anti-alias
+    filters and what the images of the held output fold into the readings are one delay D at low frequency, with a first
+    correction. Force and motion have the coupling of their conditioners in common, which the voltage has not:
+
+        factor = sinc(f T) exp(-s D + s^3 D_3) s / (s + 2 pi f_c).
+
+    Parameters
+    ----------
+    sample_rate_hz
+        Rate of the converter; infinite where the voltage was measured at the amplifier.
+    delay_s, dispersion_s3
+        D and D_3.
+    coupling_hz
+        f_c, corner of the first-order high-pass of both force and motion; 0 for none.
+    """
+
+    sample_rate_hz: float = np.inf
+    delay_s: float = 0.0
+    dispersion_s3: float = 0.0
+    coupling_hz: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.sample_rate_hz > 0.0:
+            raise IdentificationError(f"sample_rate_hz: is {self.sample_rate_hz:g} Hz, must be above zero")
+        for name in ("delay_s", "dispersion_s3", "coupling_hz"):
+            if not np.isfinite(getattr(self, name)):
+                raise IdentificationError(f"{name}: is {getattr(self, name):g}, must be finite")
+
+    def factor(self, frequency_hz: ArrayLike) -> Complex:
+        """complex, like ``frequency_hz`` (Hz, above zero): amplitude at the amplifier over the recorded one."""
+        frequency = np.asarray(frequency_hz, dtype=np.float64)
+        s = 2j * np.pi * frequency
+        late = np.sinc(frequency / self.sample_rate_hz) * np.exp(s * (s**2 * self.dispersion_s3 - self.delay_s))
+        return np.asarray(late * s / (s + 2.0 * np.pi * self.coupling_hz))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Exciter:
+    """Amplifier, exciter and stinger of one rig; see the module's head for the equations.
+
+    Parameters
+    ----------
+    force_per_volt_n_v
+        g, N per volt at the amplifier's input.
+    coil_time_constant_s
+        tau.
+    moving_mass_kg, suspension_damping_n_s_m, suspension_stiffness_n_m
+        m, c, k.
+    back_emf_damping_n_s_m
+        b.
+    stinger_compliance_m_n
+        1 / k_s; zero for a rigid one.
+    covariance
+        float[7, 7], of the parameters in the order of `PARAMETERS`; zero where a value was given, NaN if unknown.
+    lowest_hz, highest_hz
+        Band that the parameters were found in.
+    fit_residual
+        Root of the mean square of misfit over expected error; 1 where nothing but noise is left; NaN if unknown.
+    path
+        What becomes of a recorded voltage.
+    source
+        Rig and exciter that the parameters belong to; they hold for no other.
+    notes
+        What a user should know about these numbers, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        On a value that is not finite, a force per volt that is zero, a covariance of another shape.
+    """
+
+    force_per_volt_n_v: float
+    coil_time_constant_s: float
+    moving_mass_kg: float
+    suspension_damping_n_s_m: float
+    suspension_stiffness_n_m: float
+    back_emf_damping_n_s_m: float
+    stinger_compliance_m_n: float = 0.0
+    covariance: Float | None = None
+    lowest_hz: float = np.nan
+    highest_hz: float = np.nan
+    fit_residual: float = np.nan
+    path: VoltagePath = VoltagePath()
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", tuple(self.notes))
+        for name in PARAMETERS:
+            if not np.isfinite(getattr(self, name)):
+                raise IdentificationError(f"{name}: is {getattr(self, name):g}, must be finite")
+        if self.force_per_volt_n_v == 0.0:
+            raise IdentificationError("force_per_volt_n_v: is 0, must not be zero")
+        size = len(PARAMETERS)
+        covariance = np.full((size, size), np.nan) if self.covariance is None else np.array(self.covariance, float)
+        if covariance.shape != (size, size):
+            raise IdentificationError(f"covariance: shape {covariance.shape}, needs {(size, size)}")
+        covariance.setflags(write=False)
+        object.__setattr__(self, "covariance", covariance)
+
+    @property
+    def values(self) -> Float:
+        """float[7]: the parameters in the order of `PARAMETERS`."""
+        return np.array([getattr(self, name) for name in PARAMETERS])
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard error of each parameter by name; 0 where a value was given, NaN if unknown."""
+        return dict(zip(PARAMETERS, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
+
+    def force_per_volt(self, s: ArrayLike) -> Complex:
+        """complex, like ``s`` (rad/s): ``g_e``, N/V, of the blocked exciter."""
+        return np.asarray(self.force_per_volt_n_v / (1.0 + np.asarray(s) * self.coil_time_constant_s))
+
+    def dynamic_stiffness(self, s: ArrayLike) -> Complex:
+        """complex, like ``s`` (rad/s): ``Z``, N/m, force that the armature's displacement takes away."""
+        s = np.asarray(s, dtype=np.complex128)
+        back_emf = self.back_emf_damping_n_s_m / (1.0 + s * self.coil_time_constant_s)
+        mechanical = (s * self.moving_mass_kg + self.suspension_damping_n_s_m) * s + self.suspension_stiffness_n_m
+        return np.asarray(mechanical + s * back_emf)
+
+    def force(self, voltage: ArrayLike, acceleration: ArrayLike, frequency_hz: ArrayLike) -> Complex:
+        """complex: force (N) for amplitudes of recorded voltage (V) and drive-point acceleration (m/s^2); they broadcast.
+
+        ``(1 + Z / k_s) F = g_e V - Z A / s^2``; the voltage is passed through ``path``.
+        """
+        frequency = np.asarray(frequency_hz, dtype=np.float64)
+        s = 2j * np.pi * frequency
+        stiffness = self.dynamic_stiffness(s)
+        driving = self.force_per_volt(s) * self.path.factor(frequency) * np.asarray(voltage)
+        reaction = stiffness * np.asarray(acceleration) / s**2
+        return np.asarray((driving - reaction) / (1.0 + stiffness * self.stinger_compliance_m_n))
+
+    def electrical(self, amplifier_gain: float) -> dict[str, float]:
+        """Force factor, resistance and inductance for a known gain of a voltage amplifier (V/V).
+
+        ``G = b gain / g``, ``R = b (gain / g)^2``, ``L = tau R``.
+        """
+        ratio = positive("amplifier_gain", amplifier_gain) / self.force_per_volt_n_v
+        resistance = self.back_emf_damping_n_s_m * ratio**2
+        return {
+            "force_factor_n_a": self.back_emf_damping_n_s_m * ratio,
+            "resistance_ohm": resistance,
+            "inductance_h": self.coil_time_constant_s * resistance,
+        }
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        numbers = (self.lowest_hz, self.highest_hz, self.fit_residual)
+        path = np.array(astuple(self.path))
+        arrays = {"values": self.values, "covariance": np.asarray(self.covariance), "fit": np.array(numbers)}
+        return arrays | {"path": path}, {"source": self.source, "notes": list(self.notes)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Exciter":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        try:
+            values = finite_array("values", arrays["values"], np.float64, 1)
+            lowest, highest, residual = np.asarray(arrays["fit"], dtype=np.float64).tolist()
+            return cls(
+                **dict(zip(PARAMETERS, values.tolist(), strict=True)),
+                covariance=arrays["covariance"],
+                lowest_hz=lowest,
+                highest_hz=highest,
+                fit_residual=residual,
+                path=VoltagePath(*np.asarray(arrays["path"], dtype=np.float64).tolist()),
+                source=attributes["source"],
+                notes=tuple(attributes["notes"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise IdentificationError(f"exciter: {error} is missing or unknown") from None

@@ -1,0 +1,245 @@
+"""Parameters of an exciter from a multisine: voltage, force and drive-point acceleration, line by line.
+
+Every line k of every realisation obeys, for parameters p and ``s = 2 pi i f_k``, times ``1 + s tau``
+
+    e(p) = (1 + s tau + P / k_s) F + P A / s^2 - g V = 0,    P = (1 + s tau) (s^2 m + s c + k) + s b,
+
+whatever the structure does, nonlinear or not: force and motion are both measured. Only sensor noise is left, in both,
+and where the force drops at a resonance it is as large as the force itself. The maximum-likelihood cost for noise in all
+channels is ``sum |e(p)|^2 / var e(p)`` (Pintelon and Schoukens, *System Identification*, 2nd ed., 9.10 and 9.11) with the
+noise covariance taken from the scatter of the periods. The start is the linear regression
+
+    F = g V - s tau F - c3 s A - c2 A - c1 A / s - c0 A / s^2.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER, find_role
+from identification.errors import IdentificationError
+from identification.multisine.spectra import PeriodicSpectra
+from identification.prediction.exciter import PARAMETERS, Exciter, VoltagePath
+from identification.validation import positive
+
+__all__ = ["identify_exciter"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_COMPLIANCE = PARAMETERS.index("stinger_compliance_m_n")
+_BACK_EMF = PARAMETERS.index("back_emf_damping_n_s_m")
+_FEWEST_LINES = 20
+_POOLED_LINES = 21
+_UNSURE = 0.5
+_MISFIT = 2.0
+
+
+def identify_exciter(
+    spectra: PeriodicSpectra,
+    *,
+    lowest_hz: float | None = None,
+    highest_hz: float | None = None,
+    voltage: str = "voltage",
+    sample_rate_hz: float | None = None,
+    stinger_stiffness_n_m: float | None = None,
+    resistance_ohm: float | None = None,
+    amplifier_gain: float = 1.0,
+    source: str = "",
+) -> Exciter:
+    """Exciter from a multisine's spectra.
+
+    Parameters
+    ----------
+    spectra
+        At least two periods, with the channel ``voltage``, one of role ``force`` and one of role ``drive`` (where the
+        stinger is fixed). The band should reach well below and well above the suspension's resonance: from a narrow one
+        the mass comes out wrong by half.
+    lowest_hz, highest_hz
+        Part of the band to use, both ends included.
+    voltage
+        Name of the channel that holds the voltage.
+    sample_rate_hz
+        Rate of the converter that held the voltage; None where the voltage was measured at the amplifier. Delay, dispersion
+        and coupling of the `VoltagePath` are estimated along.
+    stinger_stiffness_n_m
+        k_s if it is known (E A / l); else it is estimated, and taken as rigid where the data do not tell it.
+    resistance_ohm, amplifier_gain
+        Resistance R of coil, cable and amplifier, if a meter has told it, and gain of a voltage amplifier (V/V). Then
+        ``b = g^2 R / gain^2``. Without R, suspension damping and back-EMF are told apart by the coil's inductance alone,
+        which takes a band of several hundred hertz; their sum is found either way, and is all that a prediction needs.
+    source
+        Rig and exciter that the result belongs to.
+
+    Returns
+    -------
+    Exciter
+        With the covariance of its parameters, times the mean square of misfit over noise where that is above one.
+
+    Raises
+    ------
+    IdentificationError
+        For a single period, too few lines, missing channels, a voltage that is zero.
+    """
+    rate = np.inf if sample_rate_hz is None else positive("sample_rate_hz", sample_rate_hz, "Hz")
+    data = _lines(spectra, voltage, rate, lowest_hz, highest_hz)
+    start = _regression(data)
+    if stinger_stiffness_n_m is not None:
+        start[_COMPLIANCE] = 1.0 / positive("stinger_stiffness_n_m", stinger_stiffness_n_m, "N/m")
+    known = set() if stinger_stiffness_n_m is None else {_COMPLIANCE}
+    per_square = None
+    if resistance_ohm is not None:
+        known.add(_BACK_EMF)
+        per_square = positive("resistance_ohm", resistance_ohm, "ohm") / positive("amplifier_gain", amplifier_gain) ** 2
+    free = [index for index in range(start.size) if index not in known]
+    values, covariance, residual = _fit(data, start, free, per_square)
+    notes: tuple[str, ...] = ()
+    if stinger_stiffness_n_m is None and values[_COMPLIANCE] < np.sqrt(covariance[_COMPLIANCE, _COMPLIANCE]) / _UNSURE:
+        free.remove(_COMPLIANCE)
+        values, covariance, residual = _fit(data, start, free, per_square)
+        notes += ("the stinger's compliance cannot be told from these data: taken as rigid; give its stiffness",)
+    if resistance_ohm is None:
+        notes += ("suspension damping and back-EMF are told apart by the coil's inductance alone: trust their sum",)
+    spread = np.sqrt(np.diag(covariance))
+    for name, value, std in zip(PARAMETERS, values, spread, strict=False):
+        if std > _UNSURE * abs(value):
+            notes += (f"{name}: {value:.3g} with a standard error of {std:.2g}; a wider band tells it better",)
+    if residual > _MISFIT:
+        notes += (f"misfit is {residual:.1f} times the noise: amplifier or exciter are not linear, or not in step",)
+    return Exciter(
+        **dict(zip(PARAMETERS, values.tolist(), strict=False)),
+        covariance=covariance[: len(PARAMETERS), : len(PARAMETERS)],
+        lowest_hz=float(data.frequency_hz[0]),
+        highest_hz=float(data.frequency_hz[-1]),
+        fit_residual=residual,
+        path=VoltagePath(rate, *_path(values)),
+        source=source,
+        notes=notes,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Force, acceleration and voltage (complex[3, n_realisations, n_lines]) and their noise (complex[n_lines, 3, 3])."""
+
+    frequency_hz: Float
+    signals: Complex
+    noise: Complex
+    rate_hz: float
+
+    @cached_property
+    def s(self) -> Complex:
+        """complex[n_lines], rad/s."""
+        return np.asarray(2j * np.pi * self.frequency_hz)
+
+    def coefficients(self, p: Float) -> Complex:
+        """complex[3, n_lines]: what force, acceleration and voltage are multiplied with in ``e``."""
+        g, tau, m, c, k, b, compliance = p[: len(PARAMETERS)]
+        s, path = self.s, VoltagePath(self.rate_hz, *_path(p))
+        stiffness = (1.0 + s * tau) * ((s * m + c) * s + k) + s * b
+        return np.array([1.0 + s * tau + stiffness * compliance, stiffness / s**2, -g * path.factor(self.frequency_hz)])
+
+    def residuals(self, p: Float) -> Float:
+        """float[2 n_realisations n_lines]: ``e`` over the standard deviation of its real part."""
+        x = self.coefficients(p)
+        error = np.einsum("ik,irk->rk", x, self.signals)
+        variance = np.einsum("ik,kij,jk->k", x, self.noise, np.conj(x)).real
+        scaled = error / np.sqrt(0.5 * variance)
+        return np.concatenate([scaled.real.ravel(), scaled.imag.ravel()])
+
+
+def _path(p: Float) -> list[float]:
+    """Delay, dispersion and coupling of the voltage's path, the last of the parameters of the fit."""
+    return [float(value) for value in p[len(PARAMETERS) :]]
+
+
+def _lines(
+    spectra: PeriodicSpectra, voltage: str, rate_hz: float, lowest: float | None, highest: float | None
+) -> _Lines:
+    """The excited lines of the band; the motion as acceleration."""
+    low, high = 0.0 if lowest is None else lowest, np.inf if highest is None else highest
+    used = spectra.excited & (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high) & (spectra.frequency_hz > 0)
+    if np.count_nonzero(used) < _FEWEST_LINES:
+        raise IdentificationError(
+            f"lowest_hz, highest_hz: {np.count_nonzero(used)} excited lines in {low:g} to {high:g} Hz, needs at least "
+            f"{_FEWEST_LINES}"
+        )
+    periods = spectra.spectra.shape[1]
+    if periods < 2:
+        raise IdentificationError("spectra: has 1 period, needs at least 2 to tell the noise")
+    drive = find_role(spectra.channels, "drive")
+    rows = [find_role(spectra.channels, "force"), drive, spectra.index(voltage)]
+    frequency = spectra.frequency_hz[used]
+    signals = spectra.spectra[:, :, rows][..., used]
+    signals[:, :, 1] *= (2j * np.pi * frequency) ** (2 - MOTION_ORDER[spectra.channels[drive].motion])
+    mean = signals.mean(axis=1)
+    if np.any(mean[:, 2] == 0.0):
+        raise IdentificationError(f"{voltage}: is zero at an excited line; is it the output that was played?")
+    scatter = signals - mean[:, None]
+    noise = np.einsum("rpik,rpjk->kij", scatter, np.conj(scatter)) / ((periods - 1) * signals.shape[0] * periods)
+    return _Lines(frequency, np.moveaxis(mean, 1, 0), _pooled(noise, mean[:, 0]), rate_hz)
+
+
+def _pooled(noise: Complex, force: Complex) -> Complex:
+    """Mean of the noise covariance over neighbouring lines; of a recording without noise, a trifle of the force's power."""
+    window = min(_POOLED_LINES, noise.shape[0])
+    kernel = np.full(window, 1.0)
+    counts = np.convolve(np.ones(noise.shape[0]), kernel, mode="same")
+    flat = noise.reshape(noise.shape[0], -1)
+    pooled = np.array([np.convolve(column, kernel, mode="same") / counts for column in flat.T]).T.reshape(noise.shape)
+    pooled[:, 0, 0] += (1e-9**2) * np.mean(np.abs(force) ** 2)
+    return np.asarray(pooled)
+
+
+def _regression(data: _Lines) -> Float:
+    """Start of the fit: linear least squares, which noise biases."""
+    delay = 0.5 / data.rate_hz
+    f, a, v = data.signals
+    s, v = data.s, v * VoltagePath(data.rate_hz, delay).factor(data.frequency_hz)
+    columns = np.array([v, -s * f, -s * a, -a, -a / s, -a / s**2]).reshape(6, -1).T
+    scale = np.linalg.norm(columns, axis=0)
+    stacked = np.concatenate([columns.real, columns.imag]) / scale
+    g, tau, _, mass, damping, stiffness = (
+        np.linalg.lstsq(stacked, np.concatenate([f.real.ravel(), f.imag.ravel()]), rcond=None)[0] / scale
+    )
+    shortest = 1e-3 / (2.0 * np.pi * data.frequency_hz[-1])
+    return np.array([g, max(tau, shortest), mass, 0.5 * damping, stiffness, 0.5 * damping, 0.0, delay, 0.0, 0.0])
+
+
+def _fit(data: _Lines, start: Float, free: list[int], back_emf_per_square: float | None) -> tuple[Float, Float, float]:
+    """Maximum-likelihood values, covariance (zero where not free), and root of the mean squared weighted residual.
+
+    ``back_emf_per_square`` is ``R / gain^2`` of a back-EMF that follows from g.
+    """
+    from scipy.optimize import least_squares
+
+    scale = np.abs(start)
+    top = 2.0 * np.pi * data.frequency_hz[-1]
+    # What a hundredth of a radian at the top, or of the mass's inertia, or of a turn at the bottom would take.
+    scale[_COMPLIANCE:] = 0.01 / (scale[2] * top**2), 0.01 / top, 0.01 / top**3, 0.01 * data.frequency_hz[0]
+    scale = np.maximum(scale, 1e-300)
+
+    def full(free_values: Float) -> Float:
+        p = start.copy()
+        p[free] = free_values * scale[free]
+        if back_emf_per_square is not None:
+            p[_BACK_EMF] = back_emf_per_square * p[0] ** 2
+        return p
+
+    def residuals(free_values: Float) -> Float:
+        return data.residuals(full(free_values))
+
+    begin = start[free] / scale[free]
+    result: Any = least_squares(residuals, begin, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12)
+    values = full(result.x)
+    freedom = max(result.fun.size - len(free), 1)
+    mean_square = float(np.sum(result.fun**2)) / freedom
+    column = np.zeros((start.size, len(free)))
+    column[free, range(len(free))] = scale[free]
+    if back_emf_per_square is not None:
+        column[_BACK_EMF] = 2.0 * back_emf_per_square * values[0] * column[0]
+    inverse = np.linalg.pinv(result.jac.T @ result.jac, hermitian=True) * max(mean_square, 1.0)
+    return values, column @ inverse @ column.T, float(np.sqrt(mean_square))

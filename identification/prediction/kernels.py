@@ -1,0 +1,105 @@
+"""Compiled slow flow of one nonlinear mode: amplitude over time, step by step."""
+
+import numpy as np
+
+from vibrolock.compiled import kernel
+
+__all__ = ["DIVERGED", "DONE", "modal_rate", "property_at", "slow_flow"]
+
+DONE = 0
+DIVERGED = 1
+
+
+@kernel
+def property_at(q: float, breakpoints: np.ndarray, coefficients: np.ndarray) -> float:
+    """Cubic of the interval that q lies in; the end values outside (see `ModalProperties`)."""
+    last = breakpoints.size - 1
+    held = min(max(q, breakpoints[0]), breakpoints[last])
+    k = 0
+    while k < coefficients.shape[1] - 1 and breakpoints[k + 1] <= held:
+        k += 1
+    t = held - breakpoints[k]
+    return float(((coefficients[0, k] * t + coefficients[1, k]) * t + coefficients[2, k]) * t + coefficients[3, k])
+
+
+@kernel
+def modal_rate(
+    q: complex,
+    s: complex,
+    drive: complex,
+    change: complex,
+    load: np.ndarray,
+    breakpoints: np.ndarray,
+    omega_of: np.ndarray,
+    damping_of: np.ndarray,
+    shape_of: np.ndarray,
+    tail: np.ndarray,
+) -> complex:
+    """Rate ``Q' = (phi (N - N' D'' / (2 G)) - D Q) / G``, ``G = D' - D D'' / (2 D')``, of the complex modal amplitude.
+
+    ``D(s) = w^2 + 2 z w s + s^2 + phi^2 load[0]``; ``load`` [3] is what is coupled to the drive point (N/m) with its
+    first two derivatives by s; ``drive`` is N (N), ``change`` its N' (N/s).
+    """
+    size = abs(q)
+    last = breakpoints[breakpoints.size - 1]
+    if size > last:
+        omega = np.sqrt(max(tail[0], tail[1] + tail[2] * (size * size - last * last)))
+        damping = tail[3] + tail[4] * (size - last)
+        phi = tail[5]
+    else:
+        omega = property_at(size, breakpoints, omega_of)
+        damping = property_at(size, breakpoints, damping_of)
+        phi = property_at(size, breakpoints, shape_of)
+    loaded = phi * phi
+    d0 = omega * omega + (2.0 * damping * omega + s) * s + loaded * load[0]
+    d1 = 2.0 * (damping * omega + s) + loaded * load[1]
+    d2 = 2.0 + loaded * load[2]
+    slope = d1 - 0.5 * d0 * d2 / d1
+    return complex((phi * (drive - 0.5 * change * d2 / slope) - d0 * q) / slope)
+
+
+@kernel
+def slow_flow(
+    start: complex,
+    step_s: float,
+    s: np.ndarray,
+    drive: np.ndarray,
+    change: np.ndarray,
+    load: np.ndarray,
+    breakpoints: np.ndarray,
+    omega_of: np.ndarray,
+    damping_of: np.ndarray,
+    shape_of: np.ndarray,
+    tail: np.ndarray,
+    largest: float,
+    out: np.ndarray,
+    rate: np.ndarray,
+) -> tuple[int, int]:
+    """Classical Runge-Kutta steps over the instants of ``s``, ``drive``, ``change`` [2 n - 1] and ``load`` [2 n - 1, 3].
+
+    ``step_s`` lies between every other instant, so that those between serve as midpoints. Fills ``out`` and ``rate`` [n];
+    returns a code and the number of instants filled: `DIVERGED` where the amplitude exceeds ``largest``.
+    """
+    q = start
+    count = out.size
+    for k in range(count):
+        at = 2 * k
+        k1 = modal_rate(q, s[at], drive[at], change[at], load[at], breakpoints, omega_of, damping_of, shape_of, tail)
+        out[k] = q
+        rate[k] = k1
+        if not abs(q) <= largest:
+            return DIVERGED, k + 1
+        if k + 1 == count:
+            break
+        a, b = at + 1, at + 2
+        k2 = modal_rate(
+            q + 0.5 * step_s * k1, s[a], drive[a], change[a], load[a], breakpoints, omega_of, damping_of, shape_of, tail
+        )
+        k3 = modal_rate(
+            q + 0.5 * step_s * k2, s[a], drive[a], change[a], load[a], breakpoints, omega_of, damping_of, shape_of, tail
+        )
+        k4 = modal_rate(
+            q + step_s * k3, s[b], drive[b], change[b], load[b], breakpoints, omega_of, damping_of, shape_of, tail
+        )
+        q = q + step_s / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    return DONE, count

@@ -1,0 +1,87 @@
+"""Predictions of one model beside what they are compared with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.frequency_responses import FrequencyResponse
+from identification.packing import pack_all, unpack_all
+from identification.prediction.comparison import PredictionError
+from identification.prediction.steady_prediction import SteadyPrediction
+from identification.prediction.sweep_prediction import SweepPrediction
+from identification.signals.transients import Transient
+
+__all__ = ["Predictions"]
+
+_PARTS: dict[str, type] = {
+    "steady": SteadyPrediction,
+    "steady_references": FrequencyResponse,
+    "steady_errors": PredictionError,
+    "sweeps": SweepPrediction,
+    "sweep_references": Transient,
+    "sweep_errors": PredictionError,
+}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Predictions:
+    """Steady responses and sweeps; references and errors are None where there was nothing to compare with.
+
+    Parameters
+    ----------
+    steady, steady_references, steady_errors
+        Predicted frequency responses; for each the measured one and its errors.
+    sweeps, sweep_references, sweep_errors
+        Predicted sweeps; for each the recorded one and its errors.
+    specimen
+        Name of what was tested.
+    notes
+        What a user should know about these numbers, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        If there are not as many references or errors as predictions.
+    """
+
+    steady: tuple[SteadyPrediction, ...] = ()
+    steady_references: tuple[FrequencyResponse | None, ...] = ()
+    steady_errors: tuple[PredictionError | None, ...] = ()
+    sweeps: tuple[SweepPrediction, ...] = ()
+    sweep_references: tuple[Transient | None, ...] = ()
+    sweep_errors: tuple[PredictionError | None, ...] = ()
+    specimen: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for kind, counts in (
+            ("steady", (len(self.steady), len(self.steady_references), len(self.steady_errors))),
+            ("sweeps", (len(self.sweeps), len(self.sweep_references), len(self.sweep_errors))),
+        ):
+            if len(set(counts)) > 1:
+                raise IdentificationError(
+                    f"{kind}: {counts[0]} predictions, {counts[1]} references, {counts[2]} errors"
+                )
+
+    @property
+    def errors(self) -> tuple[PredictionError, ...]:
+        """Every comparison, steady responses first."""
+        return tuple(error for error in (*self.steady_errors, *self.sweep_errors) if error is not None)
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        arrays: dict[str, NDArray[Any]] = {}
+        attributes: dict[str, Any] = {"specimen": self.specimen, "notes": list(self.notes)}
+        for name in _PARTS:
+            inside, of_parts = pack_all(name, getattr(self, name))
+            arrays, attributes = arrays | inside, attributes | of_parts
+        return arrays, attributes
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Predictions":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in _PARTS.items()}
+        return cls(**parts, specimen=str(attributes.get("specimen", "")), notes=tuple(attributes.get("notes", ())))

@@ -1,0 +1,100 @@
+"""A predicted frequency response at constant force, as data."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.prediction.peaks import peak_of
+
+__all__ = ["Peak", "SteadyPrediction"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Largest amplitude of a response: peak displacement, where it occurs, and its modal amplitude."""
+
+    amplitude_m: float
+    frequency_hz: float
+    phase_lag_deg: float
+    modal_amplitude: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SteadyPrediction:
+    """Frequency response at constant force, along its branches: from below resonance over the peak to above.
+
+    Parameters
+    ----------
+    force_n
+        Force held: peak of its fundamental (N), or its RMS (N) where ``force`` is ``rms``.
+    force
+        What is held: ``fundamental`` (its harmonics as recorded), ``rms`` (as recorded), ``pure-sine`` (no harmonics).
+    channels
+        Names of the points, the drive point first.
+    frequency_hz, modal_amplitude, fundamental_n
+        float[n], frequency of the vibration, q (kg^1/2 m), peak of the fundamental of the force.
+    displacement_m
+        complex[n, n_channels], fundamental of the displacement, peak, against the phase of the force.
+    stable
+        bool[n], under constant force and frequency, by the eigenvalues of the slow flow.
+    branch
+        int[n], 0 for the response that begins at rest, 1 and on for detached ones.
+    range_use
+        float[n], modal amplitude over the largest identified.
+    fold_frequency_hz, fold_amplitude_m, fold_modal_amplitude
+        float[n_folds], points where the response turns back in frequency; amplitude of the drive point.
+    notes
+        What a user should know about these numbers, one line each.
+    """
+
+    force_n: float
+    force: str
+    channels: tuple[str, ...]
+    frequency_hz: Float
+    modal_amplitude: Float
+    fundamental_n: Float
+    displacement_m: Complex
+    stable: NDArray[np.bool_]
+    branch: NDArray[np.int64]
+    range_use: Float
+    fold_frequency_hz: Float
+    fold_amplitude_m: Float
+    fold_modal_amplitude: Float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What was predicted, for tables."""
+        kind = {"fundamental": "", "rms": " RMS", "pure-sine": " pure sine"}[self.force]
+        return f"{self.force_n:g} N{kind}"
+
+    def motion_m(self, channel: str | None = None) -> Complex:
+        """complex[n]: fundamental of the displacement at a channel, the drive point if None."""
+        if channel is None:
+            return np.asarray(self.displacement_m[:, 0])
+        if channel not in self.channels:
+            raise IdentificationError(f"no channel '{channel}' was predicted; there are {', '.join(self.channels)}")
+        return np.asarray(self.displacement_m[:, self.channels.index(channel)])
+
+    def amplitude_m(self, channel: str | None = None) -> Float:
+        """float[n]: peak displacement at a channel, the drive point if None."""
+        return np.abs(self.motion_m(channel))
+
+    def acceleration_m_s2(self, channel: str | None = None) -> Complex:
+        """complex[n]: fundamental of the acceleration at a channel, the drive point if None."""
+        return np.asarray(-((2.0 * np.pi * self.frequency_hz) ** 2) * self.motion_m(channel))
+
+    def phase_lag_deg(self, channel: str | None = None) -> Float:
+        """float[n]: lag of the displacement behind the force, 0 to 360; 90 is phase resonance."""
+        return np.asarray(np.degrees(-np.angle(self.motion_m(channel))) % 360.0)
+
+    def peak(self, channel: str | None = None) -> Peak:
+        """Largest amplitude on the main branch, by a parabola through the three highest points."""
+        main = self.branch == 0
+        columns = (self.amplitude_m(channel), self.frequency_hz, self.phase_lag_deg(channel), self.modal_amplitude)
+        return Peak(*peak_of(*(column[main] for column in columns)))

@@ -1,0 +1,139 @@
+"""Steady states of one nonlinear mode under a constant force: all of them, with their stability.
+
+The founding paper's steady slow flow, ``(w^2 - W^2 + 2 i W w z) q = L exp(i psi)`` with the modal force ``L = phi_d F``
+and w, z (and L, where the force's harmonics or the shape depend on the level) functions of q, is explicit in the
+frequency W of the vibration:
+
+    W^2 = w^2 (1 - 2 z^2) +- sqrt(P),    P = (L / q)^2 - 4 w^4 z^2 (1 - z^2).
+
+So P >= 0 says at which amplitudes there are solutions. From rest up to the first zero of P they are the response that
+a test finds; further intervals of q with P >= 0 are detached branches (isolas). On each the curve is followed by a path
+parameter s with ``q = q_end sin s`` (main branch) or ``q = middle - half cos s`` (detached), lower sign first, which
+meets the ends of the interval without a corner.
+
+Stability is that of the complex slow flow ``2 (i W + z w) Q' = L exp(i psi) - D(|Q|) Q``, ``D = w^2 - W^2 + 2 i W w z``
+under constant force and frequency: with a disturbance ``u + i v`` of ``Q = q``,
+
+    2 (i W + z w) (u + i v)' = -(D + q dD/dq - (q D / L) dL/dq) u - i D v,
+
+a real 2 x 2 Jacobian. Its determinant changes sign exactly at the folds, where dW/ds = 0.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.prediction.properties import ModalProperties
+
+__all__ = ["OneMode", "Path", "modal_stiffness"]
+
+Float = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_LOWEST_SHARE = 1e-4
+_GRID = 4000
+
+
+def modal_stiffness(properties: ModalProperties, q: Float, omega: Float) -> Complex:
+    """complex[n]: ``D = w^2 - W^2 + 2 i W w z``; its angle is the lag of the modal coordinate behind the force."""
+    w, z = properties.frequency_rad_s(q), properties.damping_ratio(q)
+    return np.asarray(w**2 - omega**2 + 2j * omega * w * z)
+
+
+@dataclass(frozen=True)
+class Path:
+    """One connected branch of solutions: amplitudes from ``lowest`` to ``highest``; closed if detached from rest."""
+
+    lowest: float
+    highest: float
+    closed: bool
+
+    def at(self, s: Float) -> tuple[Float, Float]:
+        """Modal amplitude and sign of the square root at path parameters in [0, pi] (main) or [0, 2 pi] (closed)."""
+        if not self.closed:
+            return self.highest * np.sin(s), np.where(s <= 0.5 * np.pi, -1.0, 1.0)
+        middle, half = 0.5 * (self.highest + self.lowest), 0.5 * (self.highest - self.lowest)
+        return middle - half * np.cos(s), np.where(s <= np.pi, -1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class OneMode:
+    """One nonlinear mode under a constant force.
+
+    Parameters
+    ----------
+    properties
+        w(q), z(q) and drive shape.
+    fundamental_n
+        Peak of the fundamental of the force over q, N.
+    """
+
+    properties: ModalProperties
+    fundamental_n: Callable[[Float], Float]
+
+    def modal_force(self, q: Float) -> Float:
+        """float[n]: L, kg^1/2 m/s^2."""
+        return np.asarray(self.properties.drive_shape(q) * self.fundamental_n(q))
+
+    def discriminant(self, q: Float) -> Float:
+        """float[n]: P, (rad/s)^4."""
+        w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
+        return np.asarray((self.modal_force(q) / q) ** 2 - 4.0 * w**4 * z**2 * (1.0 - z**2))
+
+    def paths(self, highest_q: float) -> tuple[list[Path], float | None]:
+        """All branches of solutions up to ``highest_q``, and where one begins that is still open there (else None)."""
+        from scipy.optimize import brentq
+
+        grid = highest_q * np.geomspace(_LOWEST_SHARE, 1.0, _GRID)
+        inside = self.discriminant(grid) >= 0.0
+        changes = np.flatnonzero(inside[1:] != inside[:-1])
+        ends = [
+            float(brentq(lambda q: float(self.discriminant(np.array(q))), grid[k], grid[k + 1], rtol=1e-14))
+            for k in changes
+        ]
+        if inside[0]:
+            ends.insert(0, 0.0)
+        opened = ends.pop() if inside[-1] else None
+        return [Path(low, high, low > 0.0) for low, high in zip(ends[::2], ends[1::2], strict=True)], opened
+
+    def amplitudes(self, omega: float, highest_q: float) -> Float:
+        """float[n]: all modal amplitudes up to ``highest_q`` that are steady states at the frequency ``omega``, rising."""
+        from scipy.optimize import brentq
+
+        def surplus(q: Float) -> Float:
+            return np.asarray(np.abs(modal_stiffness(self.properties, q, np.array(omega))) * q - self.modal_force(q))
+
+        grid = highest_q * np.geomspace(_LOWEST_SHARE, 1.0, _GRID)
+        values = surplus(grid)
+        changes = np.flatnonzero((values[1:] > 0.0) != (values[:-1] > 0.0))
+        return np.array(
+            [brentq(lambda q: float(surplus(np.array(q))), grid[k], grid[k + 1], rtol=1e-12) for k in changes]
+        )
+
+    def omega(self, q: Float, sign: Float) -> Float:
+        """float[n]: frequency W of the vibration, rad/s; NaN where that branch has none (below its static deflection)."""
+        w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
+        squared = w**2 * (1.0 - 2.0 * z**2) + sign * np.sqrt(np.maximum(self.discriminant(q), 0.0))
+        return np.asarray(np.sqrt(np.where(squared > 0.0, squared, np.nan)))
+
+    def jacobian(self, q: Float, omega: Float) -> tuple[Float, Float]:
+        """Trace and determinant, float[n] each, of the slow flow linearised at the solutions."""
+        w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
+        dw, dz, _ = self.properties.slopes(q)
+        stiffness = modal_stiffness(self.properties, q, omega)
+        slope = 2.0 * w * dw + 2j * omega * (dw * z + w * dz)
+        step = 1e-6 * q
+        upper = np.minimum(q + step, self.properties.highest_q)
+        load_slope = np.log(self.modal_force(upper) / self.modal_force(q - step)) / (upper - q + step)
+        inertia = 2.0 * (1j * omega + z * w)
+        by_u = -(stiffness + q * slope - q * stiffness * load_slope) / inertia
+        by_v = -1j * stiffness / inertia
+        trace = by_u.real + by_v.imag
+        return np.asarray(trace), np.asarray(by_u.real * by_v.imag - by_v.real * by_u.imag)
+
+    def stable(self, q: Float, omega: Float) -> NDArray[np.bool_]:
+        """bool[n]: whether both eigenvalues of the linearised slow flow have negative real parts."""
+        trace, determinant = self.jacobian(q, omega)
+        return np.asarray((trace < 0.0) & (determinant > 0.0))

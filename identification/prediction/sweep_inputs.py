@@ -1,0 +1,123 @@
+"""What drives a sweep: frequency and complex amplitude over time, from a recording or as designed, on even instants."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import find_role
+from identification.errors import IdentificationError
+from identification.signals.half_periods import HalfPeriods
+from identification.signals.transients import Transient
+from identification.validation import positive
+
+__all__ = ["SweepInput", "VoltageSweep", "force_input", "voltage_input"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_INSTANTS_PER_PERIOD = 16
+_MOST_INSTANTS = 20_000_000
+_UNEVEN = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SweepInput:
+    """Frequency (float[n], Hz) and amplitude (complex[n], peak, N or V, against the sweep's phase) at even instants.
+
+    ``window_periods`` is what the amplitude was already smoothed over, 0 for nothing; ``origin`` says where it is from.
+    """
+
+    time_s: Float
+    frequency_hz: Float
+    amplitude: Complex
+    window_periods: int
+    origin: str
+
+    @property
+    def step_s(self) -> float:
+        """Distance of the instants."""
+        return float(self.time_s[-1] - self.time_s[0]) / (self.time_s.size - 1)
+
+
+@dataclass(frozen=True)
+class VoltageSweep:
+    """A sweep of constant voltage that is yet to be made; it begins settled at ``start_hz``.
+
+    Parameters
+    ----------
+    start_hz, stop_hz
+        First and last frequency.
+    rate_hz_per_s
+        Rate, linear in time, above zero whichever way it goes.
+    level_v
+        Peak of the recorded voltage, V.
+    """
+
+    start_hz: float
+    stop_hz: float
+    rate_hz_per_s: float
+    level_v: float
+
+    def __post_init__(self) -> None:
+        for name in ("start_hz", "stop_hz", "rate_hz_per_s", "level_v"):
+            positive(name, getattr(self, name))
+        if self.start_hz == self.stop_hz:
+            raise IdentificationError(f"stop_hz: is {self.stop_hz:g} Hz, must differ from start_hz")
+
+    @property
+    def duration_s(self) -> float:
+        """How long the sweep takes, s."""
+        return abs(self.stop_hz - self.start_hz) / self.rate_hz_per_s
+
+
+def voltage_input(source: Transient | VoltageSweep, channel: str) -> SweepInput:
+    """The voltage of a recorded or a designed sweep."""
+    if isinstance(source, Transient):
+        return _even(source, source.fundamental(channel), 0, "recorded voltage")
+    time_s = _instants(0.0, source.duration_s, max(source.start_hz, source.stop_hz))
+    way = np.sign(source.stop_hz - source.start_hz)
+    frequency = source.start_hz + way * source.rate_hz_per_s * time_s
+    return SweepInput(time_s, frequency, np.full(time_s.size, source.level_v, np.complex128), 0, "designed voltage")
+
+
+def force_input(source: Transient | HalfPeriods) -> SweepInput:
+    """The force of a recorded sweep: fundamentals, or half periods joined by monotone cubics with a phase of zero."""
+    if isinstance(source, Transient):
+        force = source.fundamentals[find_role(source.channels, "force")]
+        return _even(source, force, source.window_periods, "force by demodulation")
+    from scipy.interpolate import PchipInterpolator
+
+    time_s = _instants(source.time_s[0], source.time_s[-1], float(source.frequency_hz.max()))
+    frequency, magnitude = (
+        PchipInterpolator(source.time_s, values)(time_s) for values in (source.frequency_hz, source.magnitude)
+    )
+    return SweepInput(time_s, frequency, magnitude.astype(np.complex128), 0, "force by zero crossings")
+
+
+def _instants(start_s: float, stop_s: float, highest_hz: float) -> Float:
+    """Even instants, sixteen per shortest period."""
+    wanted = (stop_s - start_s) * highest_hz * _INSTANTS_PER_PERIOD
+    if not 2.0 <= wanted <= _MOST_INSTANTS:
+        raise IdentificationError(
+            f"sweep: {stop_s - start_s:g} s at up to {highest_hz:g} Hz make {wanted:.3g} instants, allowed are 2 to "
+            f"{_MOST_INSTANTS}; are there crossings of noise among the half periods?"
+        )
+    return np.linspace(start_s, stop_s, int(np.ceil(wanted)) + 1)
+
+
+def _even(source: Transient, amplitude: Complex, window_periods: int, origin: str) -> SweepInput:
+    """As recorded where the instants are even and close enough, else by splines."""
+    time_s, frequency = source.time_s, source.frequency_hz
+    if time_s.size < 4:
+        raise IdentificationError(f"sweep: has {time_s.size} instants, needs at least 4")
+    steps = np.diff(time_s)
+    enough = steps.max() * frequency.max() * _INSTANTS_PER_PERIOD < 1.25
+    if enough and steps.max() - steps.min() <= _UNEVEN * steps.max():
+        return SweepInput(time_s, frequency, amplitude, window_periods, origin)
+    from scipy.interpolate import CubicSpline
+
+    even = _instants(time_s[0], time_s[-1], float(frequency.max()))
+    return SweepInput(
+        even, CubicSpline(time_s, frequency)(even), CubicSpline(time_s, amplitude)(even), window_periods, origin
+    )

@@ -1,0 +1,152 @@
+"""A predicted sweep, and how far it is from a recorded one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER, find_role
+from identification.errors import IdentificationError
+from identification.prediction.comparison import PredictionError
+from identification.prediction.properties import ModalProperties
+from identification.prediction.sweep_inputs import SweepInput
+from identification.signals.transients import Transient
+
+__all__ = ["SweepPrediction", "compare_sweep"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SweepPrediction:
+    """Fundamentals of a predicted sweep over time, peak values, against the phase of what was imposed.
+
+    Parameters
+    ----------
+    time_s, frequency_hz
+        float[n], instants of the input, and its momentary frequency.
+    modal_amplitude
+        complex[n], Q, kg^1/2 m.
+    drive_m, drive_m_s2
+        complex[n], displacement and acceleration of the drive point.
+    force
+        complex[n], force at the drive point, N.
+    largest_identified
+        Largest modal amplitude that the model was identified with.
+    window_periods
+        What the input had been smoothed over, periods; the prediction then is smoothed as well.
+    origin
+        What was imposed.
+    notes
+        What a user should know about this prediction, one line each.
+    """
+
+    time_s: Float
+    frequency_hz: Float
+    modal_amplitude: Complex
+    drive_m: Complex
+    drive_m_s2: Complex
+    force: Complex
+    largest_identified: float
+    window_periods: int
+    origin: str
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of_modal_amplitude(
+        cls,
+        given: SweepInput,
+        every: slice,
+        properties: ModalProperties,
+        amplitude: Complex,
+        rate: Complex,
+        drive: Complex,
+        load: Complex,
+        others: Complex | None,
+        notes: tuple[str, ...],
+    ) -> "SweepPrediction":
+        """What follows from the modal amplitude and its rate (complex[n], at the instants ``every`` of the input).
+
+        ``F = N - phi (L Q + L' Q')``, ``X_d = phi Q + r F + r' F'``, acceleration ``(s + d/dt)^2 X_d``; ``others`` holds r
+        and r' of the other modes (complex[n, 2]), None where the force is imposed.
+        """
+        s = 2j * np.pi * given.frequency_hz[every]
+        step = 2.0 * given.step_s
+        phi = properties.drive_shape(np.abs(amplitude))
+        force = drive - phi * (load[:, 0] * amplitude + load[:, 1] * rate)
+        drive_m = phi * amplitude
+        if others is not None:
+            drive_m = drive_m + others[:, 0] * force + others[:, 1] * _rate(force, step)
+        velocity = s * drive_m + _rate(drive_m, step)
+        return cls(
+            time_s=given.time_s[every],
+            frequency_hz=given.frequency_hz[every],
+            modal_amplitude=amplitude,
+            drive_m=drive_m,
+            drive_m_s2=s * velocity + _rate(velocity, step),
+            force=force,
+            largest_identified=properties.q_range[1],
+            window_periods=given.window_periods,
+            origin=given.origin,
+            notes=notes,
+        )
+
+    @property
+    def range_use(self) -> float:
+        """Largest modal amplitude over the largest identified."""
+        return float(np.max(np.abs(self.modal_amplitude))) / self.largest_identified
+
+    def peak(self) -> tuple[float, float]:
+        """Largest displacement of the drive point (m), and the frequency (Hz) at which it occurs."""
+        where = int(np.argmax(np.abs(self.drive_m)))
+        return float(abs(self.drive_m[where])), float(self.frequency_hz[where])
+
+    def smoothed(self, values: Complex, window_periods: int) -> Complex:
+        """``values`` (complex[n]) as `identification.demodulate` would show them: a mean over half the window, twice."""
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (self.frequency_hz[1:] + self.frequency_hz[:-1]))])
+        turned *= (self.time_s[-1] - self.time_s[0]) / max(self.time_s.size - 1, 1)
+        reach = 0.25 * window_periods
+        for _ in range(2 if window_periods else 0):
+            means = 0.5 * (values[1:] + values[:-1]) * np.diff(turned)
+            total = np.concatenate([[0.0], np.cumsum(means)])
+            low, high = np.maximum(turned - reach, turned[0]), np.minimum(turned + reach, turned[-1])
+            values = (np.interp(high, turned, total) - np.interp(low, turned, total)) / (high - low)
+        return np.asarray(values)
+
+
+def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = "") -> PredictionError:
+    """Errors of a predicted sweep against the recorded one it belongs to, on the same time axis.
+
+    Amplitudes are those of the drive point's fundamental as a displacement, ``|A| / W^2`` of an acceleration. The prediction is
+    smoothed like the recording, which a fast sweep's peak is lowered by. Raises `IdentificationError` where they have
+    no time in common, or the recording no drive channel.
+    """
+    row = find_role(sweep.channels, "drive")
+    measured = (
+        np.abs(sweep.fundamentals[row]) / (2.0 * np.pi * sweep.frequency_hz) ** MOTION_ORDER[sweep.channels[row].motion]
+    )
+    window = 0 if prediction.window_periods else sweep.window_periods
+    acceleration = prediction.smoothed(prediction.drive_m_s2, window)
+    predicted = np.abs(acceleration) / (2.0 * np.pi * prediction.frequency_hz) ** 2
+    common = (sweep.time_s >= prediction.time_s[0]) & (sweep.time_s <= prediction.time_s[-1])
+    if not common.any():
+        raise IdentificationError(
+            f"sweep: lasts from {sweep.time_s[0]:g} to {sweep.time_s[-1]:g} s, the prediction from "
+            f"{prediction.time_s[0]:g} to {prediction.time_s[-1]:g} s"
+        )
+    there, here = int(np.argmax(measured)), int(np.argmax(predicted))
+    difference = np.interp(sweep.time_s[common], prediction.time_s, predicted) - measured[common]
+    return PredictionError(
+        name=name or prediction.origin,
+        peak_error=float(predicted[here] / measured[there]) - 1.0,
+        peak_frequency_error=float(prediction.frequency_hz[here] / sweep.frequency_hz[there]) - 1.0,
+        envelope_error=float(np.sqrt(np.mean(difference**2)) / measured[there]),
+        range_use=prediction.range_use,
+        notes=prediction.notes,
+    )
+
+
+def _rate(values: Complex, step_s: float) -> Complex:
+    """Rate of change by central differences."""
+    return np.gradient(values, step_s) if values.size > 1 else np.zeros_like(values)

@@ -1,0 +1,216 @@
+"""Sweeps through the resonance of a nonlinear mode by slow flow: force imposed, or exciter coupled and voltage imposed.
+
+Near resonance the complex modal amplitude Q against the sweep's phase theta (``W = theta'``, ``s = i W``) obeys
+
+    D(s + d/dt) Q = phi N(s + d/dt) u,    D(s) = s^2 + 2 z w s + w^2 + phi^2 L(s),
+
+w, z at ``|Q|``. With the force imposed (founding paper, slow-flow equations) u is the force, N = 1 and L = 0. With the
+exciter coupled u is the voltage; from ``X_a = phi Q + r F`` and ``F = g_e V - Z X_a`` follow
+
+    N = g_e / (1 + Z r),    L = Z / (1 + Z r),    F = N V - L phi Q,
+
+r the receptance of the other modes plus the stinger's compliance.
+
+Slow flow. D has a root lambda near s, ``D = (s - lambda) G(s)`` with smooth G, so that ``(d/dt + s - lambda) Q`` is
+``phi N/G`` of the input, exactly so for a linear system, transients included, whatever theta does; what is left out is
+``(N/G)'' W'`` and smaller. One step of Halley's method gives ``s - lambda = D / G`` with ``G = D' - D D'' / (2 D')``,
+and expansion of N/G to first order
+
+    Q' = [phi (N u + N' u' - D''/(2 G) N u') - D Q] / G.
+
+The founding paper's is that with ``G = 2 i W`` and without u'.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.linear.modes import LinearModes
+from identification.nonlinear.nonlinear_modes import NonlinearMode
+from identification.prediction.exciter import Exciter
+from identification.prediction.kernels import DIVERGED, slow_flow
+from identification.prediction.properties import FLAGGED_BEYOND, REFUSED_BEYOND, ExtrapolationError, ModalProperties
+from identification.prediction.sweep_inputs import SweepInput, VoltageSweep, force_input, voltage_input
+from identification.prediction.sweep_prediction import SweepPrediction
+from identification.signals.half_periods import HalfPeriods
+from identification.signals.transients import Transient
+
+__all__ = ["predict_sweep"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_Tables = tuple[Float, Float, Float, Float, Float]
+
+_TABLE_SIZE = 512
+_UNBOUNDED = 1e3  # times the identified range: there the integration of an imposed force ends
+_AT_REST = 1e-3
+_SETTLED = 12.0  # time constants
+
+
+def predict_sweep(
+    mode: NonlinearMode | ModalProperties,
+    sweep: Transient | HalfPeriods | VoltageSweep,
+    *,
+    exciter: Exciter | None = None,
+    modes: LinearModes | None = None,
+    voltage: str = "voltage",
+    damping: Literal["fundamental", "total-power"] = "fundamental",
+    allow_extrapolation: bool = False,
+) -> SweepPrediction:
+    """Response of one nonlinear mode to a sweep.
+
+    Parameters
+    ----------
+    mode
+        Identified mode, or its properties over the modal amplitude (``damping`` and ``allow_extrapolation`` are theirs then).
+    sweep
+        Without ``exciter`` the force is imposed: fundamentals (`Transient`) or half periods of the recorded force. With
+        it the voltage is: that of a recording (`Transient`), or a `VoltageSweep` that is yet to be made.
+    exciter
+        Exciter of this very rig.
+    modes
+        Linear modes of the structure; the others than the tested one take part with their receptance. With a hung or
+        otherwise soft structure they matter by several percent.
+    voltage
+        Name of the voltage's channel.
+    damping
+        Damping ratio to use, see `ModalProperties.of`.
+    allow_extrapolation
+        Whether to go on beyond twice the modal amplitude that was identified.
+
+    Returns
+    -------
+    SweepPrediction
+        From the first instant of the input on, settled there.
+
+    Raises
+    ------
+    ExtrapolationError
+        Where the modal amplitude exceeds twice the identified one, and that was not allowed.
+    IdentificationError
+        Where input and exciter do not go together.
+    """
+    properties = mode
+    if isinstance(mode, NonlinearMode):
+        properties = ModalProperties.of(mode, damping=damping, allow_extrapolation=allow_extrapolation)
+    assert isinstance(properties, ModalProperties)
+    if exciter is None:
+        if isinstance(sweep, VoltageSweep):
+            raise IdentificationError("sweep: is a voltage, which needs an exciter; give exciter")
+        given = force_input(sweep)
+        return _integrate(properties, given, *_imposed(given), None, ())
+    if isinstance(sweep, HalfPeriods):
+        raise IdentificationError("sweep: half periods of a force are imposed without an exciter; give exciter = None")
+    given = voltage_input(sweep, voltage)
+    notes = _coupling_notes(exciter, modes, given)
+    return _integrate(properties, given, *_coupled(given, exciter, modes, properties), notes)
+
+
+def _imposed(given: SweepInput) -> tuple[Complex, Complex, Complex]:
+    """Force, its rate, and no load (complex[n], complex[n], complex[n, 3])."""
+    rate = np.gradient(given.amplitude, given.step_s) if given.window_periods else np.zeros_like(given.amplitude)
+    return given.amplitude, rate, np.zeros((given.time_s.size, 3), np.complex128)
+
+
+def _coupled(
+    given: SweepInput, exciter: Exciter, modes: LinearModes | None, properties: ModalProperties
+) -> tuple[Complex, Complex, Complex, Complex]:
+    """``N V + N' V'`` and ``N V'`` (complex[n]), the load L (complex[n, 3]), and r of the other modes (complex[n, 2]).
+
+    All are smooth functions of frequency: they and their derivatives by s come from a table's cubic spline.
+    """
+    from scipy.interpolate import CubicSpline
+
+    low, high = float(given.frequency_hz.min()), float(given.frequency_hz.max())
+    table_hz = np.linspace(low * (1.0 - 1e-6), high * (1.0 + 1e-6), _TABLE_SIZE)
+    s = 2j * np.pi * table_hz
+    others = np.zeros(_TABLE_SIZE, np.complex128)
+    if modes is not None:
+        tested = modes.nearest(float(properties.frequency_rad_s(properties.q_range[0])) / (2.0 * np.pi))
+        others = modes.receptance(table_hz, without=tested)
+    stiffness = exciter.dynamic_stiffness(s)
+    shared = 1.0 + stiffness * (others + exciter.stinger_compliance_m_n)
+    per_volt = exciter.force_per_volt(s) * exciter.path.factor(table_hz) / shared
+    columns = CubicSpline(table_hz, np.column_stack([per_volt, stiffness / shared, others]))
+    by_s = 1.0 / (2j * np.pi)
+    at = given.frequency_hz
+    value, slope, curvature = columns(at), by_s * columns(at, 1), by_s**2 * columns(at, 2)
+    rate = np.gradient(given.amplitude, given.step_s)
+    drive = value[:, 0] * given.amplitude + slope[:, 0] * rate
+    load = np.column_stack([value[:, 1], slope[:, 1], curvature[:, 1]])
+    return drive, value[:, 0] * rate, load, np.column_stack([value[:, 2], slope[:, 2]])
+
+
+def _integrate(
+    properties: ModalProperties,
+    given: SweepInput,
+    drive: Complex,
+    change: Complex,
+    load: Complex,
+    others: Complex | None,
+    notes: tuple[str, ...],
+) -> SweepPrediction:
+    """The slow flow over every other instant, and what follows from it."""
+    p = properties
+    kept = slice(0, 2 * ((given.time_s.size - 1) // 2) + 1)
+    s = 2j * np.pi * given.frequency_hz[kept]
+    out, rate = np.empty(((s.size + 1) // 2,), np.complex128), np.empty(((s.size + 1) // 2,), np.complex128)
+    largest = p.q_range[1] * (_UNBOUNDED if p.allow_extrapolation else REFUSED_BEYOND)
+    tables: _Tables = (
+        p.modal_amplitude,
+        p.omega_coefficients,
+        p.damping_coefficients,
+        p.drive_shape_coefficients,
+        p.tail,
+    )
+    step = 2.0 * given.step_s
+    start = 0j
+    if abs(drive[0]) > _AT_REST * np.max(np.abs(drive)):
+        start = _settled(p, step, s[0], drive[0], load[0], tables)
+    code, count = slow_flow(start, step, s, drive, change, load, *tables, largest, out, rate)
+    every = slice(0, 2 * count - 1, 2)
+    if code == DIVERGED:
+        where = f"at {given.time_s[every][-1]:.4g} s, {given.frequency_hz[every][-1]:.4g} Hz"
+        if not p.allow_extrapolation:
+            raise ExtrapolationError(
+                f"modal amplitude: exceeds {REFUSED_BEYOND:g} times the largest identified ({p.q_range[1]:.4g} kg^1/2 m) "
+                f"{where}; identify higher levels, or allow_extrapolation"
+            )
+        notes += (f"the amplitude is unbounded: the prediction ends {where}",)
+    amplitude, rate = out[:count], rate[:count]
+    range_use = float(np.max(np.abs(amplitude)) / p.q_range[1])
+    if range_use > FLAGGED_BEYOND:
+        notes += (f"reaches {range_use:.2f} times the largest modal amplitude identified",)
+    return SweepPrediction.of_modal_amplitude(
+        given, every, p, amplitude, rate, drive[every], load[every], None if others is None else others[every], notes
+    )
+
+
+def _settled(p: ModalProperties, step_s: float, s: complex, drive: complex, load: Complex, tables: _Tables) -> complex:
+    """Steady amplitude under a constant input, from rest."""
+    decay = float(p.damping.min() * p.omega_rad_s.min())
+    steps = int(np.ceil(_SETTLED / (decay * step_s))) + 1
+    size = 2 * steps - 1
+    out, rate = np.empty(steps, np.complex128), np.empty(steps, np.complex128)
+    still = np.zeros(size, np.complex128)
+    loads = np.broadcast_to(load, (size, 3)).copy()
+    largest = p.q_range[1] * _UNBOUNDED
+    _, count = slow_flow(0j, step_s, np.full(size, s), np.full(size, drive), still, loads, *tables, largest, out, rate)
+    return complex(out[count - 1])
+
+
+def _coupling_notes(exciter: Exciter, modes: LinearModes | None, given: SweepInput) -> tuple[str, ...]:
+    notes = [f"holds for the exciter of {exciter.source} alone" if exciter.source else "holds for this exciter alone"]
+    if modes is None:
+        notes.append("the structure's other modes are left out")
+    elif (
+        np.count_nonzero(
+            (modes.frequency_hz > given.frequency_hz.min()) & (modes.frequency_hz < given.frequency_hz.max())
+        )
+        > 1
+    ):
+        notes.append("more than one mode lies in the sweep's range: only the tested one is nonlinear")
+    return tuple(notes)

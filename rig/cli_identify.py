@@ -1,0 +1,96 @@
+"""``rig identify`` and ``rig predict``: from recordings to models, from models to predictions."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli_options import Json, Output, Overwrite, keep_existing
+
+__all__ = ["identify", "predict"]
+
+
+def identify(
+    files: Annotated[
+        list[Path], typer.Argument(help="Recordings, or imported measurements. Several are taken together.")
+    ],
+    output: Output,
+    model: Annotated[str, typer.Option(help="Kind of model: nonlinear-mode, linear or exciter.")] = "nonlinear-mode",
+    modes: Annotated[Path | None, typer.Option(help="Linear model whose mode shapes the nonlinear mode uses.")] = None,
+    estimator: Annotated[str, typer.Option(help="Of a linear model's responses: instrument, H1 or H2.")] = "instrument",
+    band: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Lines of a linear or exciter model, Hz.")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option("--count", help="Number of modes of a linear model; found if left out.", min=1)
+    ] = None,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Turn recordings into a model."""
+    from rig.models.files import save
+    from rig.models.identify import Request, identify_model
+
+    keep_existing(files, output, overwrite)
+    request = Request(kind=model, modes=modes, estimator=estimator, band_hz=band, count=count)
+    save(identify_model(files, request), output)
+    _show(output, json)
+
+
+def predict(
+    model: Annotated[Path, typer.Argument(help="Nonlinear-mode model.")],
+    output: Output,
+    frequency_response: Annotated[
+        list[float] | None,
+        typer.Option(metavar="FORCE_N", help="Predict the frequency response at this constant force; may be repeated."),
+    ] = None,
+    force: Annotated[
+        str, typer.Option(help="What is constant: fundamental (peak), rms, or pure-sine.")
+    ] = "fundamental",
+    sweep: Annotated[
+        list[Path] | None, typer.Option(help="Predict the sweeps of this recording; may be repeated.")
+    ] = None,
+    exciter: Annotated[
+        Path | None, typer.Option(help="Exciter model: sweeps are predicted from the voltage, not from the force.")
+    ] = None,
+    zero_crossings: Annotated[
+        bool, typer.Option("--zero-crossings", help="Read an imposed force from its zero crossings, as the paper did.")
+    ] = False,
+    modes: Annotated[Path | None, typer.Option(help="Linear model: other modes and other sensors.")] = None,
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(help="Stepped sines to compare with (recorded or imported); may be repeated."),
+    ] = None,
+    allow_extrapolation: Annotated[
+        bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
+    ] = False,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Predict vibrations with a model, and compare them with recordings."""
+    from rig.models.files import save
+    from rig.models.predict import PredictionRequest, predict_vibrations
+
+    given = [path for path in (model, exciter, modes, *(sweep or ()), *(reference or ())) if path is not None]
+    keep_existing(given, output, overwrite)
+    request = PredictionRequest(
+        forces_n=tuple(frequency_response or ()),
+        held=force,
+        sweeps=tuple(sweep or ()),
+        exciter=exciter,
+        zero_crossings=zero_crossings,
+        modes=modes,
+        references=tuple(reference or ()),
+        allow_extrapolation=allow_extrapolation,
+    )
+    save(predict_vibrations(model, request), output)
+    _show(output, json)
+
+
+def _show(output: Path, json: bool) -> None:
+    from rig.console import print_json
+    from rig.summary import summarise
+    from rig.tables import print_summary
+
+    summary = summarise(output)
+    print_json(summary) if json else print_summary(summary)

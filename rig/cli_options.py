@@ -1,0 +1,26 @@
+"""Options that several commands share."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["Json", "Output", "Overwrite", "Realtime", "keep_existing"]
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
+Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
+
+
+def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> None:
+    """Refuse to write over a folder, over what is read, or over what exists unless that was asked for."""
+    from rig.errors import RecordingError
+
+    if output.is_dir():
+        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
+    if output.exists() and any(source.exists() and output.samefile(source) for source in sources):
+        raise RecordingError(f"{output}: is the file that is read; choose another name")
+    if output.exists() and not overwrite:
+        raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")

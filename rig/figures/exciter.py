@@ -1,0 +1,52 @@
+"""Figure of an exciter model: force per volt when blocked, dynamic stiffness, with 95 % bands."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification import Exciter
+from identification.prediction.exciter import PARAMETERS
+from rig.figures.style import MAIN, title
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_exciter"]
+
+_DRAWS = 400
+
+
+def draw_exciter(page: "Figure", exciter: Exciter) -> None:
+    """Draw what the exciter does to a structure over the band it was identified in."""
+    low = exciter.lowest_hz if np.isfinite(exciter.lowest_hz) else 5.0
+    high = exciter.highest_hz if np.isfinite(exciter.highest_hz) else 500.0
+    frequency = np.geomspace(low, high, 400)
+    s = 2j * np.pi * frequency
+    drawn = _draws(exciter)
+    axes = page.subplots(2, 2, sharex=True)
+    columns = (
+        ("blocked force per volt", "N/V", exciter.force_per_volt(s), [each.force_per_volt(s) for each in drawn]),
+        (
+            "dynamic stiffness of the armature",
+            "N/m",
+            exciter.dynamic_stiffness(s),
+            [e.dynamic_stiffness(s) for e in drawn],
+        ),
+    )
+    for (size, phase), (name, unit, value, sampled) in zip(axes.T, columns, strict=True):
+        size.loglog(frequency, np.abs(value), color=MAIN)
+        phase.semilogx(frequency, np.degrees(np.unwrap(np.angle(value))), color=MAIN)
+        if sampled:
+            size.fill_between(frequency, *np.quantile(np.abs(sampled), (0.025, 0.975), axis=0), color=MAIN, alpha=0.25)
+        size.set(ylabel=f"{name}, {unit}")
+        phase.set(xlabel="frequency, Hz", ylabel="phase, deg")
+    title(page, f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz")
+
+
+def _draws(exciter: Exciter) -> list[Exciter]:
+    """Exciters with parameters drawn from their covariance; none where it is not known."""
+    covariance = np.asarray(exciter.covariance)
+    if not np.isfinite(covariance).all():
+        return []
+    values = np.random.default_rng(0).multivariate_normal(exciter.values, covariance, _DRAWS, method="eigh")
+    return [Exciter(**dict(zip(PARAMETERS, row, strict=True))) for row in values.tolist()]

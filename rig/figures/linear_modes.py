@@ -1,0 +1,144 @@
+"""Figure of a linear modal analysis: responses with their fit, stabilisation, mode shapes, MAC."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification import FrequencyResponseMatrix, LinearModes, StabilisationDiagram
+from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_linear_modes"]
+
+_MOST_OUTPUTS = 4
+_MOST_DOTS = 4000
+
+
+def draw_linear_modes(
+    page: "Figure",
+    modes: LinearModes,
+    responses: FrequencyResponseMatrix | None = None,
+    stabilisation: StabilisationDiagram | None = None,
+) -> None:
+    """Draw what is known; ``page`` is an empty figure, about 11 by 8 inches."""
+    left, right = np.asarray(page.subfigures(1, 2, width_ratios=(1.35, 1.0)))
+    responses_on(left, modes, responses)
+    top, middle, bottom = right.subplots(3, 1, height_ratios=(1.1, 1.0, 1.0))
+    _stabilisation(top, modes, stabilisation, responses)
+    _shapes(middle, modes)
+    _mac(bottom, modes)
+    level = "" if not np.isfinite(modes.force_rms_n) else f", {modes.force_rms_n:.3g} N RMS"
+    level = ", extrapolated to zero force" if modes.force_rms_n == 0.0 else level
+    title(page, f"{modes.specimen or 'specimen'}: linear modal analysis, {modes.frequency_hz.size} modes{level}")
+
+
+def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatrix | None) -> None:
+    """Amplitude and phase of measured responses and of the model; standard error of the measured ones."""
+    size, phase = page.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    if responses is None:
+        say_why_empty(size, "no frequency responses in the file")
+        say_why_empty(phase, "")
+        return
+    frequency = responses.frequency_hz
+    fine = np.union1d(np.geomspace(max(frequency[0], 1e-3), frequency[-1], 2000), _around(modes))
+    fitted = modes.response_matrix(fine[(fine >= modes.lowest_hz) & (fine <= modes.highest_hz)])
+    every = slice(None, None, max(1, frequency.size // _MOST_DOTS))
+    known = {channel.name for channel in modes.channels}
+    errors = responses.total_std if np.isfinite(responses.total_std).any() else responses.noise_std
+    colours = (MAIN, SECOND, "#4f8f4f", "#8064a2")
+    for row, (channel, colour) in enumerate(zip(responses.outputs[:_MOST_OUTPUTS], colours, strict=False)):
+        measured = responses.value[every, row, 0]
+        label = f"{channel.name}, {channel.unit}/{responses.inputs[0].unit}"
+        size.semilogy(frequency[every], np.abs(measured), ".", ms=2.5, color=colour, alpha=0.5, label=label)
+        if np.isfinite(errors[:, row, 0]).any():
+            size.semilogy(frequency[every], errors[every, row, 0], color=colour, lw=0.5, alpha=0.45)
+        phase.plot(frequency[every], np.degrees(np.angle(measured)), ".", ms=2.5, color=colour, alpha=0.5)
+        if channel.name in known:
+            model = fitted.path(channel.name)
+            size.semilogy(fitted.frequency_hz, np.abs(model), color=colour, lw=1.0)
+            phase.plot(fitted.frequency_hz, np.degrees(np.angle(model)), color=colour, lw=1.0)
+    size.plot([], [], color=REJECTED, lw=1.0, label="model")
+    size.plot([], [], color=REJECTED, lw=0.5, alpha=0.6, label="standard error")
+    size.set(ylabel=f"frequency response ({responses.estimator})")
+    size.legend(fontsize=8, loc="best")
+    phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+
+
+def _around(modes: LinearModes) -> np.ndarray:
+    """Frequencies that show every peak of the model."""
+    width = modes.damping_ratio * modes.frequency_hz
+    return np.asarray((modes.frequency_hz[:, None] + width[:, None] * np.linspace(-12.0, 12.0, 97)).ravel())
+
+
+def _stabilisation(
+    axis: "Axes",
+    modes: LinearModes,
+    diagram: StabilisationDiagram | None,
+    responses: FrequencyResponseMatrix | None,
+) -> None:
+    """Poles over the model's order, with the sum of the responses behind them."""
+    if diagram is None:
+        say_why_empty(axis, "no stabilisation diagram: modes were given")
+        return
+    if responses is not None:
+        behind = axis.twinx()
+        behind.semilogy(responses.frequency_hz, np.abs(responses.value).sum(axis=(1, 2)), color="#cccccc", lw=0.7)
+        behind.set_axis_off()
+        axis.set_zorder(behind.get_zorder() + 1)
+        axis.patch.set_visible(False)
+    kinds = (
+        (~diagram.frequency_stable, ".", REJECTED, "new"),
+        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "frequency stable"),
+        (diagram.stable, "o", MAIN, "frequency, damping, shape stable"),
+    )
+    for which, marker, colour, label in kinds:
+        at = which & diagram.physical
+        axis.plot(
+            diagram.frequency_hz[at], diagram.order[at], marker, ms=3, mfc="none", ls="", color=colour, label=label
+        )
+    for frequency in modes.frequency_hz:
+        axis.axvline(frequency, color=MAIN, lw=0.5, alpha=0.4)
+    axis.set(xlabel="frequency, Hz", ylabel="model order", ylim=(0, 1.35 * diagram.orders.max()))
+    axis.legend(fontsize=7, loc="upper center", ncols=3, handletextpad=0.2, columnspacing=1.0)
+
+
+def _shapes(axis: "Axes", modes: LinearModes) -> None:
+    """Mass-normalised deflection of every mode, a group of bars for each channel, with 95 % intervals."""
+    count = modes.frequency_hz.size
+    width = 0.8 / count
+    at = np.arange(len(modes.channels))
+    for mode in range(count):
+        label = f"{modes.frequency_hz[mode]:.2f} Hz, {100 * modes.damping_ratio[mode]:.3f} %"
+        error = 1.96 * np.nan_to_num(modes.shapes_std[:, mode])
+        colour = _shade(mode, count)
+        x = at + (mode - 0.5 * (count - 1)) * width
+        axis.bar(x, modes.shapes[:, mode], 0.9 * width, yerr=error, color=colour, label=label, ecolor=REJECTED)
+    axis.axhline(0.0, color=REJECTED, lw=0.8)
+    axis.set_xticks(at, [channel.name for channel in modes.channels])
+    axis.set_ylabel("mode shape, kg$^{-1/2}$")
+    axis.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _mac(axis: "Axes", modes: LinearModes) -> None:
+    """MAC of every mode with every other."""
+    unit = modes.shapes / np.linalg.norm(modes.shapes, axis=0)
+    mac = (unit.T @ unit) ** 2
+    axis.imshow(mac, cmap="Blues", vmin=0.0, vmax=1.0)
+    names = [f"{frequency:.1f}" for frequency in modes.frequency_hz]
+    axis.set_xticks(range(len(names)), names)
+    axis.set_yticks(range(len(names)), names)
+    axis.set(xlabel="mode, Hz", ylabel="mode, Hz")
+    axis.grid(False)
+    axis.set_title("MAC of the modes at these sensors", fontsize=9)
+    for (row, column), value in np.ndenumerate(mac):
+        colour = "white" if value > 0.6 else "black"
+        axis.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
+
+
+def _shade(index: int, count: int) -> Any:
+    from matplotlib import colormaps
+
+    return colormaps["viridis"](0.9 * index / max(1, count - 1))

@@ -1,0 +1,42 @@
+"""Models, predictions and imported measurements in files: written whole, read back as what they were."""
+
+from pathlib import Path
+from typing import Any
+
+from rig.errors import RecordingError
+from rig.models.exciter import EXCITER
+from rig.models.frequency_responses import FREQUENCY_RESPONSES
+from rig.models.kind import Kind
+from rig.models.linear_modes import LINEAR_MODES
+from rig.models.nonlinear_mode import NONLINEAR_MODE
+from rig.models.predictions import PREDICTIONS
+from rig.models.response_matrix import RESPONSE_MATRIX
+from rig.recording.arrays import kind_of, read_arrays, write_arrays
+
+__all__ = ["KINDS", "load", "load_as", "save"]
+
+_ALL = (NONLINEAR_MODE, LINEAR_MODES, EXCITER, FREQUENCY_RESPONSES, RESPONSE_MATRIX, PREDICTIONS)
+KINDS = {kind.name: kind for kind in _ALL}
+"""Every kind of file that is no recording, by its name in the file."""
+
+
+def save(thing: Any, path: Path) -> None:
+    """Write a model, a prediction or an imported measurement, whole or not at all."""
+    kind = next(kind for kind in KINDS.values() if isinstance(thing, kind.holds))
+    write_arrays(path, kind.name, *kind.pack(thing))
+
+
+def load(path: Path) -> Any:
+    """What `save` wrote; `RecordingError` where the file holds a recording or is damaged."""
+    name, arrays, attributes = read_arrays(path)
+    if name not in KINDS:
+        raise RecordingError(f"{path}: holds a {name}; known are {', '.join(KINDS)}")
+    return KINDS[name].unpack(arrays, attributes)
+
+
+def load_as(kind: Kind, path: Path) -> Any:
+    """The same where one kind alone will do; `RecordingError` for any other."""
+    found = kind_of(path)
+    if found != kind.name:
+        raise RecordingError(f"{path}: holds a {found}, wanted is a {kind.name} file")
+    return load(path)

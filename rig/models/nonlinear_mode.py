@@ -1,0 +1,51 @@
+"""Files of nonlinear-mode models."""
+
+from typing import Any
+
+from identification import NonlinearMode
+from rig.console import number, print_table
+from rig.figures.nonlinear_mode import draw_mode
+from rig.models.kind import Kind
+
+__all__ = ["NONLINEAR_MODE"]
+
+
+def _summarise(mode: NonlinearMode) -> dict[str, Any]:
+    return {
+        "specimen": mode.specimen,
+        "source": mode.source,
+        "frequency_shift": mode.frequency_shift,
+        "points": mode.table(),
+        "notes": list(mode.notes),
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    print_table(
+        ("force N", "amplitude mm", "modal frequency Hz", "+-", "damping %", "+-", "all harmonics %", "phase lag deg"),
+        [
+            (
+                number(p["force_n"], ".4f"),
+                number(p["amplitude_m"], ".5f", 1e3),
+                number(p["modal_frequency_hz"], ".4f"),
+                number(p["modal_frequency_std_hz"], ".4f", 1.96),
+                number(p["damping_ratio"], ".4f", 100.0),
+                number(p["damping_ratio_std"], ".4f", 196.0),
+                number(p["damping_ratio_total_power"], ".4f", 100.0),
+                number(p["phase_lag_deg"], ".2f"),
+            )
+            for p in summary["points"]
+        ],
+    )
+    print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
+
+
+NONLINEAR_MODE = Kind(
+    name="nonlinear-mode",
+    holds=NonlinearMode,
+    pack=NonlinearMode.to_arrays,
+    unpack=NonlinearMode.from_arrays,
+    summarise=_summarise,
+    say=_say,
+    draw=draw_mode,
+)

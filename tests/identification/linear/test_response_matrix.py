@@ -1,0 +1,80 @@
+import json
+
+import numpy as np
+import pytest
+
+from identification import Channel, FrequencyResponseMatrix, IdentificationError
+
+OUTPUTS = (Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m/s2"))
+INPUTS = (Channel("force", "force", "N"), Channel("second", "force", "N"))
+FREQUENCY_HZ = np.array([1.0, 2.0, 4.0])
+
+
+def matrix(**changes: object) -> FrequencyResponseMatrix:
+    random = np.random.default_rng(0)
+    value = random.normal(size=(3, 2, 2)) + 1j * random.normal(size=(3, 2, 2))
+    root = random.normal(size=(3, 4, 4)) + 1j * random.normal(size=(3, 4, 4))
+    fields = {
+        "outputs": OUTPUTS,
+        "inputs": INPUTS,
+        "frequency_hz": FREQUENCY_HZ,
+        "value": value,
+        "noise_covariance": root @ np.conj(root.swapaxes(1, 2)),
+        "estimator": "H1",
+        "input_rms": (1.0, 2.0),
+        "notes": ("made up",),
+    }
+    return FrequencyResponseMatrix(**(fields | changes))
+
+
+def test_paths_deviations_and_covariance_agree() -> None:
+    found = matrix()
+    assert np.array_equal(found.path("tip", "second"), found.value[:, 1, 1])
+    assert np.array_equal(found.path("tip"), found.value[:, 1, 0])
+    covariance = found.covariance("noise")
+    np.testing.assert_allclose(found.noise_std[:, 1, 0] ** 2, covariance[:, 2, 2].real)
+    assert np.all(np.isnan(found.total_std))
+    with pytest.raises(
+        IdentificationError, match=r"total_covariance: is unknown, .* of two realisations or more has it"
+    ):
+        found.covariance("total")
+
+
+def test_a_part_keeps_the_covariance_of_its_paths() -> None:
+    whole, part = matrix(), matrix().select(["tip"], lowest_hz=1.5)
+    assert part.outputs == OUTPUTS[1:]
+    assert np.array_equal(part.value, whole.value[1:, 1:])
+    assert np.array_equal(part.noise_covariance, whole.noise_covariance[1:, 2:, 2:])
+    turned = whole.select(["tip", "drive"])
+    assert np.array_equal(turned.noise_covariance[:, 0, 3], whole.noise_covariance[:, 2, 1])
+    with pytest.raises(IdentificationError, match="no line in 5 to inf Hz, there are some in 1 to 4 Hz"):
+        whole.select(lowest_hz=5.0)
+
+
+def test_arrays_and_attributes_bring_it_back() -> None:
+    whole = matrix()
+    arrays, attributes = whole.to_arrays()
+    back = FrequencyResponseMatrix.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    for name in ("frequency_hz", "value", "noise_covariance"):
+        assert np.array_equal(getattr(back, name), getattr(whole, name))
+    assert back.total_covariance is None
+    assert (back.outputs, back.inputs, back.estimator) == (whole.outputs, whole.inputs, "H1")
+    assert (back.input_rms, back.notes) == (whole.input_rms, whole.notes)
+    with pytest.raises(IdentificationError, match="'estimator' is missing or unknown"):
+        FrequencyResponseMatrix.from_arrays(arrays, {k: v for k, v in attributes.items() if k != "estimator"})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"value": np.full((3, 2, 2), np.nan)}, r"value: value at \[0, 0, 0\] is"),
+        ({"value": np.ones((3, 2, 1))}, r"value: shape \(3, 2, 1\), needs \(3, 2, 2\)"),
+        ({"noise_covariance": np.ones((3, 2, 2))}, r"noise_covariance: shape \(3, 2, 2\), needs \(3, 4, 4\)"),
+        ({"frequency_hz": [1.0, 1.0, 2.0]}, "frequency_hz: needs at least one, none below zero, each above"),
+        ({"outputs": ()}, "outputs, inputs: needs at least one of each"),
+        ({"input_rms": (1.0,)}, "input_rms: 1 values for 2 inputs"),
+    ],
+)
+def test_what_does_not_fit_is_named(change: dict[str, object], message: str) -> None:
+    with pytest.raises(IdentificationError, match=message):
+        matrix(**change)
