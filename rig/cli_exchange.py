@@ -26,8 +26,9 @@ def import_(
     """Bring in measurements and modes from elsewhere."""
     from rig.console import print_json
     from rig.exchange.export import keep_existing
-    from rig.exchange.kinds import described, save
+    from rig.exchange.kinds import described
     from rig.exchange.reading import import_file
+    from rig.exchange.store import save
 
     keep_existing(file, output, overwrite)
     found = import_file(file, format_, mapping, units=units, drive=drive, item=item)

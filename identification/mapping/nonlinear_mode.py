@@ -96,8 +96,8 @@ def _mode(mapping: NonlinearModeMapping, frequency: Any, damping: Any, amplitude
         "response_harmonics_m": np.stack([nothing, -1j * amplitude], axis=1),
     }
     columns |= dict.fromkeys(_UNKNOWN, unknown)
-    texts = {"source": mapping.source, "specimen": mapping.specimen}
-    return NonlinearMode.from_arrays(columns, {**texts, "notes": ["imported: only what the table says is known"]})
+    notes = ("imported: only what the table says is known",)
+    return NonlinearMode(**columns, source=mapping.source, specimen=mapping.specimen, notes=notes)
 
 
 _UNKNOWN = (

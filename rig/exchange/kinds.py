@@ -1,8 +1,7 @@
-"""The kinds of objects that are exchanged: how each is taken apart, put together again, and kept in a file of ours."""
+"""The kinds of objects that are exchanged: how each is taken apart and put together again."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,21 +18,23 @@ from identification import (
     unpack_frequency_responses,
 )
 from identification.channels import MOTION_UNIT
-from rig.errors import RecordingError
+from identification.nonlinear.nonlinear_modes import QUANTITIES
 from rig.exchange.backbone_table import backbone_from, backbone_parts
-from rig.exchange.contents import Contents
+from rig.exchange.contents import Contents, unit_of
 from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
 from rig.exchange.time_data import TimeData
-from rig.recording.arrays import write_arrays
 
-__all__ = ["KINDS", "described", "put_together", "restored", "save", "taken_apart"]
+__all__ = ["KINDS", "described", "put_together", "taken_apart"]
 
 
 def _nonlinear_mode(mode: NonlinearMode) -> Contents:
     arrays, attributes = mode.to_arrays()
     size = len(mode.force_n)
     rows = {name: 0 for name, array in arrays.items() if array.ndim and array.shape[0] == size}
-    return Contents("nonlinear-mode", mode.specimen, arrays, attributes, rows, {"apparent_mass_kg": "kg"})
+    units = np.array([unit_of(name) for name in QUANTITIES])
+    further = {"systematic_std": units, "interval_95": units[:, None]}
+    labels = {"systematic_std": (QUANTITIES,), "interval_95": (QUANTITIES, ("low", "high"))}
+    return Contents("nonlinear-mode", mode.specimen, arrays, attributes, rows, further, labels)
 
 
 def _linear_modes(modes: LinearModes) -> Contents:
@@ -78,32 +79,22 @@ def _frequency_responses(responses: tuple[FrequencyResponse, ...]) -> Contents:
 
 @dataclass(frozen=True)
 class Kind:
-    """How objects of one type are taken apart and put together.
-
-    ``name`` stands in exchanged files, ``stored`` in files of ours (empty where there are none of that kind).
-    """
+    """How objects of one type are taken apart and put together; ``name`` stands in exchanged files."""
 
     name: str
     type: type
     apart: Callable[[Any], Contents]
     together: Callable[[Mapping[str, Any], Mapping[str, Any]], Any]
-    stored: str
 
 
 KINDS = (
-    Kind("backbone", Backbone, backbone_parts, backbone_from, "measured-backbone"),
-    Kind("frequency-responses", tuple, _frequency_responses, unpack_frequency_responses, "frequency-responses"),
-    Kind(
-        "frequency-response-matrix",
-        FrequencyResponseMatrix,
-        _response_matrix,
-        FrequencyResponseMatrix.from_arrays,
-        "frequency-response-matrix",
-    ),
-    Kind("linear-modes", LinearModes, _linear_modes, LinearModes.from_arrays, "linear-modes"),
-    Kind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays, "nonlinear-mode"),
-    Kind("time-data", TimeData, time_data_parts, time_data_from, ""),
-    Kind("sweep", Transient, transient_parts, transient_from, ""),
+    Kind("backbone", Backbone, backbone_parts, backbone_from),
+    Kind("frequency-responses", tuple, _frequency_responses, unpack_frequency_responses),
+    Kind("frequency-response-matrix", FrequencyResponseMatrix, _response_matrix, FrequencyResponseMatrix.from_arrays),
+    Kind("linear-modes", LinearModes, _linear_modes, LinearModes.from_arrays),
+    Kind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays),
+    Kind("time-data", TimeData, time_data_parts, time_data_from),
+    Kind("sweep", Transient, transient_parts, transient_from),
 )
 
 
@@ -127,37 +118,18 @@ def put_together(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, 
     raise IdentificationError(f"kind: is '{kind}', known are {', '.join(kind.name for kind in KINDS)}")
 
 
-def save(value: Any, path: Path) -> None:
-    """Write an imported object to a file of ours; raises `RecordingError` where that cannot be done."""
-    kind = next((kind for kind in KINDS if isinstance(value, kind.type)), None)
-    if kind is None or not kind.stored:
-        raise RecordingError(f"{path}: {type(value).__name__} has no file of its own; give a mapping that evaluates it")
-    contents = kind.apart(value)
-    write_arrays(path, kind.stored, contents.arrays, contents.attributes)
-
-
-def restored(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Any:
-    """The object in a file of ours that `save` wrote, by the kind that the file says; None for other kinds."""
-    for known in KINDS:
-        if known.stored == kind:
-            return known.together(arrays, attributes)
-    return None
-
-
 def described(value: Any) -> dict[str, Any]:
-    """Kind of an object as its file says it, its title, and in ``holds`` what a line can say of it."""
+    """Kind of an object, its title, and in ``holds`` what a line can say of it."""
     contents = taken_apart(value)
     summary = contents.summary()
-    kind = next(kind for kind in KINDS if isinstance(value, kind.type))
     if isinstance(value, tuple):
-        return {**summary, "kind": kind.stored, "holds": f"{len(value)} levels"}
+        return {**summary, "holds": f"{len(value)} levels"}
     if isinstance(value, FrequencyResponseMatrix):
         names = [", ".join(channel.name for channel in channels) for channels in (value.outputs, value.inputs)]
         band = f"{value.frequency_hz[0]:g} to {value.frequency_hz[-1]:g} Hz"
         return {
             **summary,
-            "kind": kind.stored,
             "holds": f"{summary['rows']} lines, {band}, of {names[0]} to {names[1]}",
         }
     what = "modes" if isinstance(value, LinearModes) else "points"
-    return {**summary, "kind": kind.stored, "holds": f"{summary['rows']} {what}"}
+    return {**summary, "holds": f"{summary['rows']} {what}"}

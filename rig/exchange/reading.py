@@ -18,7 +18,6 @@ __all__ = [
     "import_file",
     "read_frequency_responses",
     "read_mapping",
-    "response_matrix",
 ]
 
 FORMATS = {"mat": (".mat",), "uff": (".uff", ".unv", ".uf", ".bunv"), "csv": (".csv", ".txt")}
@@ -114,7 +113,7 @@ def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
     mapping = read_mapping(mapping_path)
     _check_units(data, mapping)
     found = _mappings()[mapping.kind][1](data, mapping)
-    return response_matrix(found, mapping.instrument, mapping.specimen) if mapping.kind == "multisine" else found
+    return _response_matrix(found, mapping.instrument, mapping.specimen) if mapping.kind == "multisine" else found
 
 
 def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
@@ -129,24 +128,13 @@ def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
             )
 
 
-def response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str) -> "FrequencyResponseMatrix":
-    """Frequency responses of all motions to the force: by an instrument, or H1 (the force as its own instrument)."""
-    import numpy as np
+def _response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str) -> "FrequencyResponseMatrix":
+    """Frequency responses of all motions to the force: with an instrument, or H1."""
+    from identification import best_linear_approximation
 
-    from identification import FrequencyResponseMatrix
-
-    force = next(channel for channel in spectra.channels if channel.role == "force")
-    outputs = tuple(channel for channel in spectra.channels if channel.role in ("drive", "response"))
-    found = [spectra.frequency_response(output.name, instrument=instrument or force.name) for output in outputs]
-    return FrequencyResponseMatrix(
-        outputs=outputs,
-        inputs=(force,),
-        frequency_hz=found[0].frequency_hz,
-        value=np.array([response.value for response in found]).T[:, :, None],
-        estimator="instrument" if instrument else "H1",
-        input_rms=(spectra.rms(force.name),),
-        specimen=specimen,
-    )
+    if not instrument:
+        return best_linear_approximation(spectra, estimator="H1", specimen=specimen)
+    return best_linear_approximation(spectra, instruments=(instrument,), specimen=specimen)
 
 
 def _chosen(found: list[Any], path: Path, item: int) -> Any:

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from rig.bench import Bench
+from identification import ModalAnalysis
 from rig.campaigns.evaluate import VOLTAGE, channels_of
-from rig.configuration import validated
 from rig.errors import ConfigurationError, RecordingError
-from rig.exchange.kinds import restored
+from rig.exchange.store import load
 from rig.exchange.time_data import TimeData
-from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
-from rig.recording.arrays import kind_of, read_arrays
+from rig.measurements import backbone, bench_of_recording, frequency_responses, point_rows, response_matrices, sweeps
+from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 __all__ = ["DATA", "read_objects"]
@@ -48,36 +47,21 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
             return _time_data(recording, points) if data == "time" else _RESULTS[kind](recording)
     if data == "time" or points:
         raise RecordingError(f"{path}: holds a {kind}; samples of points are in recordings")
-    _, arrays, attributes = read_arrays(path)
-    found = restored(kind, arrays, attributes)
-    if found is None:
-        raise RecordingError(f"{path}: holds a {kind}, which is not exchanged")
-    return [found]
-
-
-def _responses(recording: Recording) -> list[Any]:
-    """Frequency responses of every level of a multisine, with the voltage as instrument."""
-    from rig.exchange.reading import response_matrix
-
-    specimen = recording.configuration["bench"]["specimen"]["name"]
-    return [response_matrix(found, VOLTAGE.name, specimen) for found in spectra(recording).values()]
-
-
-def _sweeps(recording: Recording) -> list[Any]:
-    return list(sweeps(recording).values())
+    found = load(path)
+    return [found.modes if isinstance(found, ModalAnalysis) else found]
 
 
 _RESULTS: dict[str, Callable[[Recording], list[Any]]] = {
     "backbone": lambda recording: [backbone(recording)],
     "stepped-sine": lambda recording: [frequency_responses(recording)],
-    "multisine": _responses,
-    "sweep": _sweeps,
+    "multisine": lambda recording: list(response_matrices(recording).values()),
+    "sweep": lambda recording: list(sweeps(recording).values()),
 }
 
 
 def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:
     """Samples of points in SI as they were recorded, with the output's voltage as the last channel."""
-    bench = validated(Bench, recording.configuration["bench"], "bench of the recording")
+    bench = bench_of_recording(recording)
     known = sorted({point["number"] for point in recording.points if "end_sample" in point})
     if unknown := sorted(set(points) - set(known)):
         raise RecordingError(f"point {unknown[0]}: nothing was recorded of it; there are {', '.join(map(str, known))}")

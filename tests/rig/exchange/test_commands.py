@@ -14,8 +14,7 @@ import scipy.io
 import rig
 from identification import FrequencyResponseMatrix, nonlinear_mode
 from rig.cli import main
-from rig.exchange.kinds import restored
-from rig.recording.arrays import read_arrays
+from rig.exchange.store import load
 
 
 @pytest.fixture
@@ -30,10 +29,6 @@ def command(capsys, monkeypatch, tmp_path):
         return int(stop.value.code or 0), captured.out, captured.err
 
     return typed
-
-
-def stored(path):
-    return restored(*read_arrays(path))
 
 
 def test_a_backbone_goes_to_mat_as_a_structure_with_units(command, backbone_file, backbone, tmp_path):
@@ -53,8 +48,8 @@ def test_a_backbone_that_comes_back_gives_the_same_nonlinear_mode(command, backb
     assert command(f"export {backbone_file} -o out.{ending}")[0] == 0
     status, out, err = command(f"import out.{ending} -o back.h5")
     assert status == 0, err
-    assert out == "measured-backbone: 2 points\n"
-    again = nonlinear_mode(stored(tmp_path / "back.h5"))
+    assert out == "backbone: 2 points\n"
+    again = nonlinear_mode(load(tmp_path / "back.h5"))
     np.testing.assert_array_equal(again.damping_ratio, mode.damping_ratio)
     np.testing.assert_array_equal(again.modal_frequency_hz, mode.modal_frequency_hz)
 
@@ -70,7 +65,7 @@ def test_a_multisine_is_one_response_matrix_a_level(command, multisine_file, tmp
     assert status == 0, err
     assert json.loads(out)["written"][0]["kind"] == "frequency-response-matrix"
     assert command("import second.uff -o second.h5")[0] == 0
-    found = stored(tmp_path / "second.h5")
+    found = load(tmp_path / "second.h5")
     assert isinstance(found, FrequencyResponseMatrix)
     with rig.Recording(multisine_file) as recording:
         spectra = rig.measurements.spectra(recording)[0.1]
@@ -96,7 +91,7 @@ def test_samples_that_go_out_and_in_give_the_same_responses(command, multisine_f
     status, out, err = command("import time.uff --mapping map.toml -o responses.h5")
     assert status == 0, err
     assert "13 lines, 22 to 28 Hz" in out
-    found = stored(tmp_path / "responses.h5")
+    found = load(tmp_path / "responses.h5")
     drive = next(channel.name for channel in found.outputs if channel.role == "drive")
     np.testing.assert_allclose(found.path(drive), first.frequency_response(drive).value, rtol=1e-9)
 
