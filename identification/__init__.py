@@ -15,8 +15,13 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
+    from identification.linear.extrapolation import extrapolated_to_zero
+    from identification.linear.modal_analysis import linear_modes
+    from identification.linear.mode_correlation import mac_matrix
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
+    from identification.linear.stabilisation import StabilisationDiagram, stabilisation
+    from identification.linear.subspace import StateSpace, subspace
     from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
     from identification.multisine.design import MultisineDesign
@@ -47,17 +52,24 @@ __all__ = [
     "NonlinearMode",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "StabilisationDiagram",
+    "StateSpace",
     "Transient",
     "decimated",
     "demodulate",
+    "extrapolated_to_zero",
     "force_drop_out",
+    "linear_modes",
     "mac",
+    "mac_matrix",
     "map_frequency_responses",
     "nonlinear_mode",
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "stabilisation",
     "stepped_sine_mode",
+    "subspace",
     "unpack_frequency_responses",
     "zero_crossings",
 ]
@@ -78,17 +90,24 @@ _MODULE_OF = {
     "NonlinearMode": "nonlinear.nonlinear_modes",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "StabilisationDiagram": "linear.stabilisation",
+    "StateSpace": "linear.subspace",
     "Transient": "signals.transients",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
+    "extrapolated_to_zero": "linear.extrapolation",
     "force_drop_out": "signals.sweeps",
+    "linear_modes": "linear.modal_analysis",
     "mac": "nonlinear.mode_shapes",
+    "mac_matrix": "linear.mode_correlation",
     "map_frequency_responses": "mapping",
     "nonlinear_mode": "nonlinear.phase_resonance",
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "stabilisation": "linear.stabilisation",
     "stepped_sine_mode": "nonlinear.stepped_sine",
+    "subspace": "linear.subspace",
     "unpack_frequency_responses": "frequency_responses",
     "zero_crossings": "signals.half_periods",
 }
