@@ -97,7 +97,9 @@ def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting 
 def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
     """The same, every output turned into an acceleration (m/s2); raises where an output is no motion or at 0 Hz."""
     if responses.frequency_hz[0] == 0.0:
-        raise IdentificationError("frequency_hz: begins at 0 Hz, where no motion is an acceleration; select a band above")
+        raise IdentificationError(
+            "frequency_hz: begins at 0 Hz, where no motion is an acceleration; select a band above"
+        )
     plain = weighted_responses(responses, weighting)
     order = np.array([2 - MOTION_ORDER[channel.motion] for channel in responses.outputs])
     factor = plain.s[:, None] ** np.repeat(order, len(responses.inputs))

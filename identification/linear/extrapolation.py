@@ -38,8 +38,8 @@ def extrapolated_to_zero(
     low, high, further
         Modes of one structure, same channels, levels at least 10 % apart.
     exponent
-        Power of the force that properties are linear in: 2 for smooth elements; or lowest and highest possible power, whose
-        mean is used and whose difference adds to the errors as that of equally likely values does.
+        Power of the force that properties are linear in: 2 for smooth elements; or lowest and highest possible power: the
+        mean of their results is taken, and their difference adds to the errors as a range of equally likely values does.
 
     Raises
     ------
@@ -57,10 +57,10 @@ def extrapolated_to_zero(
     if any(model.channels != models[0].channels for model in models):
         raise IdentificationError("channels: differ between the levels")
     kept, values, covariances = _common(models)
-    middle, covariance = _intercept(force ** np.mean(powers), values, covariances)
+    _, covariance = _intercept(force ** np.mean(powers), values, covariances)
     ends = [_intercept(force**power, values, covariances)[0] for power in powers]
     covariance = covariance + np.diag((ends[-1] - ends[0]) ** 2 / 12.0)
-    return _model(models, kept, middle, covariance, force, powers)
+    return _model(models, kept, 0.5 * (ends[0] + ends[-1]), covariance, force, powers)
 
 
 def _common(models: Sequence[LinearModes]) -> tuple[list[int], Float, Float]:
@@ -107,7 +107,9 @@ def _model(
     low, count = models[0], len(kept)
     std, rows = np.sqrt(np.diag(covariance)), len(low.channels)
     levels = ", ".join(f"{value:.4g}" for value in force)
-    notes = [f"extrapolated to zero force from {levels} N RMS, linear in force to the {' to '.join(f'{p:g}' for p in powers)}"]
+    notes = [
+        f"extrapolated to zero force from {levels} N RMS, linear in force to the {' to '.join(f'{p:g}' for p in powers)}"
+    ]
     for k in sorted(set(range(low.frequency_hz.size)) - set(kept)):
         notes.append(f"left out: mode at {low.frequency_hz[k]:.5g} Hz is not found at all levels")
     return replace(

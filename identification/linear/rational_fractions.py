@@ -173,9 +173,7 @@ class _Problem:
         return np.append(poles[:-1], np.clip(poles[-1], 0.0, self.largest_c))
 
 
-def fit_modes(
-    data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS
-) -> ModalFit:
+def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS) -> ModalFit:
     """Weighted least-squares fit of a modal model from starting ``poles``: rad/s, then damping ratios (then c)."""
     problem, damping = _Problem(data, normal), 1e-3
     poles = np.append(poles, problem.prior_c) if poles.size % 2 == 0 else poles

@@ -132,7 +132,9 @@ def subspace(
         )
     rows = order + 2 if block_rows is None else block_rows
     if (rows - 1) * len(responses.outputs) < order:
-        raise IdentificationError(f"block_rows: is {rows}, too few for order {order} of {len(responses.outputs)} outputs")
+        raise IdentificationError(
+            f"block_rows: is {rows}, too few for order {order} of {len(responses.outputs)} outputs"
+        )
     data = weighted_responses(responses, weighting)
     z = np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz)
     a, c = observable_space(data, z, rows).state_matrices(order)

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -7,8 +8,13 @@ from identification import IdentificationError, LinearModes, extrapolated_to_zer
 from tests.identification.linear.structures import DAMPING, FREQUENCY_HZ, SHAPES, measured
 
 
+@cache
+def template() -> LinearModes:
+    return linear_modes(measured(0, 0.1))
+
+
 def at_level(force_rms_n: float, power: float, std: float = 1e-6) -> LinearModes:
-    modes = linear_modes(measured(0, 0.1))
+    modes = template()
     bent = force_rms_n**power
     return replace(
         modes,

@@ -25,17 +25,17 @@ def test_a_modal_model_without_noise_is_found_exactly_from_a_poor_start(normal: 
     start = np.concatenate([2 * np.pi * FREQUENCY_HZ * 1.002, DAMPING * 2.0])
     fit = fit_modes(weighted_accelerance(measured()), start, normal=normal)
     assert fit.converged
-    # The prior on the pole above the band has the weight of one line's error, here all of 100 %.
+    # Errors of 100 % a line leave the prior on the pole above the band a say; the modes must not feel it.
     np.testing.assert_allclose(fit.omega, 2 * np.pi * FREQUENCY_HZ, rtol=1e-6)
     np.testing.assert_allclose(fit.zeta, DAMPING, rtol=1e-3)
     np.testing.assert_allclose(fit.terms[:, :3], SHAPES * SHAPES[0], rtol=1e-3, atol=1e-3)
-    assert 1 / (2 * np.pi * np.sqrt(fit.poles[-1])) == pytest.approx(FAR_HZ, rel=0.02)
+    assert 1 / (2 * np.pi * np.sqrt(fit.poles[-1])) == pytest.approx(FAR_HZ, rel=0.1)
 
 
 def test_covariance_is_the_scatter_over_many_measurements() -> None:
     start = np.concatenate([2 * np.pi * FREQUENCY_HZ, DAMPING])
-    fits = [fit_modes(weighted_accelerance(measured(seed, 0.5)), start) for seed in range(60)]
+    fits = [fit_modes(weighted_accelerance(measured(seed, 0.5)), start) for seed in range(40)]
     scatter = np.std([fit.poles[:6] for fit in fits], axis=0, ddof=1)
     claimed = np.sqrt(np.mean([np.diag(fit.covariance)[:6] for fit in fits], axis=0))
-    np.testing.assert_allclose(scatter / claimed, 1.0, atol=0.3)  # 60 values: three times 9 %
+    np.testing.assert_allclose(scatter / claimed, 1.0, atol=0.35)  # 40 values: three times 11 %
     assert np.mean([fit.residual for fit in fits]) == pytest.approx(1.0, abs=0.03)

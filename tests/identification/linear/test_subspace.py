@@ -27,7 +27,9 @@ def responses_of(model: StateSpace, frequency_hz: np.ndarray, noise: float = 0.0
     )
 
 
-@pytest.mark.parametrize(("order", "outputs", "inputs", "seed"), [(4, 1, 1, 0), (5, 2, 3, 1), (6, 3, 2, 2), (8, 4, 1, 3)])
+@pytest.mark.parametrize(
+    ("order", "outputs", "inputs", "seed"), [(4, 1, 1, 0), (5, 2, 3, 1), (6, 3, 2, 2), (8, 4, 1, 3)]
+)
 def test_a_random_stable_system_is_recovered_exactly(order: int, outputs: int, inputs: int, seed: int) -> None:
     exact = system(order, outputs, inputs, seed)
     frequency = np.arange(1.0, 500.0, 2.0)
