@@ -18,9 +18,12 @@ if TYPE_CHECKING:
     from identification.linear.analysis import ModalAnalysis
     from identification.linear.extrapolation import extrapolated_to_zero
     from identification.linear.modal_analysis import linear_modes
+    from identification.linear.mode_correlation import mac_matrix
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
+    from identification.linear.subspace import StateSpace, subspace
+    from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.mapping.backbone import BackboneMapping, map_backbone
     from identification.mapping.multisine import MultisineMapping, map_multisine
     from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
@@ -87,6 +90,7 @@ __all__ = [
     "ResponseBand",
     "ResponseMatrixMapping",
     "StabilisationDiagram",
+    "StateSpace",
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
@@ -106,6 +110,7 @@ __all__ = [
     "identify_exciter",
     "linear_modes",
     "mac",
+    "mac_matrix",
     "map_backbone",
     "map_frequency_responses",
     "map_multisine",
@@ -123,6 +128,7 @@ __all__ = [
     "stabilisation",
     "steady_predictions",
     "stepped_sine_mode",
+    "subspace",
     "unpack_frequency_responses",
     "zero_crossings",
 ]
@@ -158,6 +164,7 @@ _MODULE_OF = {
     "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
     "StabilisationDiagram": "linear.stabilisation",
+    "StateSpace": "linear.subspace",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
@@ -177,7 +184,9 @@ _MODULE_OF = {
     "identify_exciter": "prediction.exciter_fit",
     "linear_modes": "linear.modal_analysis",
     "mac": "nonlinear.mode_shapes",
+    "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",
+    "map_frequency_responses": "mapping",
     "map_frequency_responses": "mapping.stepped_sine",
     "map_multisine": "mapping.multisine",
     "map_nonlinear_mode": "mapping.nonlinear_mode",
@@ -194,6 +203,7 @@ _MODULE_OF = {
     "stabilisation": "linear.stabilisation",
     "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
+    "subspace": "linear.subspace",
     "unpack_frequency_responses": "frequency_responses",
     "zero_crossings": "signals.half_periods",
 }
