@@ -93,9 +93,9 @@ def test_intervals_of_every_quantity_cover_the_truth() -> None:
             value = getattr(truth, name)
             hits[name].append((low <= value + 1e-12) & (value - 1e-12 <= high))
     covered = {name: float(np.mean(hit)) for name, hit in hits.items()}
-    print(covered)
-    assert all(0.90 <= share <= 0.99 for name, share in covered.items() if name != "mac"), covered
-    assert covered["mac"] >= 0.90
+    bounded = ("mac", "force_purity", "response_purity")  # wider on purpose
+    assert all(0.90 <= share <= 0.99 for name, share in covered.items() if name not in bounded), covered
+    assert all(covered[name] >= 0.90 for name in bounded), covered
 
 
 def test_few_periods_widen_the_errors_and_are_named() -> None:
