@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
     from identification.prediction.steady_prediction import SteadyPrediction
+    from identification.prediction.uncertainty import ResponseBand, response_band
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -56,6 +57,7 @@ __all__ = [
     "PeriodicSpectra",
     "PeriodicVibration",
     "PredictionError",
+    "ResponseBand",
     "SteadyPrediction",
     "Transient",
     "compare",
@@ -71,6 +73,7 @@ __all__ = [
     "periodic_spectra",
     "periodic_vibration",
     "recorded_force_response",
+    "response_band",
     "steady_predictions",
     "stepped_sine_mode",
     "unpack_frequency_responses",
@@ -97,6 +100,7 @@ _MODULE_OF = {
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
     "PredictionError": "prediction.comparison",
+    "ResponseBand": "prediction.uncertainty",
     "SteadyPrediction": "prediction.steady_prediction",
     "Transient": "signals.transients",
     "compare": "prediction.comparison",
@@ -112,6 +116,7 @@ _MODULE_OF = {
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
     "recorded_force_response": "prediction.recorded_force",
+    "response_band": "prediction.uncertainty",
     "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
     "unpack_frequency_responses": "frequency_responses",

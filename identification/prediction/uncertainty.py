@@ -1,0 +1,116 @@
+"""What the standard errors of a nonlinear mode mean for the responses predicted from it, by Monte Carlo.
+
+The mode's frequencies and damping ratios are drawn about their values, independently at each level. An error of the
+mass-normalised drive shape, common to all levels, cancels at the drive point: q, phi_d and z change so that the
+predicted displacement per force stays.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.nonlinear.nonlinear_modes import NonlinearMode
+from identification.prediction.frequency_response import HeldForce, frequency_response
+
+__all__ = ["ResponseBand", "response_band"]
+
+Float = NDArray[np.float64]
+
+_POINTS = 121
+_INTERVAL = (2.5, 97.5)
+_LEAST_SHARE = 0.05
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResponseBand:
+    """Uncertainty of a predicted response at the drive point.
+
+    Parameters
+    ----------
+    phase_lag_deg
+        float[n], lags of the displacement, rising.
+    amplitude_m, frequency_hz
+        float[2, n], ends of the 95 % intervals at each lag.
+    peak_amplitude_std_m, peak_frequency_std_hz
+        Standard deviations of the largest amplitude and its frequency.
+    draws
+        Number of draws.
+    """
+
+    phase_lag_deg: Float
+    amplitude_m: Float
+    frequency_hz: Float
+    peak_amplitude_std_m: float
+    peak_frequency_std_hz: float
+    draws: int
+
+
+def response_band(
+    mode: NonlinearMode,
+    force_n: float,
+    *,
+    force: HeldForce = "fundamental",
+    draws: int = 200,
+    seed: int = 0,
+    allow_extrapolation: bool = False,
+) -> ResponseBand:
+    """Monte Carlo over the standard errors of modal frequency and damping, those of the total power's damping alike.
+
+    Parameters
+    ----------
+    mode, force_n, force, allow_extrapolation
+        As for `frequency_response`.
+    draws
+        Number of draws, at least 20.
+    seed
+        Of the random numbers.
+
+    Raises
+    ------
+    IdentificationError
+        If a level has no standard error, or on fewer than 20 draws.
+    """
+    if draws < 20:
+        raise IdentificationError(f"draws: is {draws}, needs at least 20")
+    for name in ("modal_frequency_std_hz", "damping_ratio_std"):
+        if not np.all(np.isfinite(getattr(mode, name))):
+            raise IdentificationError(f"{name}: unknown at some level, the band cannot be had without it")
+    random = np.random.default_rng(seed)
+    lags = np.linspace(10.0, 170.0, _POINTS)
+    amplitude, frequency = np.zeros((draws, _POINTS)), np.zeros((draws, _POINTS))
+    peaks = np.zeros((draws, 2))
+    for draw in range(draws):
+        found = frequency_response(
+            _drawn(mode, random), force_n, force=force, points=_POINTS, allow_extrapolation=allow_extrapolation
+        )
+        main = found.branch == 0
+        lag = found.phase_lag_deg()[main]
+        amplitude[draw] = np.interp(lags, lag, found.amplitude_m()[main])
+        frequency[draw] = np.interp(lags, lag, found.frequency_hz[main])
+        peak = found.peak()
+        peaks[draw] = peak.amplitude_m, peak.frequency_hz
+    spread = np.std(peaks, axis=0, ddof=1)
+    return ResponseBand(
+        phase_lag_deg=lags,
+        amplitude_m=np.percentile(amplitude, _INTERVAL, axis=0),
+        frequency_hz=np.percentile(frequency, _INTERVAL, axis=0),
+        peak_amplitude_std_m=float(spread[0]),
+        peak_frequency_std_hz=float(spread[1]),
+        draws=draws,
+    )
+
+
+def _drawn(mode: NonlinearMode, random: np.random.Generator) -> NonlinearMode:
+    """One draw of the mode; damping ratios stay above a twentieth of their value."""
+    levels = mode.force_n.size
+    moved = mode.damping_ratio_std * random.standard_normal(levels)
+    return replace(
+        mode,
+        modal_frequency_hz=mode.modal_frequency_hz + mode.modal_frequency_std_hz * random.standard_normal(levels),
+        damping_ratio=np.maximum(mode.damping_ratio + moved, _LEAST_SHARE * mode.damping_ratio),
+        damping_ratio_total_power=np.maximum(
+            mode.damping_ratio_total_power + moved, _LEAST_SHARE * mode.damping_ratio_total_power
+        ),
+    )
