@@ -26,10 +26,15 @@ if TYPE_CHECKING:
     from identification.nonlinear.phase_resonance import nonlinear_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
+    from identification.prediction.exciter import Exciter, VoltagePath
+    from identification.prediction.exciter_fit import identify_exciter
     from identification.prediction.frequency_response import frequency_response, steady_predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
     from identification.prediction.steady_prediction import SteadyPrediction
+    from identification.prediction.sweep_inputs import VoltageSweep
+    from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
+    from identification.prediction.sweeps import predict_sweep
     from identification.prediction.uncertainty import ResponseBand, response_band
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
@@ -41,6 +46,7 @@ __all__ = [
     "Backbone",
     "Channel",
     "Comparison",
+    "Exciter",
     "ExtrapolationError",
     "ForceDropOut",
     "FrequencyResponse",
@@ -59,19 +65,25 @@ __all__ = [
     "PredictionError",
     "ResponseBand",
     "SteadyPrediction",
+    "SweepPrediction",
     "Transient",
+    "VoltagePath",
+    "VoltageSweep",
     "compare",
+    "compare_sweep",
     "decimated",
     "demodulate",
     "error_table",
     "force_drop_out",
     "frequency_response",
+    "identify_exciter",
     "mac",
     "map_frequency_responses",
     "nonlinear_mode",
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "predict_sweep",
     "recorded_force_response",
     "response_band",
     "steady_predictions",
@@ -84,6 +96,7 @@ _MODULE_OF = {
     "Backbone": "backbones",
     "Channel": "channels",
     "Comparison": "prediction.comparison",
+    "Exciter": "prediction.exciter",
     "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
@@ -102,19 +115,25 @@ _MODULE_OF = {
     "PredictionError": "prediction.comparison",
     "ResponseBand": "prediction.uncertainty",
     "SteadyPrediction": "prediction.steady_prediction",
+    "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
+    "VoltagePath": "prediction.exciter",
+    "VoltageSweep": "prediction.sweep_inputs",
     "compare": "prediction.comparison",
+    "compare_sweep": "prediction.sweep_prediction",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "error_table": "prediction.comparison",
     "force_drop_out": "signals.sweeps",
     "frequency_response": "prediction.frequency_response",
+    "identify_exciter": "prediction.exciter_fit",
     "mac": "nonlinear.mode_shapes",
     "map_frequency_responses": "mapping",
     "nonlinear_mode": "nonlinear.phase_resonance",
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "predict_sweep": "prediction.sweeps",
     "recorded_force_response": "prediction.recorded_force",
     "response_band": "prediction.uncertainty",
     "steady_predictions": "prediction.frequency_response",

@@ -1,6 +1,8 @@
 """A predicted sweep, and how far it is from a recorded one."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,8 @@ __all__ = ["SweepPrediction", "compare_sweep"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
+
+_ARRAYS = ("time_s", "frequency_hz", "modal_amplitude", "drive_m", "drive_m_s", "drive_m_s2", "force")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,6 +108,20 @@ class SweepPrediction:
         """Largest displacement of the drive point (m), and the frequency (Hz) at which it occurs."""
         where = int(np.argmax(np.abs(self.drive_m)))
         return float(abs(self.drive_m[where])), float(self.frequency_hz[where])
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        attributes = {name: getattr(self, name) for name in ("largest_identified", "window_periods", "origin")}
+        return {name: getattr(self, name) for name in _ARRAYS}, {**attributes, "notes": list(self.notes)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "SweepPrediction":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        try:
+            values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
+            return cls(**values, **{**attributes, "notes": tuple(attributes["notes"])})
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"sweep prediction: {error} is missing or unknown") from None
 
     def smoothed(self, values: Complex, window_periods: int) -> Complex:
         """``values`` (complex[n]) as `identification.demodulate` would show them: a mean over half the window, twice."""

@@ -12,7 +12,7 @@ from identification import Channel, HalfPeriods, IdentificationError, Transient,
 from identification.prediction.exciter import Exciter
 from identification.prediction.properties import ExtrapolationError, ModalProperties
 from identification.prediction.sweep_inputs import VoltageSweep
-from identification.prediction.sweep_prediction import compare_sweep
+from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
 from identification.prediction.sweeps import predict_sweep
 
 Float = NDArray[np.float64]
@@ -218,3 +218,13 @@ def test_bad_input_is_named(recorded: Transient) -> None:
     far = predict_sweep(duffing(), recorded, exciter=EXCITER)
     with pytest.raises(IdentificationError, match="lasts from"):
         compare_sweep(replace(far, time_s=far.time_s + 100.0), recorded)
+
+
+def test_a_prediction_survives_its_arrays(recorded: Transient) -> None:
+    prediction = predict_sweep(duffing(), recorded, exciter=EXCITER)
+    arrays, attributes = prediction.to_arrays()
+    again = SweepPrediction.from_arrays(arrays, attributes)
+    np.testing.assert_array_equal(again.force, prediction.force)
+    assert (again.notes, again.origin, again.range_use) == (prediction.notes, prediction.origin, prediction.range_use)
+    with pytest.raises(IdentificationError, match="drive_m_s2"):
+        SweepPrediction.from_arrays({k: v for k, v in arrays.items() if k != "drive_m_s2"}, attributes)
