@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
-    from identification.prediction.exciter import Exciter
+    from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
     from identification.prediction.frequency_response import frequency_response, steady_predictions
     from identification.prediction.predictions import Predictions
@@ -94,6 +94,7 @@ __all__ = [
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
+    "VoltagePath",
     "VoltageSweep",
     "best_linear_approximation",
     "coherence",
@@ -168,6 +169,7 @@ _MODULE_OF = {
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
+    "VoltagePath": "prediction.exciter",
     "VoltageSweep": "prediction.sweep_inputs",
     "best_linear_approximation": "multisine.best_linear_approximation",
     "coherence": "multisine.coherences",
