@@ -99,7 +99,7 @@ def _lines(path: Path) -> list[str]:
 def read_csv(path: Path) -> dict[str, Any]:
     """Columns of any CSV file by name: comma, semicolon or tab; a first line of names; lines with ``#`` are left out.
 
-    Lines right after the names without any number (units) are passed over. Raises `ImportFailed`, with the line, on
+    Lines of units right after the names (texts, or a 1) are passed over. Raises `ImportFailed`, with the line, on
     anything that is no number, on rows of unequal length, and on decimal commas.
     """
     lines = [(number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#")]
@@ -115,7 +115,11 @@ def read_csv(path: Path) -> dict[str, Any]:
     for number, line in lines[1:]:
         cells = next(csv.reader([line], delimiter=comma))
         values = [_number(cell) for cell in cells]
-        if not rows and all(value is None for value in values):
+        if (
+            not rows
+            and None in values
+            and all(value is None or cell.strip() == "1" for cell, value in zip(cells, values, strict=True))
+        ):
             continue
         if len(cells) != len(names) or None in values:
             wrong = next((cell for cell, value in zip(cells, values, strict=True) if value is None), None)

@@ -72,6 +72,10 @@ def import_file(
     reader = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}[format_of(path, format_, "--format")]
     try:
         return reader(path, mapping, {"units": units, "drive": drive, "item": item})
+    except ImportFailed as error:
+        if str(path) in str(error):
+            raise
+        raise ImportFailed(f"{path}: {error}") from None
     except IdentificationError as error:
         fit = "" if mapping is None else f" does not fit {mapping}"
         raise ImportFailed(f"{path}{fit}: {error}") from None
@@ -115,9 +119,11 @@ def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
 
 def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
     """Universal files say their units, which are SI by now: a mapping may not say others."""
+    from identification.mapping.units import si_of
+
     for channel in getattr(mapping, "channels", ()):
         told = data["units"].get(channel.value) if isinstance(data.get("units"), dict) else None
-        if isinstance(told, str) and told and told != channel.unit:
+        if isinstance(told, str) and told and si_of(channel.unit, channel.name) != si_of(told, channel.name):
             raise ImportFailed(
                 f"channels.{channel.name}.unit = '{channel.unit}': the file's own units make it {told}; write that"
             )
@@ -175,7 +181,10 @@ def _from_csv(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
 
 
 def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
-    from rig.exchange.uff.reading import modes_in, read_uff, responses_in, time_data_in
+    from rig.exchange.uff.modes import modes_in
+    from rig.exchange.uff.reading import read_uff
+    from rig.exchange.uff.responses import responses_in
+    from rig.exchange.uff.time_data import time_data_in
 
     units = options["units"]
     if units not in ("", "labels", "file", "si"):

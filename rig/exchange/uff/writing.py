@@ -4,6 +4,7 @@ Frequency responses are functions of type 4, time data of type 1, modes dataset 
 modes without a type of its own (backbones, nonlinear modes) is a function of type 0 per column over the number of the row.
 """
 
+import warnings
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -38,7 +39,9 @@ def write_uff(items: Sequence[Contents], path: Path) -> None:
     for dataset in [*_head(items), *(dataset for item in items for dataset in _DATASETS[item.kind](item))]:
         if not np.all(np.isfinite(dataset.get("data", 0.0))):
             raise RecordingError(f"'{dataset['id1']}' holds a number that is not finite, which universal files cannot")
-        writer.write_sets(dataset, "add")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves a binary file to the garbage collector
+            writer.write_sets(dataset, "add")
 
 
 def _head(items: Sequence[Contents]) -> list[dict[str, Any]]:

@@ -13,6 +13,8 @@ from rig.exchange.kinds import KINDS, put_together, taken_apart
 from rig.exchange.mat import read_mat, structures_of_ours
 from rig.exchange.reading import import_file
 from rig.exchange.time_data import TimeData
+from rig.exchange.uff.reading import read_uff
+from rig.exchange.uff.time_data import time_data_in
 from tests.rig.exchange.conftest import CHANNELS
 
 NAMES = ("backbone", "mode", "matrix", "modes", "responses")
@@ -92,8 +94,6 @@ def test_universal_files_keep_stepped_sines_but_for_digits_of_the_frequency(resp
 
 @pytest.mark.parametrize("rate_hz", [5000.0, 51200.0, 1000.0 / 3.0])
 def test_time_data_of_universal_files_is_exact_and_so_is_its_rate(tmp_path, rate_hz):
-    from rig.exchange.uff.reading import read_uff, time_data_in
-
     samples = np.random.default_rng(0).normal(size=(3, 1000))
     path = tmp_path / "time.uff"
     write_contents([taken_apart(TimeData(CHANNELS, samples, rate_hz, point=4))], path, "uff")

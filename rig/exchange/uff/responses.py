@@ -1,0 +1,118 @@
+"""Frequency responses in the datasets of a universal file."""
+
+import re
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from identification import Channel, FrequencyResponse, FrequencyResponseMatrix
+from rig.exchange.mat import ImportFailed
+from rig.exchange.uff.reading import Dataset, degree_of
+from rig.exchange.uff.units import FileUnits, file_units
+
+__all__ = ["responses_in"]
+
+
+def _names(dataset: Dataset) -> tuple[str, str]:
+    """Names of response and reference: those that this package writes, else entity, else node and direction."""
+    parts = dataset["id1"].split(" / ")
+    if dataset["id4"].startswith("vibrolock") and len(parts) == 2:
+        return parts[0], parts[1]
+    return degree_of(dataset, "rsp"), degree_of(dataset, "ref")
+
+
+def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> Any:
+    """The functions of type 4: a `FrequencyResponseMatrix`, or the levels of a stepped sine that this package wrote.
+
+    A response whose node and axis are those of a reference is the drive point; opposite directions turn its sign.
+    Raises `ImportFailed` on missing or double paths, unequal frequencies, or unclear units.
+    """
+    functions = [dataset for dataset in datasets if dataset["type"] == 58 and dataset["func_type"] == 4]
+    units = file_units(datasets, assumed)
+    if functions and all(function["id4"] == "vibrolock frequency-responses" for function in functions):
+        return _stepped_sines(datasets, functions)
+    if not functions:
+        raise ImportFailed(f"no frequency response (dataset 58 of function type 4) among {len(datasets)} datasets")
+    paths: dict[tuple[str, str], Any] = {}
+    outputs: dict[str, Channel] = {}
+    inputs: dict[str, Channel] = {}
+    frequency_hz = np.asarray(functions[0]["x"], dtype=np.float64)
+    for function in functions:
+        where, x = function["where"], function["x"]
+        if len(x) != frequency_hz.size or not np.allclose(x, frequency_hz, rtol=1e-6):
+            raise ImportFailed(f"{where}: its frequencies are not those of the first; import such files one by one")
+        output, source = _names(function)
+        if (output, source) in paths:
+            raise ImportFailed(f"{where}: a second response of {output} to {source}; wanted is one, take levels apart")
+        value, channels = _path(function, units, output, source)
+        paths[output, source] = value
+        for known, channel in zip((outputs, inputs), channels, strict=True):
+            if known.setdefault(channel.name, channel).unit != channel.unit:
+                raise ImportFailed(
+                    f"{where}: {channel.name} is in {channel.unit}, before in {known[channel.name].unit}"
+                )
+            if channel.role == "drive":
+                known[channel.name] = channel
+    if missing := [f"{o} to {i}" for o in outputs for i in inputs if (o, i) not in paths]:
+        raise ImportFailed(
+            f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs"
+        )
+    return FrequencyResponseMatrix(
+        outputs=tuple(outputs.values()),
+        inputs=tuple(inputs.values()),
+        frequency_hz=frequency_hz,
+        value=np.array([[paths[o, i] for i in inputs] for o in outputs]).transpose(2, 0, 1),
+        estimator=_estimator(functions[0]),
+        specimen="" if functions[0]["id2"] == "NONE" else functions[0]["id2"],
+    )
+
+
+def _estimator(function: Dataset) -> str:
+    found = re.search(r", estimator ([^,]+)", function["id5"])
+    return found.group(1) if found else "imported"
+
+
+def _path(function: Dataset, units: FileUnits, output: str, source: str) -> tuple[Any, tuple[Channel, Channel]]:
+    """One response in SI, and its two channels."""
+    where = function["where"]
+    (out_unit, out_factor), (in_unit, in_factor) = (
+        units.of(function, axis, where) for axis in ("ordinate", "orddenom")
+    )
+    value = np.asarray(function["data"], dtype=np.complex128) * (out_factor / in_factor)
+    told = re.match(r"(\w+) / (\w+), estimator", function["id5"])
+    if told:
+        return value, (Channel(output, told[1], out_unit), Channel(source, told[2], in_unit))  # type: ignore[arg-type]
+    same = (function["rsp_node"], abs(function["rsp_dir"])) == (function["ref_node"], abs(function["ref_dir"]))
+    motion = out_unit in ("m", "m/s", "m/s2")
+    role = "drive" if same and motion else "response" if motion else "monitor"
+    return value, (
+        Channel(output, role, out_unit),  # type: ignore[arg-type]
+        Channel(source, "force" if in_unit == "N" else "monitor", in_unit),
+    )
+
+
+def _stepped_sines(datasets: Sequence[Dataset], functions: Sequence[Dataset]) -> tuple[FrequencyResponse, ...]:
+    """The levels of a stepped sine as this package writes them: response over force, and the force."""
+    forces = {d["func_id"]: d for d in datasets if d["type"] == 58 and d["func_type"] == 0}
+    out = []
+    for function in functions:
+        told = re.fullmatch(r"controlled (\w+), level (\S+)", function["id5"])
+        force = forces.get(function["func_id"])
+        if told is None or force is None or len(force["data"]) != len(function["data"]):
+            raise ImportFailed(f"{function['where']}: level or force of this stepped sine is missing")
+        kind, controlled = function["ordinate_axis_lab"], cast(Any, told[1])
+        label, specimen = ("" if function[key] == "NONE" else function[key] for key in ("id1", "id2"))
+        drive = np.asarray(force["data"], dtype=np.complex128)
+        response = FrequencyResponse(
+            function["x"],
+            drive,
+            function["data"] * drive,
+            kind,
+            controlled,
+            float(told[2]),
+            label,
+            specimen,
+        )
+        out.append(response)
+    return tuple(out)

@@ -1,0 +1,173 @@
+"""``rig export`` and ``rig import`` as they are typed."""
+
+import errno
+import json
+import os
+import shlex
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+import rig
+from identification import FrequencyResponseMatrix, nonlinear_mode
+from rig.cli import main
+from rig.exchange.kinds import restored
+from rig.recording.arrays import read_arrays
+
+
+@pytest.fixture
+def command(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def typed(line):
+        monkeypatch.setattr(sys, "argv", ["rig", *shlex.split(line)])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        captured = capsys.readouterr()
+        return int(stop.value.code or 0), captured.out, captured.err
+
+    return typed
+
+
+def stored(path):
+    return restored(*read_arrays(path))
+
+
+def test_a_backbone_goes_to_mat_as_a_structure_with_units(command, backbone_file, backbone, tmp_path):
+    status, out, err = command(f"export {backbone_file} --to mat -o backbone.mat")
+    assert status == 0, err
+    assert out.startswith("backbone: magnet beam")
+    data = scipy.io.loadmat(tmp_path / "backbone.mat", simplify_cells=True)["backbone"]
+    np.testing.assert_array_equal(data["force_n"], backbone.force_n)
+    np.testing.assert_array_equal(data["harmonics"], [point.harmonics for point in backbone.points])
+    assert [channel["name"] for channel in data["channels"]] == [channel.name for channel in backbone.channels]
+    assert (data["units"]["force_n"], data["units"]["frequency_hz"]) == ("N", "Hz")
+    assert all(len(name) <= 31 for name in [*data, *data["units"]])
+
+
+@pytest.mark.parametrize("ending", ["mat", "csv"])
+def test_a_backbone_that_comes_back_gives_the_same_nonlinear_mode(command, backbone_file, mode, tmp_path, ending):
+    assert command(f"export {backbone_file} -o out.{ending}")[0] == 0
+    status, out, err = command(f"import out.{ending} -o back.h5")
+    assert status == 0, err
+    assert out == "measured-backbone: 2 points\n"
+    again = nonlinear_mode(stored(tmp_path / "back.h5"))
+    np.testing.assert_array_equal(again.damping_ratio, mode.damping_ratio)
+    np.testing.assert_array_equal(again.modal_frequency_hz, mode.modal_frequency_hz)
+
+
+def test_a_multisine_is_one_response_matrix_a_level(command, multisine_file, tmp_path):
+    status, out, err = command(f"export {multisine_file} -o levels.uff")
+    assert status == 0, err
+    assert len(out.splitlines()) == 2
+    status, _, err = command(f"export {multisine_file} -o levels.csv")
+    assert status == 1
+    assert "levels.csv: a CSV file holds one table, here are 2: choose by --item one of 1 (" in err
+    status, out, err = command(f"export {multisine_file} -o second.uff --item 2 --json")
+    assert status == 0, err
+    assert json.loads(out)["written"][0]["kind"] == "frequency-response-matrix"
+    assert command("import second.uff -o second.h5")[0] == 0
+    found = stored(tmp_path / "second.h5")
+    assert isinstance(found, FrequencyResponseMatrix)
+    with rig.Recording(multisine_file) as recording:
+        spectra = rig.measurements.spectra(recording)[0.1]
+    expected = spectra.frequency_response(found.outputs[0].name).value
+    np.testing.assert_allclose(found.path(found.outputs[0].name), expected, rtol=1e-11)
+
+
+def test_samples_that_go_out_and_in_give_the_same_responses(command, multisine_file, tmp_path):
+    """Without the sensors' skew, which the shipped bench does not have."""
+    with rig.Recording(multisine_file) as recording:
+        first = next(iter(rig.measurements.spectra(recording).values()))
+        bench = recording.configuration["bench"]
+    status, _, err = command(f"export {multisine_file} --data time --point 0 --point 1 -o time.uff")
+    assert status == 0, err
+    channels = "".join(
+        f'[[channels]]\nname = "{c.name}"\nrole = "{c.role}"\nunit = "{c.unit}"\nvalue = "{c.name}"\n'
+        for c in first.channels
+    )
+    size = round(bench["sample_rate_hz"] / 0.5)
+    (tmp_path / "map.toml").write_text(
+        f'kind = "multisine"\nperiod_samples = {size}\nlowest_hz = 22.0\nhighest_hz = 28.0\ninstrument = "voltage"\n{channels}'
+    )
+    status, out, err = command("import time.uff --mapping map.toml -o responses.h5")
+    assert status == 0, err
+    assert "13 lines, 22 to 28 Hz" in out
+    found = stored(tmp_path / "responses.h5")
+    drive = next(channel.name for channel in found.outputs if channel.role == "drive")
+    np.testing.assert_allclose(found.path(drive), first.frequency_response(drive).value, rtol=1e-9)
+
+
+def test_samples_are_those_of_the_recording(command, backbone_file, tmp_path):
+    assert command(f"export {backbone_file} --data time --point 1 -o time.mat")[0] == 0
+    data = scipy.io.loadmat(tmp_path / "time.mat", simplify_cells=True)["time_data"]
+    with rig.Recording(backbone_file) as recording:
+        rows = rig.measurements.point_rows(recording, 1)
+    np.testing.assert_array_equal(data["samples"][:-1], rows["inputs"].T)
+    np.testing.assert_array_equal(data["samples"][-1], rows["output_v"])
+    assert data["channels"][-1]["unit"] == "V"
+
+
+def test_a_model_goes_to_csv_for_a_spreadsheet(command, backbone_file, tmp_path):
+    assert command(f"identify {backbone_file} -o model.h5")[0] == 0
+    assert command("export model.h5 -o model.csv")[0] == 0
+    lines = Path(tmp_path / "model.csv").read_text().splitlines()
+    assert lines[0] == "# vibrolock: nonlinear-mode"
+    assert dict(zip(lines[2].split(","), lines[3].split(","), strict=True))["damping_ratio"] == "1"
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "named"),
+    [
+        ("export {file} -o x.xls", 1, "x.xls: the ending says no format; give --to, one of mat, uff, csv"),
+        ("export {file} --to xls -o x", 1, "--to = 'xls': allowed is mat, uff, csv"),
+        ("export {file} --data raw -o x.mat", 1, "--data = 'raw': allowed is results or time"),
+        ("export {file} --data time --point 9 -o x.mat", 1, "point 9: nothing was recorded of it; there are 0, 1"),
+        ("export {file} --item 3 -o x.mat", 1, "--item = 3"),
+        ("export missing.h5 -o x.mat", 1, "missing.h5"),
+        ("export {file} -o nowhere/x.mat", 1, "there is no folder nowhere"),
+        ("export {file}", 2, "--output"),
+        ("import missing.mat -o x.h5", 1, "missing.mat: there is no such file"),
+        ("import missing.uff -o x.h5", 1, "missing.uff: cannot be read"),
+        ("import missing.csv -o x.h5", 1, "missing.csv: cannot be read"),
+        ("import missing.dat -o x.h5", 1, "give --format"),
+        ("import {file} --format mat -o x.h5", 1, "is no MAT file"),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_no_file(command, backbone_file, tmp_path, line, status, named):
+    code, out, err = command(line.format(file=backbone_file))
+    assert (code, out) == (status, "")
+    assert named in err
+    assert len(err.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_exists_is_kept_without_overwrite(command, backbone_file, tmp_path):
+    (tmp_path / "out.mat").write_text("mine")
+    status, _, err = command(f"export {backbone_file} -o out.mat")
+    assert status == 1
+    assert "exists already; choose another name, or --overwrite" in err
+    assert (tmp_path / "out.mat").read_text() == "mine"
+    assert command(f"export {backbone_file} -o out.mat --overwrite")[0] == 0
+    assert (tmp_path / "out.mat").stat().st_size > 1000
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+@pytest.mark.parametrize("ending", ["mat", "uff", "csv"])
+def test_a_full_disk_is_named_and_leaves_nothing(command, backbone_file, tmp_path, monkeypatch, ending):
+    real = Path.write_bytes
+
+    def onto_the_full_device(self, data):
+        if self.name.endswith(".part"):
+            self.symlink_to("/dev/full")
+            return 0
+        return real(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", onto_the_full_device)
+    status, _, err = command(f"export {backbone_file} -o out.{ending}")
+    assert status == 1
+    assert f"out.{ending}: cannot be written ({os.strerror(errno.ENOSPC)}); nothing was changed" in err
+    assert list(tmp_path.iterdir()) == []
