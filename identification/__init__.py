@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
     from identification.linear.subspace import StateSpace, subspace
-    from identification.mapping import FrequencyResponseMapping, map_frequency_responses
     from identification.mapping.backbone import BackboneMapping, map_backbone
     from identification.mapping.multisine import MultisineMapping, map_multisine
     from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
@@ -188,7 +187,6 @@ _MODULE_OF = {
     "mac": "nonlinear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",
-    "map_frequency_responses": "mapping",
     "map_frequency_responses": "mapping.stepped_sine",
     "map_multisine": "mapping.multisine",
     "map_nonlinear_mode": "mapping.nonlinear_mode",
