@@ -16,8 +16,13 @@ if TYPE_CHECKING:
         unpack_frequency_responses,
     )
     from identification.linear.analysis import ModalAnalysis
+    from identification.linear.extrapolation import extrapolated_to_zero
+    from identification.linear.modal_analysis import linear_modes
+    from identification.linear.mode_correlation import mac_matrix
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
+    from identification.linear.stabilisation import StabilisationDiagram, stabilisation
+    from identification.linear.subspace import StateSpace, subspace
     from identification.mapping.backbone import BackboneMapping, map_backbone
     from identification.mapping.multisine import MultisineMapping, map_multisine
     from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
@@ -36,12 +41,16 @@ if TYPE_CHECKING:
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
+    from identification.prediction.exciter import Exciter, VoltagePath
+    from identification.prediction.exciter_fit import identify_exciter
     from identification.prediction.frequency_response import frequency_response, steady_predictions
     from identification.prediction.predictions import Predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
     from identification.prediction.steady_prediction import SteadyPrediction
-    from identification.prediction.sweep_prediction import SweepPrediction
+    from identification.prediction.sweep_inputs import VoltageSweep
+    from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
+    from identification.prediction.sweeps import predict_sweep
     from identification.prediction.uncertainty import ResponseBand, response_band
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
@@ -55,6 +64,7 @@ __all__ = [
     "Channel",
     "Comparison",
     "DistortionLevels",
+    "Exciter",
     "ExtrapolationError",
     "ForceDropOut",
     "FrequencyResponse",
@@ -78,20 +88,29 @@ __all__ = [
     "Repeatability",
     "ResponseBand",
     "ResponseMatrixMapping",
+    "StabilisationDiagram",
+    "StateSpace",
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
+    "VoltagePath",
+    "VoltageSweep",
     "best_linear_approximation",
     "coherence",
     "combined",
     "compare",
+    "compare_sweep",
     "decimated",
     "demodulate",
     "distortion_levels",
     "error_table",
+    "extrapolated_to_zero",
     "force_drop_out",
     "frequency_response",
+    "identify_exciter",
+    "linear_modes",
     "mac",
+    "mac_matrix",
     "map_backbone",
     "map_frequency_responses",
     "map_multisine",
@@ -101,12 +120,15 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "predict_sweep",
     "recorded_force_response",
     "repeatability",
     "response_band",
     "single_point_mode",
+    "stabilisation",
     "steady_predictions",
     "stepped_sine_mode",
+    "subspace",
     "unpack_frequency_responses",
     "zero_crossings",
 ]
@@ -117,6 +139,7 @@ _MODULE_OF = {
     "Channel": "channels",
     "Comparison": "prediction.comparison",
     "DistortionLevels": "multisine.distortion",
+    "Exciter": "prediction.exciter",
     "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
     "FrequencyResponse": "frequency_responses",
@@ -140,20 +163,29 @@ _MODULE_OF = {
     "Repeatability": "nonlinear.repeatability",
     "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
+    "StabilisationDiagram": "linear.stabilisation",
+    "StateSpace": "linear.subspace",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
+    "VoltagePath": "prediction.exciter",
+    "VoltageSweep": "prediction.sweep_inputs",
     "best_linear_approximation": "multisine.best_linear_approximation",
     "coherence": "multisine.coherences",
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
+    "compare_sweep": "prediction.sweep_prediction",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
     "error_table": "prediction.comparison",
+    "extrapolated_to_zero": "linear.extrapolation",
     "force_drop_out": "signals.sweeps",
     "frequency_response": "prediction.frequency_response",
+    "identify_exciter": "prediction.exciter_fit",
+    "linear_modes": "linear.modal_analysis",
     "mac": "nonlinear.mode_shapes",
+    "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",
     "map_frequency_responses": "mapping.stepped_sine",
     "map_multisine": "mapping.multisine",
@@ -163,12 +195,15 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "predict_sweep": "prediction.sweeps",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",
     "single_point_mode": "nonlinear.single_points",
+    "stabilisation": "linear.stabilisation",
     "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
+    "subspace": "linear.subspace",
     "unpack_frequency_responses": "frequency_responses",
     "zero_crossings": "signals.half_periods",
 }

@@ -29,7 +29,9 @@ _STEP_STD = 1e-4
 _NEAREST = 0.9
 """Largest c, relative to that of a mode at the highest line."""
 _PRIOR = 0.25
-"""Where the responses say nothing of c it stays about here, half as wide: a mode at twice the highest line."""
+"""Where the responses say nothing of c it stays about here, relative to that of a mode at the highest line."""
+_PRIOR_STD = 5.0
+"""How little that binds: standard deviation relative to it, in units of the error of the responses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +136,10 @@ class _Problem:
         matrix[poles_count:, poles_count:] = linear * np.outer(both, both)
         gradient = -np.tensordot(np.conj(slopes), weighted, ((0, 1), (0, 1))).real
         cost = float(np.sum(np.conj(misfit) * weighted).real)
-        off = 2.0 * (poles[-1] - self.prior_c) / self.prior_c
-        gradient[-1] += 2.0 * off / self.prior_c
-        matrix[poles_count - 1, poles_count - 1] += 4.0 / self.prior_c**2
+        width = _PRIOR_STD * self.prior_c
+        off = (poles[-1] - self.prior_c) / width
+        gradient[-1] += off / width
+        matrix[poles_count - 1, poles_count - 1] += 1.0 / width**2
         return _State(terms, cost + off**2, matrix, gradient)
 
     def fitted(self, poles: Float, state: _State, converged: bool) -> ModalFit:
@@ -170,9 +173,7 @@ class _Problem:
         return np.append(poles[:-1], np.clip(poles[-1], 0.0, self.largest_c))
 
 
-def fit_modes(
-    data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS
-) -> ModalFit:
+def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS) -> ModalFit:
     """Weighted least-squares fit of a modal model from starting ``poles``: rad/s, then damping ratios (then c)."""
     problem, damping = _Problem(data, normal), 1e-3
     poles = np.append(poles, problem.prior_c) if poles.size % 2 == 0 else poles

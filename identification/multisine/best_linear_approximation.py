@@ -97,7 +97,7 @@ def best_linear_approximation(
         estimator=estimator,
         input_rms=tuple(spectra.rms(name) for name in names),
         specimen=specimen,
-        notes=(*spectra.notes, *_notes(error, len(columns))),
+        notes=(*spectra.notes, *_mixed([spectra.channels[row] for row in rows]), *_notes(error, len(columns))),
     )
 
 
@@ -185,6 +185,15 @@ def _products(samples: Complex) -> Complex:
     """Sum of ``x x^H`` over the first two axes, complex[n_lines, m, m]."""
     columns = np.moveaxis(samples.reshape(-1, *samples.shape[2:]), 0, -1).swapaxes(0, 1)
     return np.asarray(columns @ np.conj(columns.swapaxes(1, 2)))
+
+
+def _mixed(outputs: list[Channel]) -> list[str]:
+    """A note on outputs that are different motions."""
+    motions = {channel.name: channel.motion for channel in outputs if channel.role in ("drive", "response")}
+    if len(set(motions.values())) < 2:
+        return []
+    named = ", ".join(f"{name} {motion}" for name, motion in motions.items())
+    return [f"outputs are different motions ({named}): their responses do not compare"]
 
 
 def _notes(error: Complex, inputs: int) -> list[str]:

@@ -30,7 +30,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 Lines = Literal["excited", "odd", "even"]
 
-_OTHER_DESIGN = 0.01  # amplitude of the instrument at detection lines against the excited ones
+_OTHER_DESIGN = 0.1  # amplitude of the instrument at detection lines against the excited ones
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,7 +98,7 @@ def distortion_levels(
     Raises
     ------
     IdentificationError
-        With one period (noise is unknown), where the instrument has more than a hundredth of its amplitude at lines that the
+        With one period (noise is unknown), where the instrument has more than a tenth of its amplitude at lines that the
         design does not excite, and as `best_linear_approximation` does.
     """
     realisations, periods = spectra.spectra.shape[:2]

@@ -191,6 +191,9 @@ def _modes(runs: Sequence[NonlinearMode | Backbone]) -> list[NonlinearMode]:
     ]
     if len(modes) < 2:
         raise IdentificationError(f"runs: {len(modes)} given, repeatability needs two at least")
+    for number, mode in enumerate(modes, 1):
+        if (size := np.unique(mode.amplitude_m).size) < 2:
+            raise IdentificationError(f"runs: run {number} has {size} amplitude, a curve needs two at least")
     if len(specimens := {mode.specimen for mode in modes}) > 1:
         raise IdentificationError(f"runs: of different specimens ({', '.join(sorted(specimens))})")
     if len(sources := {mode.source for mode in modes}) > 1:

@@ -7,6 +7,10 @@ Every settled point near resonance obeys the one-mode equation at its own amplit
 with Q the displacement at the drive point and R the receptance of all other modes there. Both sides of the resonance pass
 the same amplitudes, so that a level gives every amplitude between its wings and its peak up to twice. Far from resonance
 F / Q is nearly real: then a degree of phase error, or of R, is a large share of the damping. Such points are left out.
+
+Measured against the shipped rigs' own backbones: both magnet beams agree at 60 degrees from resonance within 0.3 % of
+damping and 0.006 % of frequency. On the friction beam, whose slipping joint moves the other modes too, the damping errs by
+1 % per 10 degrees, one way below and the other way above resonance: points on both sides cancel it.
 """
 
 from collections.abc import Sequence
@@ -31,7 +35,7 @@ def single_point_mode(
     responses: Sequence[FrequencyResponse],
     drive_mode_shape: float,
     *,
-    phase_window_deg: float = 60.0,
+    phase_window_deg: float = 30.0,
     modes: LinearModes | None = None,
     mode: int | None = None,
 ) -> NonlinearMode:

@@ -94,8 +94,9 @@ def propagated(
         # What the errors do to the estimate they did to the truth: the quantiles of the deviation, turned over.
         low, high = np.percentile(total[name], _TAILS, axis=0)
         intervals[:, column] = np.column_stack([estimate[name] - high, estimate[name] - low])
-        if name in _BOUNDED:
-            intervals[:, column] = np.clip(intervals[:, column], 0.0, 1.0)
+        if name in _BOUNDED:  # beside its bound a quantity is skewed, and either way of reading the draws falls short
+            ends = np.column_stack([intervals[:, column], estimate[name] + low, estimate[name] + high])
+            intervals[:, column] = np.clip(np.column_stack([ends.min(axis=1), ends.max(axis=1)]), 0.0, 1.0)
     intervals[~known] = np.nan
     return {
         **out,

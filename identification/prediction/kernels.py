@@ -4,22 +4,23 @@ import numpy as np
 
 from vibrolock.compiled import kernel
 
-__all__ = ["DIVERGED", "DONE", "modal_rate", "property_at", "slow_flow"]
+__all__ = ["DIVERGED", "DONE", "cubic", "inverse", "modal_rate", "slow_flow"]
 
 DONE = 0
 DIVERGED = 1
 
 
 @kernel
-def property_at(q: float, breakpoints: np.ndarray, coefficients: np.ndarray) -> float:
-    """Cubic of the interval that q lies in; the end values outside (see `ModalProperties`)."""
-    last = breakpoints.size - 1
-    held = min(max(q, breakpoints[0]), breakpoints[last])
-    k = 0
-    while k < coefficients.shape[1] - 1 and breakpoints[k + 1] <= held:
-        k += 1
-    t = held - breakpoints[k]
+def cubic(t: float, coefficients: np.ndarray, k: int) -> float:
+    """Cubic of interval k, t beyond its beginning."""
     return float(((coefficients[0, k] * t + coefficients[1, k]) * t + coefficients[2, k]) * t + coefficients[3, k])
+
+
+@kernel
+def inverse(z: complex) -> complex:
+    """``1 / z`` without the care for overflow that costs a compiled division most of its time."""
+    scale = 1.0 / (z.real * z.real + z.imag * z.imag)
+    return complex(z.real * scale, -z.imag * scale)
 
 
 @kernel
@@ -38,24 +39,26 @@ def modal_rate(
     """Rate ``Q' = (phi (N - N' D'' / (2 G)) - D Q) / G``, ``G = D' - D D'' / (2 D')``, of the complex modal amplitude.
 
     ``D(s) = w^2 + 2 z w s + s^2 + phi^2 load[0]``; ``load`` [3] is what is coupled to the drive point (N/m) with its
-    first two derivatives by s; ``drive`` is N (N), ``change`` its N' (N/s).
+    first two derivatives by s; ``drive`` is N (N), ``change`` its N' (N/s). The properties are those of `ModalProperties`.
     """
-    size = abs(q)
+    size = np.sqrt(q.real * q.real + q.imag * q.imag)
     last = breakpoints[breakpoints.size - 1]
     if size > last:
         omega = np.sqrt(max(tail[0], tail[1] + tail[2] * (size * size - last * last)))
         damping = tail[3] + tail[4] * (size - last)
         phi = tail[5]
     else:
-        omega = property_at(size, breakpoints, omega_of)
-        damping = property_at(size, breakpoints, damping_of)
-        phi = property_at(size, breakpoints, shape_of)
+        k = 0
+        while k < omega_of.shape[1] - 1 and breakpoints[k + 1] <= size:
+            k += 1
+        t = max(size - breakpoints[k], 0.0)
+        omega, damping, phi = cubic(t, omega_of, k), cubic(t, damping_of, k), cubic(t, shape_of, k)
     loaded = phi * phi
     d0 = omega * omega + (2.0 * damping * omega + s) * s + loaded * load[0]
     d1 = 2.0 * (damping * omega + s) + loaded * load[1]
-    d2 = 2.0 + loaded * load[2]
-    slope = d1 - 0.5 * d0 * d2 / d1
-    return complex((phi * (drive - 0.5 * change * d2 / slope) - d0 * q) / slope)
+    half_d2 = 1.0 + 0.5 * loaded * load[2]
+    per_slope = inverse(d1 - d0 * half_d2 * inverse(d1))
+    return complex((phi * (drive - change * half_d2 * per_slope) - d0 * q) * per_slope)
 
 
 @kernel

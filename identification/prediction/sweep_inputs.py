@@ -1,6 +1,6 @@
 """What drives a sweep: frequency and complex amplitude over time, from a recording or as designed, on even instants."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _INSTANTS_PER_PERIOD = 16
+_FEWEST_PER_PERIOD = 8
 _MOST_INSTANTS = 20_000_000
 _UNEVEN = 1e-6
 
@@ -38,6 +39,14 @@ class SweepInput:
     def step_s(self) -> float:
         """Distance of the instants."""
         return float(self.time_s[-1] - self.time_s[0]) / (self.time_s.size - 1)
+
+    def thinned(self, longest_step_s: float) -> "SweepInput":
+        """Every so many-th instant: no further apart than ``longest_step_s``, at least eight per shortest period."""
+        longest = min(longest_step_s, 1.0 / (_FEWEST_PER_PERIOD * float(self.frequency_hz.max())))
+        every = slice(0, None, max(1, int(longest / self.step_s)))
+        return replace(
+            self, time_s=self.time_s[every], frequency_hz=self.frequency_hz[every], amplitude=self.amplitude[every]
+        )
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,8 @@
 """A predicted sweep, and how far it is from a recorded one."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,8 @@ __all__ = ["SweepPrediction", "compare_sweep"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
+_ARRAYS = ("time_s", "frequency_hz", "modal_amplitude", "drive_m", "drive_m_s", "drive_m_s2", "force")
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SweepPrediction:
@@ -28,8 +32,9 @@ class SweepPrediction:
         float[n], instants of the input, and its momentary frequency.
     modal_amplitude
         complex[n], Q, kg^1/2 m.
-    drive_m, drive_m_s2
-        complex[n], displacement and acceleration of the drive point.
+    drive_m, drive_m_s, drive_m_s2
+        complex[n], displacement, velocity and acceleration of the drive point. In a fast sweep ``|A|`` is not ``W^2 |X|``:
+        the phase of X moves, by percents of the frequency.
     force
         complex[n], force at the drive point, N.
     largest_identified
@@ -46,6 +51,7 @@ class SweepPrediction:
     frequency_hz: Float
     modal_amplitude: Complex
     drive_m: Complex
+    drive_m_s: Complex
     drive_m_s2: Complex
     force: Complex
     largest_identified: float
@@ -68,7 +74,7 @@ class SweepPrediction:
     ) -> "SweepPrediction":
         """What follows from the modal amplitude and its rate (complex[n], at the instants ``every`` of the input).
 
-        ``F = N - phi (L Q + L' Q')``, ``X_d = phi Q + r F + r' F'``, acceleration ``(s + d/dt)^2 X_d``; ``others`` holds r
+        ``F = N - phi (L Q + L' Q')``, ``X_d = phi Q + r F + r' F'``, velocity ``(s + d/dt) X_d``; ``others`` holds r
         and r' of the other modes (complex[n, 2]), None where the force is imposed.
         """
         s = 2j * np.pi * given.frequency_hz[every]
@@ -78,13 +84,14 @@ class SweepPrediction:
         drive_m = phi * amplitude
         if others is not None:
             drive_m = drive_m + others[:, 0] * force + others[:, 1] * _rate(force, step)
-        velocity = s * drive_m + _rate(drive_m, step)
+        drive_m_s = s * drive_m + _rate(drive_m, step)
         return cls(
             time_s=given.time_s[every],
             frequency_hz=given.frequency_hz[every],
             modal_amplitude=amplitude,
             drive_m=drive_m,
-            drive_m_s2=s * velocity + _rate(velocity, step),
+            drive_m_s=drive_m_s,
+            drive_m_s2=s * drive_m_s + _rate(drive_m_s, step),
             force=force,
             largest_identified=properties.q_range[1],
             window_periods=given.window_periods,
@@ -102,6 +109,20 @@ class SweepPrediction:
         where = int(np.argmax(np.abs(self.drive_m)))
         return float(abs(self.drive_m[where])), float(self.frequency_hz[where])
 
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        attributes = {name: getattr(self, name) for name in ("largest_identified", "window_periods", "origin")}
+        return {name: getattr(self, name) for name in _ARRAYS}, {**attributes, "notes": list(self.notes)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "SweepPrediction":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        try:
+            values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
+            return cls(**values, **{**attributes, "notes": tuple(attributes["notes"])})
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"sweep prediction: {error} is missing or unknown") from None
+
     def smoothed(self, values: Complex, window_periods: int) -> Complex:
         """``values`` (complex[n]) as `identification.demodulate` would show them: a mean over half the window, twice."""
         turned = np.concatenate([[0.0], np.cumsum(0.5 * (self.frequency_hz[1:] + self.frequency_hz[:-1]))])
@@ -118,17 +139,17 @@ class SweepPrediction:
 def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = "") -> PredictionError:
     """Errors of a predicted sweep against the recorded one it belongs to, on the same time axis.
 
-    Amplitudes are those of the drive point's fundamental as a displacement, ``|A| / W^2`` of an acceleration. The prediction is
-    smoothed like the recording, which a fast sweep's peak is lowered by. Raises `IdentificationError` where they have
-    no time in common, or the recording no drive channel.
+    Compared is the fundamental of the drive channel, be it displacement, velocity or acceleration, over that power of the
+    momentary W that makes it a displacement. The prediction is smoothed like the recording, which lowers a fast
+    sweep's peak. Raises `IdentificationError` where they have no time in common, or the recording no drive channel.
     """
     row = find_role(sweep.channels, "drive")
-    measured = (
-        np.abs(sweep.fundamentals[row]) / (2.0 * np.pi * sweep.frequency_hz) ** MOTION_ORDER[sweep.channels[row].motion]
-    )
+    order = MOTION_ORDER[sweep.channels[row].motion]
+    motion = (prediction.drive_m, prediction.drive_m_s, prediction.drive_m_s2)[order]
     window = 0 if prediction.window_periods else sweep.window_periods
-    acceleration = prediction.smoothed(prediction.drive_m_s2, window)
-    predicted = np.abs(acceleration) / (2.0 * np.pi * prediction.frequency_hz) ** 2
+    measured = np.abs(sweep.fundamentals[row]) / (2.0 * np.pi * sweep.frequency_hz) ** order
+    smoothed = np.abs(prediction.smoothed(motion, window))
+    predicted = smoothed / (2.0 * np.pi * prediction.frequency_hz) ** order
     common = (sweep.time_s >= prediction.time_s[0]) & (sweep.time_s <= prediction.time_s[-1])
     if not common.any():
         raise IdentificationError(

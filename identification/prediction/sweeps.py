@@ -30,7 +30,7 @@ from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.exciter import Exciter
-from identification.prediction.kernels import DIVERGED, slow_flow
+from identification.prediction.kernels import DIVERGED, modal_rate, slow_flow
 from identification.prediction.properties import FLAGGED_BEYOND, REFUSED_BEYOND, ExtrapolationError, ModalProperties
 from identification.prediction.sweep_inputs import SweepInput, VoltageSweep, force_input, voltage_input
 from identification.prediction.sweep_prediction import SweepPrediction
@@ -48,6 +48,8 @@ _TABLE_SIZE = 512
 _UNBOUNDED = 1e3  # times the identified range: there the integration of an imposed force ends
 _AT_REST = 1e-3
 _SETTLED = 12.0  # time constants
+_STEP_RAD = 0.4  # turn of the amplitude against its steady state within one step of Runge-Kutta
+_LEAST_DECAY = 1e-4
 
 
 def predict_sweep(
@@ -105,6 +107,8 @@ def predict_sweep(
     if isinstance(sweep, HalfPeriods):
         raise IdentificationError("sweep: half periods of a force are imposed without an exciter; give exciter = None")
     given = voltage_input(sweep, voltage)
+    detuning = np.max(np.abs(2.0 * np.pi * given.frequency_hz - properties.omega_rad_s[0]))
+    given = given.thinned(0.5 * _STEP_RAD / float(max(detuning, 1e-9)))
     notes = _coupling_notes(exciter, modes, given)
     return _integrate(properties, given, *_coupled(given, exciter, modes, properties), notes)
 
@@ -169,7 +173,7 @@ def _integrate(
     step = 2.0 * given.step_s
     start = 0j
     if abs(drive[0]) > _AT_REST * np.max(np.abs(drive)):
-        start = _settled(p, step, s[0], drive[0], load[0], tables)
+        start = _settled(p, complex(s[0]), complex(drive[0]), load[0], tables)
     code, count = slow_flow(start, step, s, drive, change, load, *tables, largest, out, rate)
     every = slice(0, 2 * count - 1, 2)
     if code == DIVERGED:
@@ -189,16 +193,17 @@ def _integrate(
     )
 
 
-def _settled(p: ModalProperties, step_s: float, s: complex, drive: complex, load: Complex, tables: _Tables) -> complex:
-    """Steady amplitude under a constant input, from rest."""
-    decay = float(p.damping.min() * p.omega_rad_s.min())
-    steps = int(np.ceil(_SETTLED / (decay * step_s))) + 1
+def _settled(p: ModalProperties, s: complex, drive: complex, load: Complex, tables: _Tables) -> complex:
+    """Steady amplitude under a constant input, from rest, by steps that the detuning at the smallest amplitude allows."""
+    small = 1e-3 * p.q_range[0]
+    detuning = -modal_rate(small + 0j, s, 0j, 0j, load, *tables) / small
+    step_s = _STEP_RAD / abs(detuning)
+    steps = int(np.ceil(_SETTLED / (max(detuning.real, _LEAST_DECAY * abs(detuning)) * step_s))) + 1
     size = 2 * steps - 1
     out, rate = np.empty(steps, np.complex128), np.empty(steps, np.complex128)
-    still = np.zeros(size, np.complex128)
-    loads = np.broadcast_to(load, (size, 3)).copy()
-    largest = p.q_range[1] * _UNBOUNDED
-    _, count = slow_flow(0j, step_s, np.full(size, s), np.full(size, drive), still, loads, *tables, largest, out, rate)
+    still, loads = np.zeros(size, np.complex128), np.broadcast_to(load, (size, 3)).copy()
+    held = (np.full(size, s), np.full(size, drive), still, loads)
+    _, count = slow_flow(0j, step_s, *held, *tables, p.q_range[1] * _UNBOUNDED, out, rate)
     return complex(out[count - 1])
 
 

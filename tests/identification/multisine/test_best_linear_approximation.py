@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identification import IdentificationError, MultisineDesign, PeriodicSpectra, best_linear_approximation
+from identification import Channel, IdentificationError, MultisineDesign, PeriodicSpectra, best_linear_approximation
 from tests.identification.multisine.linear_systems import RATE_HZ, instruments, measured, response_of
 
 FEW_LINES = MultisineDesign(RATE_HZ, 100, 40.0, 160.0)
@@ -151,6 +151,17 @@ def test_experiments_that_cannot_tell_the_inputs_apart_are_refused() -> None:
         IdentificationError, match="realisations: are 3, need a multiple of the 2 inputs force0, force1"
     ):
         best_linear_approximation(odd, instruments=instruments(2))
+
+
+def test_outputs_that_are_different_motions_are_noted() -> None:
+    spectra = measured(2, 1, noise=0.1)
+    channels = (*spectra.channels[:3], Channel("a1", "response", "m"))
+    mixed = PeriodicSpectra(channels, spectra.frequency_hz, spectra.excited, spectra.spectra)
+    found = best_linear_approximation(mixed)
+    assert found.notes == (
+        "outputs are different motions (a0 acceleration, a1 displacement): their responses do not compare",
+    )
+    assert not best_linear_approximation(mixed, outputs=("a1",)).notes
 
 
 def test_an_excited_line_without_power_is_refused() -> None:

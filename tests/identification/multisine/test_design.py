@@ -16,7 +16,7 @@ def component(signal: np.ndarray, line: int) -> complex:
 
 @settings(max_examples=30, deadline=None)
 @given(
-    period=st.integers(50, 3000),
+    period=st.integers(100, 3000),
     band=st.tuples(st.floats(0.01, 0.2), st.floats(0.25, 0.49)),
     grid=st.sampled_from(["full", "odd", "odd-random"]),
     rms=st.floats(0.01, 10.0),

@@ -6,6 +6,7 @@ import pytest
 import rig
 from identification import best_linear_approximation, distortion_levels
 from rig.campaigns.multisine import MultisinePlan
+from rig.errors import ConfigurationError
 from simulators.analysis import frequency_response
 from simulators.virtual_rig import VirtualRig
 
@@ -27,6 +28,12 @@ def spectra():
     with rig.run(PLAN, seed=2) as run:
         assert run.complete
         yield run.spectra()
+
+
+def test_a_plan_too_narrow_for_detection_lines_is_refused_with_the_size_of_its_groups():
+    narrow = PLAN.model_copy(update={"highest_hz": 16.0})
+    with pytest.raises(ConfigurationError, match=r"no line of the odd-random grid in 15 to 16 Hz; .* groups of 4 odd"):
+        rig.run(narrow)
 
 
 def test_a_low_level_gives_the_linear_response_of_the_rig_with_its_held_output(spectra):

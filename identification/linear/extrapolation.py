@@ -1,0 +1,129 @@
+"""Modes of several levels extrapolated to zero force: what nonlinearity makes of them at any level is taken out.
+
+Below some level a property y follows ``y = y_0 + d F^p``. Smooth elements have p = 2 (a cubic's or a magnet's share in the
+best linear approximation grows with the variance of the response). Joints in micro-slip have p = 1 + chi of Segalman's
+density (J. Appl. Mech. 72, 2005), chi in (-1, 0) for the energy that a cycle loses, and finite numbers of sliders blur it:
+1.2 to 1.4 was measured on the friction beam. Unless p is known, every p of a range is held to be equally likely.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.linear.mode_correlation import mac_matrix
+from identification.linear.modes import LinearModes
+
+__all__ = ["extrapolated_to_zero"]
+
+Float = NDArray[np.float64]
+
+_SAME_HZ = 0.03
+_SAME_MAC = 0.8
+_SPREAD = 1.1
+
+
+def extrapolated_to_zero(
+    low: LinearModes, high: LinearModes, *further: LinearModes, exponent: float | tuple[float, float] = (1.0, 2.0)
+) -> LinearModes:
+    """Modes at zero force, from the same modes at two or more levels.
+
+    Frequencies, damping ratios and shapes are straight lines over ``force_rms_n ** exponent``, each weighted by its errors.
+    Residual terms are those of the lowest level.
+
+    Parameters
+    ----------
+    low, high, further
+        Modes of one structure, same channels, levels at least 10 % apart.
+    exponent
+        Power of the force that properties are linear in: 2 for smooth elements; or lowest and highest possible power: the
+        mean of their results is taken, and their difference adds to the errors as a range of equally likely values does.
+
+    Raises
+    ------
+    IdentificationError
+        On levels that are unknown or alike, channels that differ, no mode in common, exponents that are not above zero.
+    """
+    models = sorted((low, high, *further), key=lambda model: model.force_rms_n)
+    force = np.array([model.force_rms_n for model in models])
+    if not np.all(np.isfinite(force)) or force[0] <= 0.0 or np.any(force[1:] < _SPREAD * force[:-1]):
+        listed = ", ".join(f"{value:.4g}" for value in force)
+        raise IdentificationError(f"force_rms_n: levels are {listed} N, need to be above zero and 10 % apart")
+    powers = np.atleast_1d(np.asarray(exponent, dtype=np.float64))
+    if powers.size > 2 or not np.all(np.isfinite(powers)) or np.any(powers <= 0.0):
+        raise IdentificationError(f"exponent: is {exponent}, needs one or two numbers above zero")
+    if any(model.channels != models[0].channels for model in models):
+        raise IdentificationError("channels: differ between the levels")
+    kept, values, covariances = _common(models)
+    _, covariance = _intercept(force ** np.mean(powers), values, covariances)
+    ends = [_intercept(force**power, values, covariances)[0] for power in powers]
+    covariance = covariance + np.diag((ends[-1] - ends[0]) ** 2 / 12.0)
+    return _model(models, kept, 0.5 * (ends[0] + ends[-1]), covariance, force, powers)
+
+
+def _common(models: Sequence[LinearModes]) -> tuple[list[int], Float, Float]:
+    """Modes of the lowest level that every other has too; their parameters float[n_levels, m] and covariances."""
+    first, matches = models[0], []
+    for k, frequency in enumerate(first.frequency_hz):
+        partners = [model.nearest(float(frequency)) for model in models]
+        if all(
+            abs(model.frequency_hz[j] / frequency - 1.0) < _SAME_HZ and mac_matrix(first, model)[k, j] > _SAME_MAC
+            for model, j in zip(models, partners, strict=True)
+        ):
+            matches.append((k, partners))
+    if not matches:
+        raise IdentificationError("frequency_hz: no mode is found at all levels")
+    values, covariances = [], []
+    for level, model in enumerate(models):
+        chosen = [partners[level] for _, partners in matches]
+        count = model.frequency_hz.size
+        index = np.concatenate([block * count + np.array(chosen) for block in range(2 + len(model.channels))])
+        values.append(np.concatenate([model.frequency_hz, model.damping_ratio, model.shapes.ravel()])[index])
+        if model.covariance is None:
+            std = np.concatenate([model.frequency_std_hz, model.damping_ratio_std, model.shapes_std.ravel()])
+            covariances.append(np.diag(std[index] ** 2))
+        else:
+            covariances.append(model.covariance[np.ix_(index, index)])
+    return [k for k, _ in matches], np.array(values), np.array(covariances)
+
+
+def _intercept(x: Float, values: Float, covariances: Float) -> tuple[Float, Float]:
+    """Weighted straight lines over x at x = 0, parameter by parameter, and their covariance."""
+    variance = np.einsum("lii->li", covariances)
+    weight = 1.0 / variance if np.all(np.isfinite(variance)) and np.all(variance > 0.0) else np.ones(values.shape)
+    weight = weight / weight.sum(axis=0)
+    mean = np.sum(weight * x[:, None], axis=0)
+    spread = np.sum(weight * (x[:, None] - mean) ** 2, axis=0)
+    share = weight * (1.0 - (x[:, None] - mean) * mean / spread)
+    covariance = np.einsum("li,lij,lj->ij", share, covariances, share)
+    return np.sum(share * values, axis=0), covariance
+
+
+def _model(
+    models: Sequence[LinearModes], kept: list[int], values: Float, covariance: Float, force: Float, powers: Float
+) -> LinearModes:
+    low, count = models[0], len(kept)
+    std, rows = np.sqrt(np.diag(covariance)), len(low.channels)
+    levels = ", ".join(f"{value:.4g}" for value in force)
+    notes = [
+        f"extrapolated to zero force from {levels} N RMS, linear in force to the {' to '.join(f'{p:g}' for p in powers)}"
+    ]
+    for k in sorted(set(range(low.frequency_hz.size)) - set(kept)):
+        notes.append(f"left out: mode at {low.frequency_hz[k]:.5g} Hz is not found at all levels")
+    return replace(
+        low,
+        frequency_hz=values[:count],
+        frequency_std_hz=std[:count],
+        damping_ratio=values[count : 2 * count],
+        damping_ratio_std=std[count : 2 * count],
+        shapes=values[2 * count :].reshape(rows, count),
+        shapes_std=std[2 * count :].reshape(rows, count),
+        phase_collinearity=low.phase_collinearity[kept],
+        covariance=covariance,
+        residues=None if low.residues is None else low.residues[:, kept],
+        force_rms_n=0.0,
+        fit_residual=np.nan,
+        notes=(*low.notes, *notes),
+    )

@@ -1,0 +1,118 @@
+"""Recorded sweeps of the virtual rigs, predicted from a recorded backbone and a recorded multisine.
+
+The other modes are the rig's own, which a modal analysis of the same rig would give.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import rig
+from identification import Channel, LinearModes, Transient, nonlinear_mode
+from identification.prediction.exciter import Exciter
+from identification.prediction.exciter_fit import identify_exciter
+from identification.prediction.properties import ModalProperties
+from identification.prediction.sweep_prediction import compare_sweep
+from identification.prediction.sweeps import predict_sweep
+from simulators.virtual_rig import VirtualRig
+from tests.rig.rigs import bench_with
+
+STINGER_N_M = {"magnet-beam": 6283185.0, "friction-beam": 9666439.0}
+GAIN = {"magnet-beam": 1.0, "friction-beam": 10.0}
+
+
+@cache
+def exciter_of(bench: str, noise: float = 1.0) -> Exciter:
+    with rig.run(f"{bench}/exciter", bench=bench_with(name=bench, noise_scale=noise), seed=3) as run:
+        (spectra,) = run.spectra().values()
+    return identify_exciter(
+        spectra,
+        sample_rate_hz=5000.0,
+        stinger_stiffness_n_m=STINGER_N_M[bench],
+        resistance_ohm=1.5,
+        amplifier_gain=GAIN[bench],
+        source=bench,
+    )
+
+
+@cache
+def properties_of(bench: str) -> ModalProperties:
+    with rig.run(f"{bench}/backbone") as run:
+        return ModalProperties.of(nonlinear_mode(run.backbone()))
+
+
+@cache
+def modes_of(bench: str) -> LinearModes:
+    modes = VirtualRig.shipped(bench).linear_modes
+    unknown, shape = np.full(modes.frequency_hz.size, np.nan), modes.drive_shape[None]
+    return LinearModes(
+        channels=(Channel("drive", "drive", "m/s2"),),
+        frequency_hz=modes.frequency_hz,
+        frequency_std_hz=unknown,
+        damping_ratio=modes.damping_ratio,
+        damping_ratio_std=unknown,
+        shapes=shape,
+        shapes_std=np.full(shape.shape, np.nan),
+        phase_collinearity=unknown,
+        lower=np.zeros(1, np.complex128),
+        upper=np.zeros(1, np.complex128),
+        lowest_hz=0.0,
+        highest_hz=2500.0,
+    )
+
+
+def sweep_of(plan: str) -> Transient:
+    with rig.run(plan) as run:
+        (sweep,) = run.sweeps().values()
+    return sweep
+
+
+@pytest.mark.parametrize("bench", ["magnet-beam", "friction-beam"])
+@pytest.mark.parametrize("noise", [1.0, 10.0])
+def test_the_shipped_multisine_tells_the_exciter_within_two_percent(bench: str, noise: float) -> None:
+    shaker = VirtualRig.shipped(bench).exciter
+    found = exciter_of(bench, noise)
+    electrical = found.electrical(GAIN[bench])
+    assert found.moving_mass_kg == pytest.approx(shaker.armature_mass_kg, rel=0.02)
+    assert found.suspension_stiffness_n_m == pytest.approx(shaker.suspension_stiffness_n_m, rel=0.02)
+    assert found.suspension_damping_n_s_m == pytest.approx(shaker.suspension_damping_n_s_m, rel=0.02)
+    assert electrical["force_factor_n_a"] == pytest.approx(shaker.force_factor_n_a, rel=0.02)
+    assert electrical["inductance_h"] == pytest.approx(shaker.inductance_h, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("plan", "peak"),
+    [
+        ("magnet-beam/sweep-2", 0.01),
+        ("magnet-beam/sweep-3", 0.01),
+        ("friction-beam/sweep-1", 0.02),
+        ("friction-beam/sweep-2", 0.02),
+    ],
+)
+def test_with_the_exciter_coupled_the_peak_is_right_even_with_a_wrong_frequency(plan: str, peak: float) -> None:
+    bench, sweep = plan.split("/")[0], sweep_of(plan)
+    right = properties_of(bench)
+    for change in (-0.002, 0.0, 0.002):
+        p = ModalProperties.from_levels(
+            right.modal_amplitude, (1.0 + change) * right.omega_rad_s, right.damping, right.drive_shape_at
+        )
+        prediction = predict_sweep(p, sweep, exciter=exciter_of(bench), modes=modes_of(bench))
+        error = compare_sweep(prediction, sweep)
+        assert abs(error.peak_error) < peak
+        assert abs(error.peak_frequency_error) < 0.004
+        assert error.range_use < 1.0
+
+
+def test_with_the_force_imposed_a_frequency_error_captures_the_slow_sweep() -> None:
+    """Founding paper, magnet beam's second sweep: unbounded, or many times too large."""
+    sweep = sweep_of("magnet-beam/sweep-2")
+    p = replace(properties_of("magnet-beam"), allow_extrapolation=True)
+    wrong = ModalProperties.from_levels(
+        p.modal_amplitude, 1.002 * p.omega_rad_s, p.damping, p.drive_shape_at, allow_extrapolation=True
+    )
+    assert abs(compare_sweep(predict_sweep(p, sweep), sweep).peak_error) < 0.06
+    captured = compare_sweep(predict_sweep(wrong, sweep), sweep)
+    assert captured.peak_error > 1.0
+    assert captured.verdict == "extrapolated far"

@@ -1,0 +1,120 @@
+import numpy as np
+import pytest
+
+from identification import (
+    Channel,
+    FrequencyResponseMatrix,
+    IdentificationError,
+    LinearModes,
+    linear_modes,
+    stabilisation,
+)
+from tests.identification.linear.structures import (
+    CHANNELS,
+    DAMPING,
+    FORCE,
+    FREQUENCY_HZ,
+    LINES_HZ,
+    SHAPES,
+    accelerance,
+    measured,
+)
+
+
+def test_modes_are_found_and_mass_normalised_without_being_asked_for() -> None:
+    modes = linear_modes(measured(1, 0.1))
+    assert np.all(np.abs(modes.frequency_hz - FREQUENCY_HZ) < 4 * modes.frequency_std_hz)
+    assert np.all(np.abs(modes.damping_ratio - DAMPING) < 4 * modes.damping_ratio_std)
+    assert np.all(np.abs(modes.shapes - SHAPES) < 4 * modes.shapes_std)
+    assert modes.fit_residual == pytest.approx(1.0, abs=0.1)
+    np.testing.assert_allclose(modes.accelerance(LINES_HZ), accelerance(), atol=0.05 * np.max(np.abs(accelerance())))
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    truth = np.concatenate([FREQUENCY_HZ, DAMPING, SHAPES.ravel()])
+    inside = []
+    for seed in range(15):
+        modes = linear_modes(measured(seed, 0.5), modes=list(FREQUENCY_HZ), orders=range(2, 15, 2))
+        found = np.concatenate([modes.frequency_hz, modes.damping_ratio, modes.shapes.ravel()])
+        assert modes.covariance is not None
+        inside.append(np.abs(found - truth) < 1.96 * np.sqrt(np.diag(modes.covariance)))
+    assert 0.9 <= np.mean(inside) <= 0.99
+
+
+def test_velocities_and_displacements_give_the_same_modes_as_accelerations() -> None:
+    s = 2j * np.pi * LINES_HZ
+    channels = (Channel("drive", "drive", "m"), Channel("tip", "response", "m/s"))
+    value = measured(2, 0.05).value / np.stack([s**2, s], axis=1)[:, :, None]
+    responses = FrequencyResponseMatrix(outputs=channels, inputs=FORCE, frequency_hz=LINES_HZ, value=value)
+    modes = linear_modes(responses, modes=3)
+    np.testing.assert_allclose(modes.frequency_hz, FREQUENCY_HZ, rtol=1e-3)
+    np.testing.assert_allclose(modes.shapes, SHAPES, rtol=0.05)
+    assert any("no covariance" in note for note in modes.notes)
+
+
+def test_a_number_of_modes_or_frequencies_near_them_can_be_asked_for() -> None:
+    responses = measured(3, 0.5)
+    assert linear_modes(responses, modes=3).frequency_hz.size == 3
+    near = linear_modes(responses, modes=[60.5, 19.8, 33.2])
+    np.testing.assert_allclose(near.frequency_hz, FREQUENCY_HZ, rtol=1e-3)
+    with pytest.raises(IdentificationError, match=r"modes: 9 wanted, \d found"):
+        linear_modes(responses, modes=9)
+    with pytest.raises(IdentificationError, match=r"modes: frequencies are 20, 90 Hz, allowed are 10 to 79.95 Hz"):
+        linear_modes(responses, modes=[20.0, 90.0])
+
+
+def test_complex_residues_are_recovered_and_their_collinearity_told() -> None:
+    s = 2j * np.pi * LINES_HZ[:, None]
+    omega = 2 * np.pi * FREQUENCY_HZ
+    pole = omega * (-DAMPING + 1j * np.sqrt(1 - DAMPING**2))
+    residues = SHAPES * SHAPES[0] * np.exp(1j * np.array([[0.05, -0.05, 0.1], [0.6, 0.5, -0.7]]))
+    part = residues / (2j * pole.imag)
+    modal = s**2 / (s - pole) @ part.T + s**2 / (s - np.conj(pole)) @ np.conj(part).T
+    modes = linear_modes(measured(4, 0.05, exact=modal + 0.3), complex_residues=True)
+    assert modes.residues is not None
+    np.testing.assert_allclose(modes.residues, residues, atol=0.02)
+    np.testing.assert_allclose(modes.accelerance(LINES_HZ), modal + 0.3, atol=0.05 * np.max(np.abs(modal)))
+    assert np.all(modes.phase_collinearity < 0.97)
+    arrays, attributes = modes.to_arrays()
+    again = LinearModes.from_arrays(arrays, attributes)
+    np.testing.assert_array_equal(again.accelerance(LINES_HZ), modes.accelerance(LINES_HZ))
+
+
+def test_close_modes_and_coarse_lines_are_named() -> None:
+    close = np.array([20.0, 33.0, 33.4])
+    exact = accelerance(poles_hz=close, damping=DAMPING[[0, 1, 1]])
+    notes = linear_modes(measured(5, 0.1, exact=exact), modes=list(close)).notes
+    assert any("Hz are close: " in note and "MAC" in note for note in notes)
+    exact = accelerance(damping=np.array([0.0008, 0.008, 0.002]))
+    notes = linear_modes(measured(6, 0.1, exact=exact), modes=list(FREQUENCY_HZ)).notes
+    assert any(note.startswith("mode at 20 Hz: half-power bandwidth") for note in notes)
+
+
+def test_what_a_modal_analysis_needs_is_asked_for() -> None:
+    responses = measured(7, 0.5)
+    with pytest.raises(IdentificationError, match="'drive'"):
+        linear_modes(responses.select(["tip"]))
+    with pytest.raises(IdentificationError, match=r"frequency_hz: 2 lines are too few for 42 block rows"):
+        linear_modes(responses.select(lowest_hz=20.0, highest_hz=20.1), orders=[40])
+    with pytest.raises(IdentificationError, match="weighting: is 'noise', but the responses have no noise_covariance"):
+        linear_modes(responses, weighting="noise")
+    noise = np.random.default_rng(0).normal(size=(2, LINES_HZ.size, 2)).view(np.complex128)
+    empty = FrequencyResponseMatrix(
+        outputs=CHANNELS, inputs=FORCE, frequency_hz=LINES_HZ, value=noise.reshape(-1, 2, 1)
+    )
+    with pytest.raises(IdentificationError, match="modes: "):
+        linear_modes(empty)
+
+
+def test_the_stabilisation_diagram_shows_columns_at_the_modes() -> None:
+    diagram = stabilisation(measured(8, 0.5))
+    columns = diagram.columns()
+    for frequency, damping in zip(FREQUENCY_HZ, DAMPING, strict=True):
+        at = columns[np.argmin(np.abs(diagram.frequency_hz[columns] - frequency))]
+        assert diagram.frequency_hz[at] == pytest.approx(frequency, rel=2e-3)
+        assert diagram.damping_ratio[at] == pytest.approx(damping, rel=0.35)
+        column = diagram.stable & (np.abs(diagram.frequency_hz / frequency - 1) < 0.01)
+        assert np.unique(diagram.order[column]).size >= 10
+    assert not np.any(diagram.stable & ~diagram.frequency_stable)
+    with pytest.raises(IdentificationError, match=r"orders: \[0, 4\]"):
+        stabilisation(measured(8, 0.5), orders=[4, 0])

@@ -1,0 +1,150 @@
+"""Standard errors by Monte Carlo against first-order propagation, known errors, and the coverage that they promise."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import Backbone, Channel, IdentificationError, ModeShapes, NonlinearMode, PeriodicVibration
+from identification import nonlinear_mode as identify
+from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
+from tests.identification.rigs import PHI, one_mode_point
+
+CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m/s2"))
+SHAPE = np.array([PHI, 3.1])
+
+
+def noisy_point(lag_deg: float = 90.0, relative: float = 1e-3, forces: tuple[complex, ...] = (0, 0.3, 0.1)):
+    """A one-mode point with a second sensor and stated errors; nothing is added to its harmonics."""
+    point = one_mode_point(lag_deg, forces=forces)
+    harmonics = np.vstack([point.harmonics, point.harmonics[1] * SHAPE[1] / SHAPE[0]])
+    std = relative * np.abs(harmonics[:, 1])[:, None] * np.ones(harmonics.shape)
+    return PeriodicVibration(CHANNELS, point.frequency_hz, harmonics, 200, np.zeros(3), std)
+
+
+def with_errors(point: PeriodicVibration, rng: np.random.Generator) -> PeriodicVibration:
+    noise = rng.standard_normal(point.harmonics.shape) + 1j * rng.standard_normal(point.harmonics.shape)
+    return replace(point, harmonics=point.harmonics + point.harmonics_std * noise)
+
+
+@pytest.mark.parametrize("lag_deg", [60.0, 90.0, 110.0])
+def test_standard_errors_are_those_of_first_order_propagation(lag_deg: float) -> None:
+    relative = 1e-3
+    mode = identify(Backbone((noisy_point(lag_deg, relative),), drive_mode_shape=PHI), draws=20_000)
+    w, f, z, lag = mode.modal_frequency_hz[0], mode.frequency_hz[0], mode.damping_ratio[0], np.radians(lag_deg)
+    tails = np.sqrt(38 / 36)  # Student's, of twenty batches
+    size = 2 * z * f * w / np.sin(lag)  # |phi^2 F / Q| / (2 pi)^2
+    magnitude = angle = np.sqrt(2) * relative * tails
+    frequency_std = size * np.hypot(np.cos(lag) * magnitude, np.sin(lag) * angle) / (2 * w)
+    damping_std = size * np.hypot(np.sin(lag) * magnitude, np.cos(lag) * angle) / (2 * w * f)
+    assert mode.modal_frequency_std_hz[0] == pytest.approx(frequency_std, rel=0.03)
+    assert mode.damping_ratio_std[0] == pytest.approx(damping_std, rel=0.03)
+    assert mode.force_std_n[0] == pytest.approx(0.3 * relative * tails, rel=0.03)
+    assert mode.modal_amplitude_std[0] == pytest.approx(relative * tails * mode.modal_amplitude[0], rel=0.03)
+    assert mode.phase_lag_std_deg[0] == pytest.approx(np.degrees(angle), rel=0.03)
+
+
+def test_one_percent_of_the_shape_is_two_percent_of_the_damping_at_all_points_alike() -> None:
+    points = tuple(noisy_point(relative=1e-6, forces=(0, force, 0)) for force in (0.1, 0.2, 0.3))
+    shapes = ModeShapes(("drive",), np.array([[PHI]]), shapes_std=np.array([[0.01 * PHI]]))
+    mode = identify(Backbone(points), mode_shapes=shapes)
+    relative = mode.systematic("damping_ratio") / mode.damping_ratio
+    np.testing.assert_allclose(relative, 0.02, rtol=0.1)
+    np.testing.assert_allclose(relative, relative[0], rtol=1e-6)
+    assert np.all(mode.random("damping_ratio") < 0.02 * mode.systematic("damping_ratio"))
+    np.testing.assert_allclose(mode.systematic("force_n"), 0.0)
+
+
+def test_gain_and_skew_of_the_sensors_are_counted_where_they_act() -> None:
+    backbone = Backbone((noisy_point(relative=1e-7),), drive_mode_shape=PHI)
+    gain = identify(backbone, calibration_std={"force": 0.01})
+    assert gain.damping_ratio_std[0] == pytest.approx(0.01 * gain.damping_ratio[0], rel=0.1)
+    assert gain.modal_frequency_std_hz[0] == pytest.approx(0.0, abs=1e-6)
+    skew = identify(backbone, phase_skew_std_deg={"drive": 0.5})
+    assert skew.phase_lag_std_deg[0] == pytest.approx(0.5, rel=0.1)
+    expected = skew.damping_ratio[0] * skew.modal_frequency_hz[0] * np.radians(0.5)
+    assert skew.modal_frequency_std_hz[0] == pytest.approx(expected, rel=0.1)
+    both = identify(backbone, calibration_std=0.01)
+    assert both.damping_ratio_std[0] == pytest.approx(np.sqrt(2) * 0.01 * both.damping_ratio[0], rel=0.1)
+
+
+def test_intervals_of_every_quantity_cover_the_truth() -> None:
+    rng = np.random.default_rng(7)
+    true_points = [noisy_point(lag, 2e-3, (0, force, 0.4 * force)) for lag, force in ((80, 0.1), (90, 0.2), (95, 0.3))]
+    shapes_std = 3e-3 * SHAPE[:, None]
+    truth = identify(Backbone(tuple(true_points)), mode_shapes=ModeShapes(("drive", "tip"), SHAPE[:, None]))
+    hits = {name: [] for name in QUANTITIES}
+    for seed in range(250):
+        gain = (1 + 5e-3 * rng.standard_normal(3)) * np.exp(1j * np.radians(0.2) * rng.standard_normal(3))
+        turned = np.abs(gain)[:, None] * np.exp(1j * np.outer(np.angle(gain), np.arange(3)))
+        points = [with_errors(replace(p, harmonics=p.harmonics * turned), rng) for p in true_points]
+        shapes = ModeShapes(("drive", "tip"), SHAPE[:, None] + shapes_std * rng.standard_normal((2, 1)), 0, shapes_std)
+        mode = identify(
+            Backbone(tuple(points)),
+            mode_shapes=shapes,
+            calibration_std=5e-3,
+            phase_skew_std_deg=0.2,
+            draws=200,
+            seed=seed,
+        )
+        for name in QUANTITIES:
+            low, high = mode.interval(name).T
+            value = getattr(truth, name)
+            hits[name].append((low <= value + 1e-12) & (value - 1e-12 <= high))
+    covered = {name: float(np.mean(hit)) for name, hit in hits.items()}
+    bounded = ("mac", "force_purity", "response_purity")  # wider on purpose
+    assert all(0.90 <= share <= 0.99 for name, share in covered.items() if name not in bounded), covered
+    assert all(covered[name] >= 0.90 for name in bounded), covered
+
+
+def test_few_periods_widen_the_errors_and_are_named() -> None:
+    many, few = noisy_point(), replace(noisy_point(), periods=5)
+    wide = identify(Backbone((few,), drive_mode_shape=PHI))
+    narrow = identify(Backbone((many,), drive_mode_shape=PHI))
+    assert wide.damping_ratio_std[0] > 1.05 * narrow.damping_ratio_std[0]
+    assert any("point 1: fewer than 10 periods" in note for note in wide.notes)
+
+
+def test_the_same_seed_gives_the_same_numbers_and_unknown_errors_stay_unknown() -> None:
+    backbone = Backbone((noisy_point(),), drive_mode_shape=PHI)
+    one, two, other = (identify(backbone, seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.damping_ratio_std, two.damping_ratio_std)
+    assert one.damping_ratio_std[0] != other.damping_ratio_std[0]
+    silent = identify(Backbone((replace(noisy_point(), harmonics_std=None),), drive_mode_shape=PHI))
+    for name in STANDARD_ERRORS.values():
+        assert np.isnan(getattr(silent, name)).all(), name
+
+
+def test_a_file_of_an_earlier_version_is_read_with_a_note() -> None:
+    mode = identify(Backbone((noisy_point(),), "beam", PHI))
+    arrays, attributes = mode.to_arrays()
+    again = NonlinearMode.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    np.testing.assert_array_equal(again.interval("damping_ratio"), mode.interval("damping_ratio"))
+    kept = ("modal_frequency_std_hz", "damping_ratio_std")
+    old = {k: v for k, v in arrays.items() if k in kept or ("_std" not in k and k != "interval_95")}
+    earlier = NonlinearMode.from_arrays(old, attributes)
+    np.testing.assert_array_equal(earlier.damping_ratio_std, mode.damping_ratio_std)
+    assert np.isnan(earlier.mac_std).all()
+    assert np.isnan(earlier.interval("mac")).all()
+    assert "written by an earlier version" in earlier.notes[-1]
+    json.dumps(earlier.table(), allow_nan=False)
+
+
+def test_what_cannot_be_used_is_named() -> None:
+    backbone = Backbone((noisy_point(),), drive_mode_shape=PHI)
+    with pytest.raises(IdentificationError, match="calibration_std: no channel 'tap'; channels: force, drive, tip"):
+        identify(backbone, calibration_std={"tap": 0.1})
+    with pytest.raises(IdentificationError, match=r"phase_skew_std_deg: is -1, allowed is 0 or above"):
+        identify(backbone, phase_skew_std_deg=-1)
+    with pytest.raises(IdentificationError, match="draws: is 3, needs at least 100"):
+        identify(backbone, draws=3)
+    drowned = replace(noisy_point(), harmonics_std=np.ones((3, 3)))
+    with pytest.raises(
+        IdentificationError, match=r"force 0.3 N drowns in its standard error of 1 N; record more periods"
+    ):
+        identify(Backbone((drowned,), drive_mode_shape=PHI))
+    with pytest.raises(IdentificationError, match="quantity: is 'q', allowed are force_n"):
+        identify(backbone).interval("q")
+    with pytest.raises(IdentificationError, match=r"shapes_std: shape \(1,\), shapes have \(2, 1\)"):
+        ModeShapes(("drive", "tip"), SHAPE[:, None], shapes_std=np.zeros(1))
