@@ -14,6 +14,9 @@ import scipy.io
 import rig
 from identification import FrequencyResponseMatrix, nonlinear_mode
 from rig.cli import main
+from rig.exchange.export import write_contents
+from rig.exchange.kinds import taken_apart
+from rig.exchange.reading import import_file
 from rig.exchange.store import load
 
 
@@ -166,3 +169,19 @@ def test_a_full_disk_is_named_and_leaves_nothing(command, backbone_file, tmp_pat
     assert status == 1
     assert f"out.{ending}: cannot be written ({os.strerror(errno.ENOSPC)}); nothing was changed" in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_imported_modes_and_responses_are_shown_and_plotted_like_our_own(command, multisine_file, modes, tmp_path):
+    write_contents([taken_apart(modes)], tmp_path / "modes.unv", "uff")
+    assert command(f"export {multisine_file} --item 1 -o responses.uff")[0] == 0
+    for name in ("modes.unv", "responses.uff"):
+        status, _, err = command(f"import {name} -o {name}.h5")
+        assert status == 0, err
+        status, out, err = command(f"show {name}.h5")
+        assert status == 0, err
+        assert "m/s2/N" in out or "m/s^2/N" in out or "24.1235" in out
+        assert command(f"plot {name}.h5 -o {name}.png")[0] == 0
+        again = f"again.{name}"
+        assert command(f"export {name}.h5 -o {again}")[0] == 0
+    found, first = (import_file(tmp_path / name) for name in ("again.modes.unv", "modes.unv"))
+    np.testing.assert_array_equal(found.shapes, first.shapes)
