@@ -15,6 +15,10 @@ own damping ratio exactly. ``damping_ratio_uncorrected`` is ``P_1 / (W^3 q^2)``.
 
 The force's own harmonics, fed back by the exciter, do work too; ``damping_ratio_total_power`` takes the power of all
 harmonics, ``P = sum_h 1/2 Re(F_h conj(i h W Q_d,h))``.
+
+What a pure sine would find is yet another thing where the vibration has a mean: the exciter's suspension holds the mean
+deflection with a static force that piezo sensors do not see. On the one-sided magnet beam it is 1.1 N at 0.56 N and raises
+the modal frequency by 0.37 %; the modal frequency here is that of the rig as it stands, static force included.
 """
 
 from collections.abc import Mapping

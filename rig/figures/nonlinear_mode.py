@@ -16,14 +16,45 @@ __all__ = ["draw_mode", "draw_properties"]
 
 def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
     """Draw a model."""
-    axes = page.subplots(2, 2)
+    shapes, purities = np.isfinite(mode.mac).any(), np.isfinite(mode.force_purity).any()
+    axes = page.subplots(2, 3 if shapes or purities else 2)
     draw_properties(axes[0, 0], axes[0, 1], mode)
     amplitude, unit = engineering(mode.amplitude_m)
     order = np.argsort(mode.force_n)
+    if shapes or purities:
+        _draw_mac(axes[0, 2], mode)
+        _draw_purity(axes[1, 2], mode)
     axes[1, 0].plot(mode.force_n[order], amplitude[order], "o-", ms=4, color=MAIN)
     axes[1, 0].set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement amplitude, {unit}")
     _harmonics(axes[1, 1], mode)
     title(page, f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {mode.force_n.size} points")
+
+
+def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
+    """One minus the MAC on a logarithmic axis: what is close to one would be a line at the top."""
+    if not np.isfinite(mode.mac).any():
+        say_why_empty(axis, "MAC needs mode shapes")
+        return
+    order = np.argsort(mode.amplitude_m)
+    amplitude, unit = engineering(mode.amplitude_m[order])
+    low, high = np.maximum(1.0 - mode.interval("mac")[order, ::-1].T, 1e-12)
+    axis.fill_between(amplitude, low, high, color=MAIN, alpha=0.2, lw=0)
+    axis.semilogy(amplitude, np.maximum(1.0 - mode.mac[order], 1e-12), "o-", ms=4, color=MAIN)
+    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel="1 - MAC against the linear shape")
+
+
+def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
+    """Share of the fundamental in force and motion, with its 95 % interval."""
+    if not np.isfinite(mode.force_purity).any():
+        say_why_empty(axis, "purity needs harmonics")
+        return
+    order = np.argsort(mode.force_n)
+    for name, label, colour in (("force_purity", "force", MAIN), ("response_purity", "drive point", SECOND)):
+        low, high = mode.interval(name)[order].T
+        axis.fill_between(mode.force_n[order], low, high, color=colour, alpha=0.2, lw=0)
+        axis.plot(mode.force_n[order], getattr(mode, name)[order], "o-", ms=4, color=colour, label=label)
+    axis.set(xlabel="force amplitude (fundamental), N", ylabel="purity", ylim=(0.0, 1.05))
+    axis.legend(fontsize=8)
 
 
 def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = MAIN) -> None:
@@ -38,17 +69,16 @@ def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: st
             amplitude,
             100 * mode.damping_ratio[order],
             196 * mode.damping_ratio_std[order],
-            label="active power of the fundamental" if mode.source == "backbone" else "one-mode fit",
+            label="one-mode fit" if mode.source == "stepped sine" else "active power of the fundamental",
             **error,
         )
         if np.isfinite(mode.damping_ratio_total_power).any():
-            right.plot(
+            right.errorbar(
                 amplitude,
                 100 * mode.damping_ratio_total_power[order],
-                "s--",
-                ms=3.5,
-                color=SECOND,
+                196 * mode.damping_ratio_total_power_std[order],
                 label="active power of all harmonics",
+                **{**error, "fmt": "s--", "ms": 3.5, "color": SECOND},
             )
         right.legend(fontsize=8)
     else:

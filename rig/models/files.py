@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
+from rig.exchange.measured_backbone import MEASURED_BACKBONE
 from rig.models.exciter import EXCITER
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.kind import Kind
@@ -15,7 +16,7 @@ from rig.recording.arrays import kind_of, read_arrays, write_arrays
 
 __all__ = ["KINDS", "load", "load_as", "save"]
 
-_ALL = (NONLINEAR_MODE, LINEAR_MODES, EXCITER, FREQUENCY_RESPONSES, RESPONSE_MATRIX, PREDICTIONS)
+_ALL = (NONLINEAR_MODE, LINEAR_MODES, EXCITER, FREQUENCY_RESPONSES, RESPONSE_MATRIX, MEASURED_BACKBONE, PREDICTIONS)
 KINDS = {kind.name: kind for kind in _ALL}
 """Every kind of file that is no recording, by its name in the file."""
 

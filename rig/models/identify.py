@@ -118,7 +118,7 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
     matrices.sort(key=lambda matrix: matrix.input_rms or (0.0,))
     found = [linear_modes(matrix, modes=request.count) for matrix in matrices]
     lowest = matrices[0]
-    modes = found[0] if len(found) == 1 else extrapolated_to_zero(found)
+    modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
     return ModalAnalysis(modes, lowest, stabilisation(lowest))
 
 

@@ -48,4 +48,5 @@ NONLINEAR_MODE = Kind(
     summarise=_summarise,
     say=_say,
     draw=draw_mode,
+    figure_in=(12.0, 6.4),
 )

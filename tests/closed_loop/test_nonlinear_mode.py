@@ -16,8 +16,11 @@ MODES = {"magnet-beam": 0, "magnet-beam-symmetric": 0, "friction-beam": 2}
 FILTERED = {"oversampling": 4, "anti_alias_hz": 1500.0, "anti_alias_order": 8, "substeps": 8}
 
 
-def measured(name: str, seed: int, plan: BackbonePlan | None = None, **options) -> Backbone:
-    with rig.run(plan or load_plan(f"{name}/backbone"), bench=bench_with(name=name, **options), seed=seed) as run:
+def measured(
+    name: str, seed: int, plan: BackbonePlan | None = None, changes: dict | None = None, **options
+) -> Backbone:
+    bench = bench_with(changes, name=name, **options)
+    with rig.run(plan or load_plan(f"{name}/backbone"), bench=bench, seed=seed) as run:
         return run.backbone()
 
 
@@ -48,13 +51,19 @@ def curve(truth: PeriodicResponses, name: str, mode: NonlinearMode) -> np.ndarra
     return PchipInterpolator(truth.amplitude_m, getattr(truth, name))(mode.amplitude_m)
 
 
+def beside(levels: np.ndarray | tuple[float, ...]) -> np.ndarray:
+    """Levels a little below and above the given ones: few slip elements leave kinks that a wider spacing cuts off."""
+    return np.sort(np.outer([0.995, 1.005], levels).ravel())
+
+
 @pytest.mark.parametrize("name", MODES)
 def test_both_specimens_have_the_modal_properties_of_harmonic_balance(name: str) -> None:
     virtual, plan = VirtualRig.shipped(name), load_plan(f"{name}/backbone")
-    coupled = phase_resonance_backbone(virtual, voltages_v=plan.levels)
-    pure = phase_resonance_backbone(
-        virtual, forces_n=np.geomspace(0.8 * coupled.force_n[0], 1.1 * coupled.force_n[-1], 40), excitation="pure-sine"
-    )
+    coupled = phase_resonance_backbone(virtual, voltages_v=beside(plan.levels))
+    forces = np.concatenate([np.geomspace(0.8, 1.1, 2) * coupled.force_n[[0, -1]], beside(coupled.force_n[::2])])
+    if name == "magnet-beam":  # its amplitudes belong to other forces
+        forces = np.geomspace(forces.min(), forces.max(), 30)
+    pure = phase_resonance_backbone(virtual, forces_n=np.sort(forces), excitation="pure-sine")
     backbone = measured(name, seed=21)
     mode = nonlinear_mode(backbone, modes=modal_model(virtual, backbone))
     np.testing.assert_allclose(mode.modal_frequency_hz, curve(coupled, "modal_frequency_hz", mode), rtol=1e-4)
@@ -83,21 +92,22 @@ def test_a_linear_rig_returns_its_own_damping(name: str) -> None:
     virtual = VirtualRig.shipped(name, **options)
     k = MODES[name]
     modes = virtual.linear_modes
-    levels = (0.4, 1.0, 2.0) if name == "magnet-beam" else (0.3, 0.6, 1.0)
+    levels = (1.0, 1.5, 2.0)
     plan = load_plan(f"{name}/backbone")
     centre = float(modes.frequency_hz[k])
     controller = plan.controller.model_copy(
         update={"centre_frequency_hz": centre, "frequency_window_hz": (0.9 * centre, 1.1 * centre)}
     )
-    plan = plan.model_copy(update={"levels_v": levels, "controller": controller})
-    backbone = measured(name, 4, plan, **options, converter=FILTERED)
+    plan = plan.model_copy(update={"levels_v": levels, "controller": controller, "record_periods": 200})
+    facts = {"specimen": {"linear_frequency_hz": centre}}
+    backbone = measured(name, 4, plan, facts, **options, converter=FILTERED)
     mode = nonlinear_mode(backbone, modes=modal_model(virtual, backbone))
     np.testing.assert_allclose(mode.damping_ratio, modes.damping_ratio[k], rtol=1e-3)
     np.testing.assert_allclose(mode.modal_frequency_hz, modes.frequency_hz[k], rtol=1e-5)
 
 
 def test_random_errors_are_those_of_runs_that_differ_by_noise_alone() -> None:
-    runs = [nonlinear_mode(measured("magnet-beam", seed)) for seed in range(1, 13)]
+    runs = [nonlinear_mode(measured("magnet-beam", seed)) for seed in range(1, 9)]
     for name in ("modal_frequency_hz", "damping_ratio", "damping_ratio_total_power", "force_n"):
         values = np.array([getattr(run, name) for run in runs])
         stated = np.sqrt(np.mean([run.random(name) ** 2 for run in runs], axis=0))
@@ -108,14 +118,18 @@ def test_random_errors_are_those_of_runs_that_differ_by_noise_alone() -> None:
 def test_the_truth_lies_in_the_interval_where_the_outputs_stairs_do_not_alias() -> None:
     virtual = VirtualRig.shipped("magnet-beam")
     levels = load_plan("magnet-beam/backbone").levels
-    wide = np.sort(np.concatenate([0.99 * np.array(levels), 1.01 * np.array(levels)]))
-    truth = phase_resonance_backbone(virtual, voltages_v=wide)
+    truth = phase_resonance_backbone(virtual, voltages_v=beside(levels))
+    speeds = 2j * np.pi * np.outer(truth.frequency_hz, np.arange(16)) * truth.drive_harmonics_m
+    powers = np.real(truth.force_harmonics_n * np.conj(speeds))
+    recorded = (
+        truth.damping_ratio_total_power * powers[:, 1:8].sum(axis=1) / powers[:, 1:].sum(axis=1)
+    )  # seven harmonics
     hits = []
-    for seed in range(1, 13):
+    for seed in range(1, 9):
         backbone = measured("magnet-beam", seed, converter=FILTERED)
-        mode = nonlinear_mode(backbone, modes=modal_model(virtual, backbone), seed=seed)
+        mode = nonlinear_mode(backbone, seed=seed)  # the drive point alone, as harmonic balance has its amplitude
         low, high = mode.interval("damping_ratio_total_power").T
-        exact = curve(truth, "damping_ratio_total_power", mode)
+        exact = PchipInterpolator(truth.amplitude_m, recorded)(mode.amplitude_m)
         hits.append((low <= exact) & (exact <= high))
     assert 0.88 <= np.mean(hits) <= 0.995
 

@@ -23,7 +23,7 @@ def run(rng: np.random.Generator, *, scatter: float = 0.0, noise: float = 1e-4, 
 def test_frequency_scatter_of_ten_runs_is_recovered_within_its_statistics() -> None:
     rng = np.random.default_rng(2)
     inside, sizes = [], []
-    for _ in range(60):
+    for _ in range(40):
         found = repeatability([nonlinear_mode(run(rng, scatter=5e-4), draws=100) for _ in range(10)])
         size, low, high = found.scatter("modal_frequency_hz")
         inside.append(low < 5e-4 < high)
@@ -47,7 +47,7 @@ def test_runs_that_differ_by_noise_alone_have_little_between_them() -> None:
 def test_the_combined_model_holds_what_a_further_run_does() -> None:
     rng = np.random.default_rng(8)
     inside = []
-    for _ in range(60):
+    for _ in range(30):
         model = combined([nonlinear_mode(run(rng, scatter=5e-4), draws=100) for _ in range(5)])
         low, high = model.interval("modal_frequency_hz").T
         further = nonlinear_mode(run(rng, scatter=5e-4), draws=100)

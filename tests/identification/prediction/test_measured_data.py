@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig.importing import read_frequency_responses
 
 from identification import FrequencyResponse, compare, frequency_response, recorded_force_response, stepped_sine_mode
+from rig.exchange.reading import read_frequency_responses
 
 EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "brake-reuss-mapping.toml"
 
