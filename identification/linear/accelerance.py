@@ -15,7 +15,7 @@ from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 
-__all__ = ["Weighting", "WeightedResponses", "weighted_accelerance", "weighted_responses"]
+__all__ = ["WeightedResponses", "Weighting", "weighted_accelerance", "weighted_responses"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
