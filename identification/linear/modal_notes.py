@@ -24,7 +24,7 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
         if apart < _CLOSE_BANDWIDTHS * 0.5 * (bandwidth[k] + bandwidth[k + 1]):
             notes.append(
                 f"modes at {frequency[k]:.5g} and {frequency[k + 1]:.5g} Hz are close: {apart:.3g} Hz apart with half-power "
-                f"bandwidths of {bandwidth[k]:.3g} and {bandwidth[k + 1]:.3g} Hz, MAC between their shapes {alike[k, k + 1]:.2f}"
+                f"bandwidths of {bandwidth[k]:.3g} and {bandwidth[k + 1]:.3g} Hz, MAC of their shapes {alike[k, k + 1]:.2f}"
             )
     for f, width in zip(frequency, bandwidth, strict=True):
         lines = np.count_nonzero(np.abs(data.frequency_hz - f) <= 0.5 * width)

@@ -5,9 +5,9 @@ The accelerance is, with ``s = i W``,
     H_o(s) = sum_k phi_ok phi_dk s^2 / (s^2 + 2 z_k w_k s + w_k^2) + L_o + U_o s^2 / (1 + s^2 / w_u^2),
 
 phi mass-normalised shapes at the channel o and at the drive point d, L_o what lower modes and rigid-body motion leave
-in the band (inertia), U_o what higher modes leave (stiffness, growing towards the
-nearest of them, at w_u; a plain stiffness where w_u is infinite). Complex residues ``rho_ok`` in place of ``phi_ok phi_dk`` turn
-a term into ``s^2 (a + b s) / (s^2 + 2 z w s + w^2)`` with ``rho = a + b p`` at the pole ``p = -z w + i w sqrt(1 - z^2)``.
+in the band (inertia), U_o what higher modes leave (stiffness, growing towards the nearest of them, at w_u; a plain
+stiffness where w_u is infinite). Complex residues ``rho_ok`` in place of ``phi_ok phi_dk`` turn a term into
+``s^2 (a + b s) / (s^2 + 2 z w s + w^2)`` with ``rho = a + b p`` at the pole ``p = -z w + i w sqrt(1 - z^2)``.
 """
 
 from collections.abc import Mapping
@@ -153,8 +153,9 @@ class LinearModes:
         modal = s**2 / (s**2 + 2.0 * self.damping_ratio * omega * s + omega**2)
         if without is not None:
             modal[:, without] = 0.0
+        modes: Complex
         if self.residues is None:
-            modes = modal @ (self.shapes * self.drive_shape).T
+            modes = modal @ (self.shapes * self.drive_shape).T.astype(np.complex128)
         else:
             slope = self.residues.imag / (omega * np.sqrt(1.0 - self.damping_ratio**2))
             constant = self.residues.real + slope * self.damping_ratio * omega

@@ -144,7 +144,7 @@ class _Problem:
 
     def fitted(self, poles: Float, state: _State, converged: bool) -> ModalFit:
         """The fit with the errors of its parameters."""
-        count, outputs = poles.size, self.value.shape[1]
+        outputs = self.value.shape[1]
         basis = modal_basis(self.s, poles, self.normal)
         unit = 1.0 / np.sqrt(np.diag(state.matrix))
         inverse = np.linalg.pinv(state.matrix * np.outer(unit, unit), rcond=1e-14, hermitian=True)

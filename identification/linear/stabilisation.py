@@ -137,7 +137,7 @@ def diagram(
     """`stabilisation` of weighted accelerances."""
     lines, outputs, inputs = data.value.shape
     most = 2 * lines * inputs // (outputs + inputs) - 2
-    tried = sorted(set(order for order in _ORDERS if order <= most) if orders is None else set(orders))
+    tried = sorted({order for order in _ORDERS if order <= most} if orders is None else set(orders))
     if not tried or tried[0] < 1:
         raise IdentificationError(f"orders: {tried or 'none'} for {lines} lines, needs numbers from 1 to {most}")
     middle = float(np.sqrt(np.abs(data.s[0]) * np.abs(data.s[-1])))
@@ -177,4 +177,4 @@ def _alike(
     frequency = np.abs(now[0][:, None] - before[0]) <= tolerances[0] * now[0][:, None]
     damping = frequency & (np.abs(now[1][:, None] - before[1]) <= tolerances[1] * np.abs(now[1][:, None]))
     shape = damping & (np.abs(now[2] @ np.conj(before[2].T)) ** 2 >= tolerances[2])
-    return frequency.any(axis=1), damping.any(axis=1), shape.any(axis=1)
+    return np.any(frequency, axis=1), np.any(damping, axis=1), np.any(shape, axis=1)

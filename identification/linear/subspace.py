@@ -82,7 +82,7 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
     response = np.einsum("kr,koi->roki", powers, data.value).reshape(block_rows * outputs, -1)
     excitation = np.einsum("kr,ji->rjki", powers, np.eye(inputs)).reshape(block_rows * inputs, -1)
     stacked = np.vstack([excitation, response])
-    triangle = np.linalg.qr(np.hstack([stacked.real, stacked.imag]).T, mode="r").T
+    triangle = np.asarray(np.linalg.qr(np.hstack([stacked.real, stacked.imag]).T, mode="r")).T
     left = block_rows * inputs
     remainder = triangle[left:, left:]
     if data.covariance is None:

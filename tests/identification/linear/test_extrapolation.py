@@ -49,7 +49,7 @@ def test_an_unknown_power_is_in_the_interval() -> None:
 def test_levels_that_cannot_be_told_apart_are_refused() -> None:
     with pytest.raises(IdentificationError, match=r"force_rms_n: levels are 1, 1.05 N"):
         extrapolated_to_zero(at_level(1.0, 1.0), at_level(1.05, 1.0))
-    with pytest.raises(IdentificationError, match="exponent: is 0.0"):
+    with pytest.raises(IdentificationError, match=r"exponent: is 0\.0"):
         extrapolated_to_zero(at_level(1.0, 1.0), at_level(2.0, 1.0), exponent=0.0)
 
 

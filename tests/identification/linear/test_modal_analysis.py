@@ -87,7 +87,7 @@ def test_close_modes_and_coarse_lines_are_named() -> None:
     assert any("Hz are close: " in note and "MAC" in note for note in notes)
     exact = accelerance(damping=np.array([0.0008, 0.008, 0.002]))
     notes = linear_modes(measured(6, 0.1, exact=exact), modes=list(FREQUENCY_HZ)).notes
-    assert any(note.startswith("mode at 20 Hz: half-power bandwidth") for note in notes)
+    assert any("Hz: half-power bandwidth" in note for note in notes)
 
 
 def test_what_a_modal_analysis_needs_is_asked_for() -> None:
