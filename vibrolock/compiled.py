@@ -27,7 +27,7 @@ R = TypeVar("R")
 Record: TypeAlias = Any
 """One record of a structured array inside a kernel; numba knows its fields, the type checker does not."""
 
-_PACKAGES = ("vibrolock", "controller", "simulators", "rig")
+_PACKAGES = ("vibrolock", "controller", "simulators", "identification", "rig")
 _COMPILED_FROM = (
     "kernels.py",
     "layout.py",
