@@ -93,7 +93,7 @@ def _sweep(**changes):
 
 
 def _late():
-    """Samples by which a row's phase is behind the beginning of the interval that it shows: half of the hold, and the filter."""
+    """Samples by which a row's phase is behind the start of the interval that it shows, from half the hold and the filter."""
     with make_daq(bench_with()) as daq:
         daq.start(1)
         return (1.0 + daq.latency_samples) % 1.0

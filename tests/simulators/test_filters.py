@@ -6,6 +6,7 @@ import pytest
 from pydantic import ValidationError
 from scipy import signal
 
+from simulators.analysis.frequency_responses import frequency_response
 from simulators.kernels import run_open_loop
 from simulators.layout import Flag, RigState
 from simulators.sensing.filters import dc_delay, lagrange_taps, low_pass_sections
@@ -109,6 +110,23 @@ def test_images_of_the_held_output_are_kept_out_of_slow_readings() -> None:
     assert errors["filtered"] < 0.1 * errors["bare"], errors
 
 
+@pytest.mark.parametrize(("specimen", "mode"), [("magnet-beam", 1), ("magnet-beam-symmetric", 1), ("friction-beam", 3)])
+def test_filters_of_the_shipped_rigs_keep_images_out_at_the_resonance_that_has_most_of_them(
+    specimen: str, mode: int
+) -> None:
+    converter = VirtualRig.shipped(specimen).converter
+    errors = {}
+    for name, filters in {"bare": {}, "shipped": {key: getattr(converter, key) for key in UNFILTERED}}.items():
+        rig = ideal(specimen, friction=(), elements=(), converter=filters)
+        frequency_hz = rig.linear_modes.frequency_hz[mode]
+        run = Simulation(rig).run(1e-3 * np.cos(2 * np.pi * frequency_hz / 5000.0 * np.arange(120_000)))
+        drive, force = (phasor(run.measured[channel], frequency_hz, 5000.0) for channel in ("drive", "force"))
+        accelerance = frequency_response(rig, [frequency_hz]).accelerance_per_kg["drive"][0]
+        errors[name] = abs(drive / force / accelerance - 1.0)
+    assert errors["bare"] > 0.15
+    assert errors["shipped"] < 0.015
+
+
 def test_clipping_happens_before_the_filter_and_is_flagged_between_samples_too() -> None:
     sensors = [ideal().sensors[0].model_dump() | {"range_v": 2.0}]
     run = Simulation(ideal(sensors=sensors, converter=FILTERED)).run(np.repeat([0.0, 5.0], 50))
@@ -180,7 +198,9 @@ def test_blocks_do_not_matter_with_every_filter_skew_and_noise() -> None:
 def test_oversampling_without_filters_changes_no_reading() -> None:
     voltages = np.sin(0.03 * np.arange(400))
     runs = [
-        Simulation(VirtualRig.shipped("magnet-beam", converter=UNFILTERED | {"substeps": 4, "oversampling": m})).run(voltages)
+        Simulation(VirtualRig.shipped("magnet-beam", converter=UNFILTERED | {"substeps": 4, "oversampling": m})).run(
+            voltages
+        )
         for m in (1, 4)
     ]
     assert np.array_equal(runs[0].force_n, runs[1].force_n)
