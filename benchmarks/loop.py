@@ -1,6 +1,7 @@
 """How fast the loop is, as ratios within one run: ``python -m benchmarks.loop [--json]``.
 
-Everything runs on one core at 5 kHz with the shipped backbones (reading B of the paper's controller). Each number is the
+Everything runs on one core at 5 kHz with the shipped backbones (reading B of the paper's controller): both shipped rigs, and
+for reference the magnet beam with two sub-steps and no filter, whose kernels do nothing but its physics. Each number is the
 median over interleaved rounds, so that what else the machine does falls on all of them alike; ``least`` is the quickest
 round, what the code costs on a machine that is left alone.
 """
@@ -33,6 +34,15 @@ ROUNDS = 9
 SAMPLES = 40_000
 BLOCKS = (1, 8, 64)
 DRIVE = {"magnet-beam": (0.5, 24.4), "friction-beam": (0.5, 149.0)}  # V and Hz of the open-loop measurements
+NO_FILTER = "magnet-beam, 2 sub-steps, no filter"
+
+
+def benches() -> dict[str, Bench]:
+    """What is measured, by its name in the results."""
+    shipped = {name: load_bench(name) for name in DRIVE}
+    table = shipped["magnet-beam"].model_dump()
+    table["driver"]["options"]["converter"] = {"substeps": 2, "oversampling": 1, "anti_alias_hz": 0.0}
+    return shipped | {NO_FILTER: Bench.model_validate(table)}
 
 
 def _started(bench: Bench, block: int = 1) -> tuple[VirtualDAQ, Tick]:
@@ -142,19 +152,26 @@ daq.run_fused(tick.arrays, *tick.buffers(1))
 """
 
 
-def measure(name: str) -> dict[str, float]:
-    """All numbers of one bench."""
-    bench = load_bench(name)
-    kinds = {"fused": fused(bench), "rig": virtual_rig(bench), "integrator": integrator(bench), "rk4": rk4(bench)}
-    kinds |= {f"exchange_{block}": exchanged(bench, block) for block in BLOCKS}
-    if name == "magnet-beam":
-        kinds["recorded"] = recorded(bench)
-    times: dict[str, list[float]] = {kind: [] for kind in kinds}
+def measure() -> dict[str, dict[str, float]]:
+    """All numbers of all benches."""
+    measured = {}
+    for name, bench in benches().items():
+        kinds = {"fused": fused(bench), "rig": virtual_rig(bench), "integrator": integrator(bench), "rk4": rk4(bench)}
+        kinds |= {f"exchange_{block}": exchanged(bench, block) for block in BLOCKS}
+        if bench.name == "magnet-beam":
+            kinds["recorded"] = recorded(bench)
+        measured[name] = kinds
+    times: dict[str, dict[str, list[float]]] = {name: {kind: [] for kind in measured[name]} for name in measured}
     for _ in range(ROUNDS):
-        for kind, once in kinds.items():
-            times[kind].append(once())
+        for name, kinds in measured.items():
+            for kind, once in kinds.items():
+                times[name][kind].append(once())
+    return {name: numbers(times[name], 1e6 / bench.sample_rate_hz) for name, bench in benches().items()}
+
+
+def numbers(times: dict[str, list[float]], period_us: float) -> dict[str, float]:
+    """What the times (us per sample) of one bench come to."""
     us = {kind: statistics.median(values) for kind, values in times.items()}
-    period_us = 1e6 / bench.sample_rate_hz
     out = {f"{kind}_us_per_sample": value for kind, value in us.items()}
     out |= {f"{kind}_least_us_per_sample": min(values) for kind, values in times.items()}
     out |= {
@@ -185,7 +202,7 @@ def starting() -> dict[str, float]:
 if __name__ == "__main__":
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    results = {name: measure(name) for name in DRIVE} | {"starting": starting()}
+    results = measure() | {"starting": starting()}
     if "--json" in sys.argv:
         print(json.dumps(results, indent=2))
     else:

@@ -13,6 +13,7 @@ from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS
 from rig.campaigns.sweep import SweepPlan
 from rig.console import RunProgress
+from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
 from rig.safety.layout import GuardMode
@@ -91,6 +92,13 @@ def _sweep(**changes):
     return SweepPlan.model_validate(table | changes)
 
 
+def _late():
+    """Samples by which a row's phase is behind the start of the interval that it shows, from half the hold and the filter."""
+    with make_daq(bench_with()) as daq:
+        daq.start(1)
+        return (1.0 + daq.latency_samples) % 1.0
+
+
 def _swept_phase(plan):
     with rig.run(plan, bench=bench_with(**QUIET)) as run:
         assert run.complete
@@ -105,12 +113,12 @@ def test_a_linear_sweep_has_the_phase_of_a_chirp(start_hz, stop_hz):
     assert t[-1] == pytest.approx(1.0, abs=2e-3)
     way = 5.0 if stop_hz > start_hz else -5.0
     before = int(np.argmax(rows["frequency_hz"] != np.float32(start_hz)))  # what was sent out before still shows first
-    t = t - (before + 0.5) / 5000.0  # a row has the phase of the middle of the interval before its instant
+    t = t - (before + _late()) / 5000.0  # a row has the phase that its instant's readings answer to
     lead = theta[before]
     np.testing.assert_allclose(
         theta[before:] - lead, 2.0 * np.pi * (start_hz * (t - t[before]) + 0.5 * way * t**2)[before:], atol=1e-4
     )
-    held = rows["theta_rad"] + np.pi * rows["frequency_hz"] / 5000.0  # the recorded phase is that of the hold's middle
+    held = rows["theta_rad"] + 2.0 * np.pi * _late() * rows["frequency_hz"] / 5000.0  # phase when it was put out
     np.testing.assert_allclose(rows["output_v"], 0.2 * np.cos(held.astype(float)), atol=1e-6)
 
 
@@ -156,8 +164,8 @@ def test_a_multisine_is_put_out_as_it_was_designed(multisine):
     design = MULTISINE.design(5000.0)
     for point in multisine.recording.points:
         rows = point_rows(multisine.recording, point["number"])
-        turns = rows["theta_rad"].astype(float) / (2.0 * np.pi)  # the recorded phase is that of the hold's middle
-        played = np.round(turns * design.period_samples + 0.5).astype(int)
+        turns = rows["theta_rad"].astype(float) / (2.0 * np.pi)  # the recorded phase is late, like the readings
+        played = np.round(turns * design.period_samples + _late()).astype(int)
         wanted = 0.05 * design.realisation(0, point["realisation"])[played % design.period_samples]
         np.testing.assert_allclose(rows["output_v"], wanted, atol=1e-6)
         assert point["voltage_rms_v"] == pytest.approx(0.05, rel=1e-4)

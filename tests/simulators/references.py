@@ -7,13 +7,16 @@ from scipy.integrate import DOP853
 
 from simulators.virtual_rig import VirtualRig
 
+UNFILTERED: dict[str, Any] = {"oversampling": 1, "anti_alias_hz": 0.0, "reconstruction_hz": 0.0}
+"""Changes to a converter that leave it without the filters of the shipped rigs."""
+
 
 def ideal(specimen: str = "magnet-beam", **changes: Any) -> VirtualRig:
-    """A specimen with nothing between physics and samples: no noise, no quantisation, no high-pass, no limits."""
+    """A specimen with nothing between physics and samples: no noise, no quantisation, no filter, no limits."""
     table = VirtualRig.shipped(specimen).model_dump()
     for sensor in table["sensors"]:
         sensor |= {"noise_rms": 0.0, "high_pass_hz": 0.0, "sensitivity_v_per_unit": 1.0, "range_v": 1e9}
-    table["converter"] |= {"adc_bits": 0, "dac_bits": 0, "adc_range_v": 1e9, "dac_range_v": 1e9}
+    table["converter"] |= {"adc_bits": 0, "dac_bits": 0, "adc_range_v": 1e9, "dac_range_v": 1e9} | UNFILTERED
     for key, value in changes.items():
         table[key] = table[key] | value if isinstance(value, dict) else value
     return VirtualRig.model_validate(table)

@@ -9,6 +9,7 @@ from rig.bench import Bench
 from rig.drivers import make_daq
 from rig.loop import Loop
 from tests.rig.rigs import bench_with, tick_for
+from tests.simulators.references import UNFILTERED
 
 SLOW_AND_FILTERED = {"oversampling": 10, "substeps": 20, "anti_alias_hz": 320.0}
 
@@ -16,7 +17,7 @@ SLOW_AND_FILTERED = {"oversampling": 10, "substeps": 20, "anti_alias_hz": 320.0}
 def slow_bench(**converter: Any) -> Bench:
     return bench_with(
         {"sample_rate_hz": 800.0, "limits": {"frequency_hz": (20.0, 30.0)}},
-        converter={"sample_rate_hz": 800.0} | converter,
+        converter=UNFILTERED | {"sample_rate_hz": 800.0} | converter,
     )
 
 
