@@ -92,7 +92,9 @@ def voltage_input(source: Transient | VoltageSweep, channel: str) -> SweepInput:
     time_s = _instants(0.0, source.duration_s, max(source.start_hz, source.stop_hz))
     way = np.sign(source.stop_hz - source.start_hz)
     frequency = source.start_hz + way * source.rate_hz_per_s * time_s
-    return SweepInput(time_s, frequency, np.full(time_s.size, source.level_v, np.complex128), 0, f"planned {source.name}")
+    return SweepInput(
+        time_s, frequency, np.full(time_s.size, source.level_v, np.complex128), 0, f"planned {source.name}"
+    )
 
 
 def force_input(source: Transient | HalfPeriods) -> SweepInput:

@@ -27,7 +27,9 @@ _SHOWN = {
 
 def _summarise(exciter: Exciter) -> dict[str, Any]:
     std = exciter.std
-    found = {name: (getattr(exciter, name), std[name]) for name in PARAMETERS} | {"damping_n_s_m": exciter.damping_n_s_m}
+    found = {name: (getattr(exciter, name), std[name]) for name in PARAMETERS} | {
+        "damping_n_s_m": exciter.damping_n_s_m
+    }
     return {
         "specimen": exciter.source,
         "band_hz": [exciter.lowest_hz, exciter.highest_hz],

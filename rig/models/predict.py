@@ -135,9 +135,7 @@ def _band(mode: NonlinearMode, force_n: float, request: PredictionRequest) -> Re
     """What the model's standard errors make of a response; None where they are unknown, or a draw leaves the range."""
     held = cast(HeldForce, request.held)
     try:
-        return response_band(
-            mode, force_n, force=held, draws=_DRAWS, allow_extrapolation=request.allow_extrapolation
-        )
+        return response_band(mode, force_n, force=held, draws=_DRAWS, allow_extrapolation=request.allow_extrapolation)
     except IdentificationError:
         return None
 

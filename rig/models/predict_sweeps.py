@@ -22,7 +22,6 @@ from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.sweep import SweepPlan
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
-from rig.models.identify import rig_name
 from rig.recording.reader import Recording
 
 __all__ = ["SweepModels", "Swept", "planned_sweeps", "recorded_sweeps"]
@@ -99,12 +98,15 @@ def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
 def _strangers(bench: Bench, models: SweepModels, source: str) -> tuple[str, ...]:
     """Models of another rig: an exciter may move on to another structure, but that only its user knows."""
     notes = []
-    if models.mode.specimen and models.mode.specimen != bench.specimen.name:
-        notes.append(f"the model is of {models.mode.specimen}, {source} of {bench.specimen.name}: not the same specimen")
-    if models.exciter is not None and models.exciter.source and models.exciter.source != rig_name(bench):
+    if models.mode.specimen not in ("", bench.specimen.name):
         notes.append(
-            f"the exciter model is of {models.exciter.source}, {source} of {rig_name(bench)}: right only if amplifier, "
-            "exciter and stinger are the same"
+            f"the model is of {models.mode.specimen}, {source} of {bench.specimen.name}: not the same specimen"
+        )
+    here = f"{bench.name}, {bench.specimen.name}"  # as the identification of an exciter calls it
+    if models.exciter is not None and models.exciter.source not in ("", here):
+        notes.append(
+            f"the exciter model is of {models.exciter.source}, {source} of {here}: right only if amplifier, exciter and "
+            "stinger are the same"
         )
     return tuple(notes)
 
