@@ -22,11 +22,9 @@ def draw_sweeps(area: Any, predictions: Predictions) -> None:
         _sweep(axes[index], predictions, index)
     for axis in axes[-1]:
         axis.set_xlabel("frequency, Hz")
-    handles, labels = [], []
-    for handle, label in zip(*axes[0, 0].get_legend_handles_labels(), strict=True):
-        handles, labels = [*handles, handle], [*labels, label]
     heading = None if count == shown else f"the first {shown} of {count} sweeps"
-    area.legend(handles, labels, loc="outside upper left", fontsize=7, ncols=3, title=heading, title_fontsize=7)
+    entries = axes[0, 0].get_legend_handles_labels()
+    area.legend(*entries, loc="outside upper left", fontsize=7, ncols=3, title=heading, title_fontsize=7)
 
 
 def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
@@ -46,8 +44,7 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
     axes[1].plot(sweep.frequency_hz, force, color=MAIN, lw=1.0)
     limit = scale * top / sweep.range_use
     axes[0].axhline(limit, color=SECOND, lw=0.7, ls="--", label="identified up to")
-    for axis, highest in ((axes[0], scale * top), (axes[1], float(force.max()))):
-        axis.set_ylim(0.0, 1.08 * highest)
+    axes[0].set_ylim(0.0, 1.08 * scale * top)
     axes[1].set_ylim(0.0, 1.08 * max(float(force.max()), 0.0 if recorded is None else np.abs(recorded.force).max()))
     axes[0].set(ylabel=f"displacement, {unit}")
     axes[1].set(ylabel="force, N")
