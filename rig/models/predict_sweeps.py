@@ -74,8 +74,9 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
         notes = _strangers(bench_of_recording(recording), models, str(path))
         recorded = sweeps(recording)
-        if not recording.complete:
-            notes += (f"{path}: is not complete; predicted are its {len(recorded)} accepted sweeps",)
+        rejected = {point["number"] for point in recording.points} - set(recorded)
+        if rejected or not recording.complete:
+            notes += (f"{path}: is not complete; sweeps accepted, and predicted: {len(recorded)}",)
         for number, sweep in recorded.items():
             name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
             predicted = models.predict(_half_periods(recording, number) if models.zero_crossings else sweep)

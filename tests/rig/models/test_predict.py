@@ -188,4 +188,4 @@ def test_of_an_incomplete_recording_what_was_accepted_is_predicted(at_shelf, she
         return
     summary = json.loads(done.out)
     assert len(summary["sweeps"]) == 1
-    assert "cut.h5: is not complete; predicted are its 1 accepted sweeps" in summary["notes"][0]
+    assert "cut.h5: is not complete; sweeps accepted, and predicted: 1" in summary["notes"][0]
