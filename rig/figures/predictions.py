@@ -17,6 +17,7 @@ __all__ = ["draw_predictions"]
 _BEYOND = 1.0
 _MOST_NAMED = 9
 _NEAR = 1.3
+_MARGIN = 0.15
 
 
 def draw_predictions(page: "Figure", predictions: Predictions) -> None:
@@ -54,6 +55,7 @@ def _steady_on(area: Any, predictions: Predictions) -> None:
     _explain(size, predictions)
     size.set(ylabel=f"displacement amplitude of the drive point, {unit}")
     size.set_ylim(bottom=0.0)
+    _show_references(size, predictions)
     area.legend(loc="outside upper left", fontsize=7, ncols=3)
     phase.set(xlabel="frequency, Hz", ylabel="phase lag of displacement, deg")
     phase.axhline(90.0, color=REJECTED, lw=0.8)
@@ -89,6 +91,15 @@ def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> 
     limit = scale * float(highest.amplitude_m()[where] / highest.range_use[where])
     if limit < _NEAR * top:
         size.axhline(limit, color=REJECTED, lw=0.8, ls="--", label="identified up to")
+
+
+def _show_references(size: "Axes", predictions: Predictions) -> None:
+    """Where every response has a reference, what is shown is their range and a little more."""
+    found = [reference.frequency_hz for reference in predictions.steady_references if reference is not None]
+    if len(found) == len(predictions.steady):
+        every = np.concatenate(found)
+        margin = _MARGIN * np.ptp(every)
+        size.set_xlim(every.min() - margin, every.max() + margin)
 
 
 def _explain(size: "Axes", predictions: Predictions) -> None:
