@@ -45,12 +45,11 @@ def draw_exciter(page: "Figure", exciter: Exciter) -> None:
         phase.set(xlabel="frequency, Hz", ylabel="phase, deg")
     damping, error = exciter.damping_n_s_m
     known = f"{damping:.5g}" if not np.isfinite(error) else f"{damping:.5g} +- {1.96 * error:.2g}"
-    title(
-        page,
-        f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\n"
-        f"mass {exciter.moving_mass_kg:.4g} kg, stiffness {exciter.suspension_stiffness_n_m:.4g} N/m, damping of suspension and "
-        f"back-EMF {known} N s/m",
+    facts = (
+        f"mass {exciter.moving_mass_kg:.4g} kg, stiffness {exciter.suspension_stiffness_n_m:.4g} N/m, "
+        f"damping of suspension and back-EMF {known} N s/m"
     )
+    title(page, f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\n{facts}")
 
 
 def _draws(exciter: Exciter) -> list[Exciter]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_predictions"]
 
 _BEYOND = 1.0
-_MOST_NAMED = 9
+_MOST_NAMED = 12
 _NEAR = 1.3
 _MARGIN = 0.15
 
