@@ -50,6 +50,10 @@ def predict(
     sweep: Annotated[
         list[Path] | None, typer.Option(help="Predict the sweeps of this recording; may be repeated.")
     ] = None,
+    planned_sweep: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."),
+    ] = None,
     exciter: Annotated[
         Path | None, typer.Option(help="Exciter model: sweeps are predicted from the voltage, not from the force.")
     ] = None,
@@ -61,6 +65,9 @@ def predict(
         list[Path] | None,
         typer.Option(help="Stepped sines to compare with (recorded or imported); may be repeated."),
     ] = None,
+    over: Annotated[
+        str, typer.Option(help="Compare at each frequency, or at each phase (tells all branches apart).")
+    ] = "frequency",
     allow_extrapolation: Annotated[
         bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
     ] = False,
@@ -77,10 +84,12 @@ def predict(
         forces_n=tuple(frequency_response or ()),
         held=force,
         sweeps=tuple(sweep or ()),
+        planned=tuple(planned_sweep or ()),
         exciter=exciter,
         zero_crossings=zero_crossings,
         modes=modes,
         references=tuple(reference or ()),
+        over=over,
         allow_extrapolation=allow_extrapolation,
     )
     save(predict_vibrations(model, request), output)

@@ -2,11 +2,12 @@
 
 With ``s = i W``, the voltage V at the amplifier's input, the displacements X_d of the drive point and X_a of the armature,
 
-    F = g_e V - Z X_a,    X_a = X_d + F / k_s,    g_e = g / (1 + s tau),    Z = s^2 m + s c + k + s b / (1 + s tau),
+    F = g_e V - Z X_a,    X_a = X_d + r_s F,    r_s = (1 / k_s) / (1 + s T),
+    g_e = g / (1 + s tau),    Z = s^2 m + s c + k + s b / (1 + s tau),
 
 g the force per volt of the blocked exciter at low frequency (amplifier gain times G / R), tau = L / R the coil's time
-constant, m moving mass, c and k suspension, b = G^2 / R what the back-EMF damps, 1 / k_s the stinger's compliance. A
-current amplifier is the case b = 0.
+constant, m moving mass, c and k suspension, b = G^2 / R what the back-EMF damps, 1 / k_s the stinger's compliance, T its
+damping over its stiffness. A current amplifier is the case b = 0.
 
 The voltage that a recording holds is a number given to a converter, and the inputs have filters of their own.
 `VoltagePath` says what becomes of it.
@@ -35,8 +36,9 @@ PARAMETERS = (
     "suspension_stiffness_n_m",
     "back_emf_damping_n_s_m",
     "stinger_compliance_m_n",
+    "stinger_damping_time_s",
 )
-"""The parameters g, tau, m, c, k, b, 1/k_s, in the order of `Exciter.covariance`."""
+"""The parameters g, tau, m, c, k, b, 1/k_s, T, in the order of `Exciter.covariance`."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +98,10 @@ class Exciter:
         b.
     stinger_compliance_m_n
         1 / k_s; zero for a rigid one.
+    stinger_damping_time_s
+        T; zero for one without damping.
     covariance
-        float[7, 7], of the parameters in the order of `PARAMETERS`; zero where a value was given, NaN if unknown.
+        float[8, 8], of the parameters in the order of `PARAMETERS`; zero where a value was given, NaN if unknown.
     lowest_hz, highest_hz
         Band that the parameters were found in.
     fit_residual
@@ -122,6 +126,7 @@ class Exciter:
     suspension_stiffness_n_m: float
     back_emf_damping_n_s_m: float
     stinger_compliance_m_n: float = 0.0
+    stinger_damping_time_s: float = 0.0
     covariance: Float | None = None
     lowest_hz: float = np.nan
     highest_hz: float = np.nan
@@ -146,7 +151,7 @@ class Exciter:
 
     @property
     def values(self) -> Float:
-        """float[7]: the parameters in the order of `PARAMETERS`."""
+        """float[8]: the parameters in the order of `PARAMETERS`."""
         return np.array([getattr(self, name) for name in PARAMETERS])
 
     @property
@@ -165,17 +170,28 @@ class Exciter:
         mechanical = (s * self.moving_mass_kg + self.suspension_damping_n_s_m) * s + self.suspension_stiffness_n_m
         return np.asarray(mechanical + s * back_emf)
 
+    def stinger_compliance(self, s: ArrayLike) -> Complex:
+        """complex, like ``s`` (rad/s): ``r_s``, m/N, what the stinger gives way."""
+        return np.asarray(self.stinger_compliance_m_n / (1.0 + np.asarray(s) * self.stinger_damping_time_s))
+
+    @property
+    def damping_n_s_m(self) -> tuple[float, float]:
+        """``c + b`` at low frequency and its standard error, N s/m: known well even where the two are not told apart."""
+        both = [PARAMETERS.index("suspension_damping_n_s_m"), PARAMETERS.index("back_emf_damping_n_s_m")]
+        variance = float(np.sum(np.asarray(self.covariance)[np.ix_(both, both)]))
+        return float(np.sum(self.values[both])), float(np.sqrt(max(variance, 0.0)))
+
     def force(self, voltage: ArrayLike, acceleration: ArrayLike, frequency_hz: ArrayLike) -> Complex:
         """complex: force (N) for amplitudes of recorded voltage (V) and drive-point acceleration (m/s^2); they broadcast.
 
-        ``(1 + Z / k_s) F = g_e V - Z A / s^2``; the voltage is passed through ``path``.
+        ``(1 + Z r_s) F = g_e V - Z A / s^2``; the voltage is passed through ``path``.
         """
         frequency = np.asarray(frequency_hz, dtype=np.float64)
         s = 2j * np.pi * frequency
         stiffness = self.dynamic_stiffness(s)
         driving = self.force_per_volt(s) * self.path.factor(frequency) * np.asarray(voltage)
         reaction = stiffness * np.asarray(acceleration) / s**2
-        return np.asarray((driving - reaction) / (1.0 + stiffness * self.stinger_compliance_m_n))
+        return np.asarray((driving - reaction) / (1.0 + stiffness * self.stinger_compliance(s)))
 
     def electrical(self, amplifier_gain: float) -> dict[str, float]:
         """Force factor, resistance and inductance for a known gain of a voltage amplifier (V/V).

@@ -152,8 +152,12 @@ def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
             f"identified ({largest:g} kg^1/2 m); {advice}"
         )
     notes = []
-    if opened is not None:
-        notes.append(f"a detached branch that the extrapolation has from q = {opened:g} on was left out")
+    invented = [path.lowest for path in paths if path.lowest > largest] + ([] if opened is None else [opened])
+    if invented:
+        notes.append(
+            f"detached branches that the extrapolation alone has, from q = {min(invented):g} on, were left out"
+        )
+        paths = [path for path in paths if path.lowest <= largest]
     if detached := sum(path.closed for path in paths):
         notes.append(f"{detached} detached branch{'es' if detached > 1 else ''}: reached by a large disturbance only")
     return paths, notes

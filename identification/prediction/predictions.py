@@ -12,6 +12,7 @@ from identification.packing import pack_all, unpack_all
 from identification.prediction.comparison import PredictionError
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.prediction.sweep_prediction import SweepPrediction
+from identification.prediction.uncertainty import ResponseBand
 from identification.signals.transients import Transient
 
 __all__ = ["Predictions"]
@@ -20,6 +21,7 @@ _PARTS: dict[str, type] = {
     "steady": SteadyPrediction,
     "steady_references": FrequencyResponse,
     "steady_errors": PredictionError,
+    "steady_bands": ResponseBand,
     "sweeps": SweepPrediction,
     "sweep_references": Transient,
     "sweep_errors": PredictionError,
@@ -34,6 +36,8 @@ class Predictions:
     ----------
     steady, steady_references, steady_errors
         Predicted frequency responses; for each the measured one and its errors.
+    steady_bands
+        Their uncertainty where it is known; empty for none at all.
     sweeps, sweep_references, sweep_errors
         Predicted sweeps; for each the recorded one and its errors.
     specimen
@@ -50,6 +54,7 @@ class Predictions:
     steady: tuple[SteadyPrediction, ...] = ()
     steady_references: tuple[FrequencyResponse | None, ...] = ()
     steady_errors: tuple[PredictionError | None, ...] = ()
+    steady_bands: tuple[ResponseBand | None, ...] = ()
     sweeps: tuple[SweepPrediction, ...] = ()
     sweep_references: tuple[Transient | None, ...] = ()
     sweep_errors: tuple[PredictionError | None, ...] = ()
@@ -57,6 +62,10 @@ class Predictions:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.steady_bands:
+            object.__setattr__(self, "steady_bands", (None,) * len(self.steady))
+        if len(self.steady_bands) != len(self.steady):
+            raise IdentificationError(f"steady: {len(self.steady)} predictions, {len(self.steady_bands)} bands")
         for kind, counts in (
             ("steady", (len(self.steady), len(self.steady_references), len(self.steady_errors))),
             ("sweeps", (len(self.sweeps), len(self.sweep_references), len(self.sweep_errors))),

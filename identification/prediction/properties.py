@@ -4,7 +4,8 @@ Inside, modal frequency w, damping ratio z and drive shape are monotone cubic (P
 that they invent no extrema between levels. Below the lowest level they are constant. Above the highest, ``w^2`` is
 linear in ``q^2`` (what an amplitude-dependent stiffness ``k0 + k2 q^2`` gives) and z is linear in q and never falls: a
 cubic continued would invent branches, a falling z would let a response grow without bound. Both slopes are those of a
-straight line through the last levels, for a difference of two levels is mostly noise.
+straight line through the levels above half the highest q, at least three: a difference of two levels is mostly noise,
+and with a fixed number it would depend on how densely the test was stepped.
 """
 
 from dataclasses import dataclass
@@ -24,7 +25,8 @@ Damping = Literal["fundamental", "total-power"]
 
 FLAGGED_BEYOND = 1.25
 REFUSED_BEYOND = 2.0
-_TAIL_LEVELS = 3
+_TAIL_FROM = 0.5
+_FEWEST_TAIL_LEVELS = 3
 _SAME_LEVEL = 0.02
 _LOWEST_OF_LAST = 0.01  # w^2 of a strongly softening mode ends at this share of its last value
 _DAMPING_FIELD = {"fundamental": "damping_ratio", "total-power": "damping_ratio_total_power"}
@@ -127,13 +129,14 @@ class ModalProperties:
             if np.any(values <= 0.0):
                 where = int(np.argmax(values <= 0.0))
                 raise IdentificationError(f"{name}: is {values[where]:g} at q = {q[where]:g}, must be above zero")
-        squared = _tail_slope(q**2, omega**2)
+        last = slice(min(int(np.searchsorted(q, _TAIL_FROM * q[-1])), max(q.size - _FEWEST_TAIL_LEVELS, 0)), None)
+        squared = _slope(q[last] ** 2, omega[last] ** 2)
         tail = (
             _LOWEST_OF_LAST * omega[-1] ** 2,
             omega[-1] ** 2,
             squared,
             z[-1],
-            max(_tail_slope(q, z), 0.0),
+            max(_slope(q[last], z[last]), 0.0),
             shape[-1],
         )
         return cls(
@@ -231,9 +234,8 @@ def _pchip(q: Float, values: Float) -> Float:
     return np.asarray(PchipInterpolator(q, values).c)
 
 
-def _tail_slope(x: Float, y: Float) -> float:
-    """Slope of the least-squares line through the last levels; 0 for a single level."""
-    x, y = x[-_TAIL_LEVELS:], y[-_TAIL_LEVELS:]
+def _slope(x: Float, y: Float) -> float:
+    """Slope of the least-squares line; 0 for a single level."""
     if x.size < 2:
         return 0.0
     x = x - x.mean()

@@ -75,6 +75,11 @@ class VoltageSweep:
             raise IdentificationError(f"stop_hz: is {self.stop_hz:g} Hz, must differ from start_hz")
 
     @property
+    def name(self) -> str:
+        """What it is, for tables."""
+        return f"{self.level_v:g} V, {self.start_hz:g} to {self.stop_hz:g} Hz, {self.rate_hz_per_s:g} Hz/s"
+
+    @property
     def duration_s(self) -> float:
         """How long the sweep takes, s."""
         return abs(self.stop_hz - self.start_hz) / self.rate_hz_per_s
@@ -87,7 +92,9 @@ def voltage_input(source: Transient | VoltageSweep, channel: str) -> SweepInput:
     time_s = _instants(0.0, source.duration_s, max(source.start_hz, source.stop_hz))
     way = np.sign(source.stop_hz - source.start_hz)
     frequency = source.start_hz + way * source.rate_hz_per_s * time_s
-    return SweepInput(time_s, frequency, np.full(time_s.size, source.level_v, np.complex128), 0, "designed voltage")
+    return SweepInput(
+        time_s, frequency, np.full(time_s.size, source.level_v, np.complex128), 0, f"planned {source.name}"
+    )
 
 
 def force_input(source: Transient | HalfPeriods) -> SweepInput:

@@ -14,7 +14,7 @@ from identification.prediction.properties import ModalProperties
 from identification.prediction.sweep_inputs import SweepInput
 from identification.signals.transients import Transient
 
-__all__ = ["SweepPrediction", "compare_sweep"]
+__all__ = ["SweepPrediction", "as_recorded", "compare_sweep"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -136,12 +136,11 @@ class SweepPrediction:
         return np.asarray(values)
 
 
-def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = "") -> PredictionError:
-    """Errors of a predicted sweep against the recorded one it belongs to, on the same time axis.
+def as_recorded(prediction: SweepPrediction, sweep: Transient) -> tuple[Float, Float, Float]:
+    """Amplitudes that can be held against each other: of a recorded sweep, and of its prediction as a recording shows it.
 
-    Compared is the fundamental of the drive channel, be it displacement, velocity or acceleration, over that power of the
-    momentary W that makes it a displacement. The prediction is smoothed like the recording, which lowers a fast
-    sweep's peak. Raises `IdentificationError` where they have no time in common, or the recording no drive channel.
+    Returns the drive point's displacement (m) as recorded, at the instants of ``sweep``, that predicted, and the force (N)
+    predicted, both at the instants of ``prediction``, smoothed like the recording. See `compare_sweep`.
     """
     row = find_role(sweep.channels, "drive")
     order = MOTION_ORDER[sweep.channels[row].motion]
@@ -150,6 +149,17 @@ def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = 
     measured = np.abs(sweep.fundamentals[row]) / (2.0 * np.pi * sweep.frequency_hz) ** order
     smoothed = np.abs(prediction.smoothed(motion, window))
     predicted = smoothed / (2.0 * np.pi * prediction.frequency_hz) ** order
+    return measured, predicted, np.abs(prediction.smoothed(prediction.force, window))
+
+
+def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = "") -> PredictionError:
+    """Errors of a predicted sweep against the recorded one it belongs to, on the same time axis.
+
+    Compared is the fundamental of the drive channel, be it displacement, velocity or acceleration, over that power of the
+    momentary W that makes it a displacement. The prediction is smoothed like the recording, which lowers a fast
+    sweep's peak. Raises `IdentificationError` where they have no time in common, or the recording no drive channel.
+    """
+    measured, predicted, _ = as_recorded(prediction, sweep)
     common = (sweep.time_s >= prediction.time_s[0]) & (sweep.time_s <= prediction.time_s[-1])
     if not common.any():
         raise IdentificationError(

@@ -136,7 +136,7 @@ def _coupled(
         tested = modes.nearest(float(properties.frequency_rad_s(properties.q_range[0])) / (2.0 * np.pi))
         others = modes.receptance(table_hz, without=tested)
     stiffness = exciter.dynamic_stiffness(s)
-    shared = 1.0 + stiffness * (others + exciter.stinger_compliance_m_n)
+    shared = 1.0 + stiffness * (others + exciter.stinger_compliance(s))
     per_volt = exciter.force_per_volt(s) * exciter.path.factor(table_hz) / shared
     columns = CubicSpline(table_hz, np.column_stack([per_volt, stiffness / shared, others]))
     by_s = 1.0 / (2j * np.pi)

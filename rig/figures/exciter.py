@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_exciter"]
 
 _DRAWS = 400
+_DECADES = 5.0
 
 
 def draw_exciter(page: "Figure", exciter: Exciter) -> None:
@@ -34,13 +35,21 @@ def draw_exciter(page: "Figure", exciter: Exciter) -> None:
         ),
     )
     for (size, phase), (name, unit, value, sampled) in zip(axes.T, columns, strict=True):
-        size.loglog(frequency, np.abs(value), color=MAIN)
+        size.semilogx(frequency, np.abs(value), color=MAIN)
+        if np.abs(value).max() > _DECADES * np.abs(value).min():
+            size.set_yscale("log")
         phase.semilogx(frequency, np.degrees(np.unwrap(np.angle(value))), color=MAIN)
         if sampled:
             size.fill_between(frequency, *np.quantile(np.abs(sampled), (0.025, 0.975), axis=0), color=MAIN, alpha=0.25)
         size.set(ylabel=f"{name}, {unit}")
         phase.set(xlabel="frequency, Hz", ylabel="phase, deg")
-    title(page, f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz")
+    damping, error = exciter.damping_n_s_m
+    known = f"{damping:.5g}" if not np.isfinite(error) else f"{damping:.5g} +- {1.96 * error:.2g}"
+    facts = (
+        f"mass {exciter.moving_mass_kg:.4g} kg, stiffness {exciter.suspension_stiffness_n_m:.4g} N/m, "
+        f"damping of suspension and back-EMF {known} N s/m"
+    )
+    title(page, f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\n{facts}")
 
 
 def _draws(exciter: Exciter) -> list[Exciter]:

@@ -19,19 +19,24 @@ _SHOWN = {
     "suspension_damping_n_s_m": ("damping of the suspension", "N s/m"),
     "suspension_stiffness_n_m": ("stiffness of the suspension", "N/m"),
     "back_emf_damping_n_s_m": ("damping by the back-EMF", "N s/m"),
+    "damping_n_s_m": ("damping by both", "N s/m"),
     "stinger_compliance_m_n": ("compliance of the stinger", "m/N"),
+    "stinger_damping_time_s": ("damping over stiffness of the stinger", "s"),
 }
 
 
 def _summarise(exciter: Exciter) -> dict[str, Any]:
     std = exciter.std
+    found = {name: (getattr(exciter, name), std[name]) for name in PARAMETERS} | {
+        "damping_n_s_m": exciter.damping_n_s_m
+    }
     return {
         "specimen": exciter.source,
         "band_hz": [exciter.lowest_hz, exciter.highest_hz],
         "fit_residual": exciter.fit_residual,
         "parameters": {
-            name: {"value": getattr(exciter, name), "std": std[name] if np.isfinite(std[name]) else None}
-            for name in PARAMETERS
+            name: {"value": value, "std": error if np.isfinite(error) else None}
+            for name, (value, error) in ((name, found[name]) for name in _SHOWN)
         },
         "notes": list(exciter.notes),
     }

@@ -8,36 +8,37 @@ from typing import cast, get_args
 from identification import (
     Exciter,
     FrequencyResponse,
-    HalfPeriods,
+    IdentificationError,
     LinearModes,
     NonlinearMode,
     PredictionError,
     Predictions,
+    ResponseBand,
     SteadyPrediction,
-    SweepPrediction,
-    Transient,
     compare,
-    compare_sweep,
     frequency_response,
-    predict_sweep,
     recorded_force_response,
-    zero_crossings,
+    response_band,
 )
+from identification.prediction.comparison import Over
 from identification.prediction.frequency_response import HeldForce
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import bench_of_recording, frequency_responses, point_rows, sweeps
+from rig.measurements import frequency_responses
 from rig.models.exciter import EXCITER
 from rig.models.files import load_as
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.identify import modes_in
 from rig.models.nonlinear_mode import NONLINEAR_MODE
+from rig.models.predict_sweeps import SweepModels, Swept, planned_sweeps, recorded_sweeps
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 __all__ = ["PredictionRequest", "predict_vibrations"]
 
 
-_Compared = tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]
+_Compared = tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None, ResponseBand | None]
+
+_DRAWS = 40
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,52 +51,77 @@ class PredictionRequest:
     """What of the force is constant: ``fundamental``, ``rms`` or ``pure-sine``."""
     sweeps: tuple[Path, ...] = ()
     """Recordings whose sweeps are predicted."""
+    planned: tuple[str, ...] = ()
+    """Plans of sweeps that are yet to be made, by name or file."""
     zero_crossings: bool = False
     """Whether an imposed force is read from its zero crossings, the founding paper's way, or demodulated."""
     exciter: Path | None = None
-    """Exciter model: sweeps are predicted from the recorded voltage, else from the recorded force."""
+    """Exciter model: sweeps are predicted from the voltage, else from the recorded force."""
     modes: Path | None = None
     """Linear model: the other modes take part, responses of the other sensors are predicted."""
     references: tuple[Path, ...] = ()
     """Stepped sines that are predicted at their own force and compared."""
+    over: str = "frequency"
+    """What they are compared over: ``frequency`` or ``phase``."""
     allow_extrapolation: bool = False
     """Whether to answer beyond twice the largest modal amplitude identified."""
 
     def __post_init__(self) -> None:
-        if not (self.forces_n or self.sweeps or self.references):
-            raise ConfigurationError("nothing to predict: give --frequency-response, --sweep or --reference")
-        if self.held not in get_args(HeldForce):
-            raise ConfigurationError(f"--force = {self.held!r}: allowed are {', '.join(get_args(HeldForce))}")
+        if not (self.forces_n or self.sweeps or self.planned or self.references):
+            raise ConfigurationError(
+                "nothing to predict: give --frequency-response, --sweep, --planned-sweep or --reference"
+            )
+        for name, value, allowed in (
+            ("--force", self.held, get_args(HeldForce)),
+            ("--over", self.over, get_args(Over)),
+        ):
+            if value not in allowed:
+                raise ConfigurationError(f"{name} = {value!r}: allowed are {', '.join(allowed)}")
         if self.exciter is not None and self.zero_crossings:
             raise ConfigurationError(
                 "--zero-crossings: are those of an imposed force; with --exciter the voltage is imposed"
             )
-        if self.exciter is not None and not self.sweeps:
-            raise ConfigurationError("--exciter: is for sweeps, and none is given; add --sweep, or leave it out")
+        if self.zero_crossings and not self.sweeps:
+            raise ConfigurationError("--zero-crossings: is for recorded sweeps; add --sweep, or leave it out")
+        if self.exciter is not None and not (self.sweeps or self.planned):
+            raise ConfigurationError(
+                "--exciter: is for sweeps, and none is given; add --sweep or --planned-sweep, or leave it out"
+            )
+        if self.exciter is None and self.planned:
+            raise ConfigurationError("--planned-sweep: gives a voltage, which needs an exciter; add --exciter")
 
 
 def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     """Predictions of a nonlinear-mode model, and their errors where there is something to compare with.
 
-    Raises `RecordingError` for files that hold something else, `identification.IdentificationError` where the model cannot
-    answer, in particular beyond twice the largest amplitude that it was identified with.
+    Raises `RecordingError` for files that hold something else, `ConfigurationError` for plans that cannot be predicted,
+    `identification.IdentificationError` where the model cannot answer, in particular beyond twice the largest amplitude
+    that it was identified with.
     """
     mode = cast(NonlinearMode, load_as(NONLINEAR_MODE, model))
     modes = None if request.modes is None else modes_in(request.modes)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
-    steady: list[_Compared] = [(_steady(mode, force, modes, request), None, None) for force in request.forces_n]
+    steady: list[_Compared] = [_alone(mode, force, modes, request) for force in request.forces_n]
     for path in request.references:
         steady += [_compared(mode, measured, modes, request) for measured in _stepped_sines(path)]
-    swept = [found for path in request.sweeps for found in _sweeps(path, mode, modes, exciter, request)]
+    models = SweepModels(mode, modes, exciter, request.zero_crossings, request.allow_extrapolation)
+    swept: list[Swept] = [found for path in request.sweeps for found in recorded_sweeps(path, models)]
+    swept += [found for plan in request.planned for found in planned_sweeps(plan, models)]
     return Predictions(
         steady=tuple(item[0] for item in steady),
         steady_references=tuple(item[1] for item in steady),
         steady_errors=tuple(item[2] for item in steady),
-        sweeps=tuple(item[0] for item in swept),
-        sweep_references=tuple(item[1] for item in swept),
-        sweep_errors=tuple(item[2] for item in swept),
+        steady_bands=tuple(item[3] for item in steady),
+        sweeps=tuple(item.prediction for item in swept),
+        sweep_references=tuple(item.recorded for item in swept),
+        sweep_errors=tuple(item.error for item in swept),
         specimen=mode.specimen,
+        notes=tuple(dict.fromkeys(note for item in swept for note in item.notes)),
     )
+
+
+def _alone(mode: NonlinearMode, force_n: float, modes: LinearModes | None, request: PredictionRequest) -> _Compared:
+    return _steady(mode, force_n, modes, request), None, None, _band(mode, force_n, request)
 
 
 def _steady(
@@ -105,17 +131,28 @@ def _steady(
     return frequency_response(mode, force_n, force=held, modes=modes, allow_extrapolation=request.allow_extrapolation)
 
 
+def _band(mode: NonlinearMode, force_n: float, request: PredictionRequest) -> ResponseBand | None:
+    """What the model's standard errors make of a response; None where they are unknown, or a draw leaves the range."""
+    held = cast(HeldForce, request.held)
+    try:
+        return response_band(mode, force_n, force=held, draws=_DRAWS, allow_extrapolation=request.allow_extrapolation)
+    except IdentificationError:
+        return None
+
+
 def _compared(
     mode: NonlinearMode, measured: FrequencyResponse, modes: LinearModes | None, request: PredictionRequest
 ) -> _Compared:
     """At constant force where the force was controlled, else at the force that each point had."""
     if measured.controlled == "force":
-        predicted = _steady(mode, measured.level, modes, replace(request, held="fundamental"))
+        wanted = replace(request, held="fundamental")
+        predicted, band = _steady(mode, measured.level, modes, wanted), _band(mode, measured.level, wanted)
     else:
-        predicted = recorded_force_response(
-            mode, measured, modes=modes, allow_extrapolation=request.allow_extrapolation
+        predicted, band = (
+            recorded_force_response(mode, measured, modes=modes, allow_extrapolation=request.allow_extrapolation),
+            None,
         )
-    return predicted, measured, compare(predicted, measured).error
+    return predicted, measured, compare(predicted, measured, over=cast(Over, request.over)).error, band
 
 
 def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
@@ -128,35 +165,3 @@ def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
         )
     with Recording(path) as recording:
         return frequency_responses(recording)
-
-
-def _sweeps(
-    path: Path, mode: NonlinearMode, modes: LinearModes | None, exciter: Exciter | None, request: PredictionRequest
-) -> list[tuple[SweepPrediction, Transient, PredictionError]]:
-    out = []
-    with Recording(path) as recording:
-        if recording.kind != "sweep":
-            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
-        recorded = sweeps(recording)
-        for number, sweep in recorded.items():
-            name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
-            given = _half_periods(recording, number) if request.zero_crossings else sweep
-            predicted = predict_sweep(
-                mode, given, exciter=exciter, modes=modes, allow_extrapolation=request.allow_extrapolation
-            )
-            out.append((predicted, _force_and_drive(sweep), compare_sweep(predicted, sweep, name=name)))
-    return out
-
-
-def _half_periods(recording: Recording, number: int) -> HalfPeriods:
-    """The force of a recorded sweep between its zero crossings."""
-    bench = bench_of_recording(recording)
-    column = next(index for index, channel in enumerate(bench.channels) if channel.role == "force")
-    force = point_rows(recording, number)["inputs"][:, column].astype(float)
-    return zero_crossings(force, sample_rate_hz=bench.sample_rate_hz)
-
-
-def _force_and_drive(sweep: Transient) -> Transient:
-    """What a comparison shows of a sweep."""
-    rows = [row for row, channel in enumerate(sweep.channels) if channel.role in ("force", "drive")]
-    return replace(sweep, channels=tuple(sweep.channels[row] for row in rows), fundamentals=sweep.fundamentals[rows])

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from identification import Predictions, SteadyPrediction, SweepPrediction
+from identification import FrequencyResponse, Predictions, ResponseBand, SteadyPrediction, SweepPrediction
 from rig.console import number, print_table
 from rig.figures.predictions import draw_predictions
 from rig.models.kind import Kind
@@ -12,14 +12,18 @@ from rig.models.kind import Kind
 __all__ = ["PREDICTIONS"]
 
 
-def _steady(response: SteadyPrediction) -> dict[str, Any]:
+def _steady(
+    response: SteadyPrediction, band: ResponseBand | None, reference: FrequencyResponse | None
+) -> dict[str, Any]:
     peak = response.peak()
     return {
-        "name": response.name,
+        "name": (reference.label if reference else "") or response.name,
         "force_n": response.force_n,
         "force": response.force,
         "peak_m": peak.amplitude_m,
         "peak_frequency_hz": peak.frequency_hz,
+        "peak_std_m": None if band is None else band.peak_amplitude_std_m,
+        "peak_frequency_std_hz": None if band is None else band.peak_frequency_std_hz,
         "peak_phase_lag_deg": peak.phase_lag_deg,
         "folds_hz": response.fold_frequency_hz.tolist(),
         "detached_branches": int(response.branch.max()),
@@ -42,10 +46,12 @@ def _sweep(sweep: SweepPrediction, name: str) -> dict[str, Any]:
 
 
 def _summarise(predictions: Predictions) -> dict[str, Any]:
-    names = [error.name if error else f"sweep {i}" for i, error in enumerate(predictions.sweep_errors)]
+    steady = zip(predictions.steady, predictions.steady_bands, predictions.steady_references, strict=True)
+    compared = zip(predictions.sweeps, predictions.sweep_errors, strict=True)
+    names = [error.name if error else sweep.origin for sweep, error in compared]
     return {
         "specimen": predictions.specimen,
-        "frequency_responses": [_steady(response) for response in predictions.steady],
+        "frequency_responses": [_steady(*each) for each in steady],
         "sweeps": [_sweep(sweep, name) for sweep, name in zip(predictions.sweeps, names, strict=True)],
         "errors": [error.row() for error in predictions.errors],
         "notes": list(predictions.notes),
@@ -54,14 +60,17 @@ def _summarise(predictions: Predictions) -> dict[str, Any]:
 
 def _say(summary: dict[str, Any]) -> None:
     if summary["frequency_responses"]:
-        print("frequency responses at constant force")
+        print("frequency responses; +- are 95 % by the model's own errors")
         print_table(
-            ("force", "peak mm", "at Hz", "lag deg", "folds at Hz", "range use"),
+            ("response", "force N", "peak mm", "+-", "at Hz", "+-", "lag deg", "folds at Hz", "range use"),
             [
                 (
                     r["name"],
+                    number(r["force_n"], ".4g"),
                     number(r["peak_m"], ".5f", 1e3),
+                    number(r["peak_std_m"], ".2g", 1.96e3),
                     number(r["peak_frequency_hz"], ".4f"),
+                    number(r["peak_frequency_std_hz"], ".2g", 1.96),
                     number(r["peak_phase_lag_deg"], ".1f"),
                     ", ".join(f"{fold:.4f}" for fold in r["folds_hz"]) or "none",
                     number(r["range_use"], ".2f"),
@@ -76,7 +85,7 @@ def _say(summary: dict[str, Any]) -> None:
             [
                 (
                     s["name"],
-                    s["origin"],
+                    s["origin"] if s["origin"] != s["name"] else "the plan",
                     number(s["peak_m"], ".5f", 1e3),
                     number(s["peak_frequency_hz"], ".3f"),
                     number(s["smallest_force_n"], ".4f"),
@@ -101,9 +110,12 @@ def _say(summary: dict[str, Any]) -> None:
                 for e in summary["errors"]
             ],
         )
+    shown = set()
     for part in (*summary["frequency_responses"], *summary["sweeps"]):
         for note in part["notes"]:
-            print(f"note: {part['name']}: {note}")
+            if note not in shown:
+                print(f"note: {part['name']}: {note}")
+            shown.add(note)
 
 
 PREDICTIONS = Kind(

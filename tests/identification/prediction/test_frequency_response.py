@@ -254,3 +254,13 @@ def test_rms_and_bands_need_what_they_are_made_of() -> None:
         response_band(replace(mode_with(Q), damping_ratio_std=np.full(Q.size, np.nan)), 0.5)
     with pytest.raises(IdentificationError, match="draws: is 5, needs at least 20"):
         response_band(mode_with(Q), 0.5, draws=5)
+
+
+def test_branches_that_only_a_softening_extrapolation_has_are_left_out() -> None:
+    """``w^2`` linear in ``q^2`` falls to its floor far beyond the levels: what closes there is no branch of the structure."""
+    q = np.linspace(1e-3, 12e-3, 12)
+    mode = mode_with(q, F0_HZ * np.sqrt(1.0 - 900.0 * q**2), ZETA)
+    found = frequency_response(mode, 0.5 * float(mode.force_n[-1]), allow_extrapolation=True)
+    assert set(found.branch) == {0}
+    assert found.range_use.max() < 1.0
+    assert any("extrapolation alone" in note for note in found.notes)

@@ -131,3 +131,13 @@ def test_what_cannot_be_used_is_named() -> None:
         ModalProperties.of(mode_with(Q), damping="all")  # type: ignore[arg-type]
     with pytest.raises(IdentificationError, match="each above the one before"):
         ModalProperties.from_levels([2.0, 1.0], [1.0, 1.0], [0.1, 0.1], 1.0)
+
+
+def test_the_continuation_does_not_depend_on_how_densely_the_test_was_stepped() -> None:
+    """A damping that turns flat: with a fixed number of levels a denser test would have a flatter continuation."""
+    slopes = []
+    for levels in (11, 101):
+        q = np.linspace(0.0, 1e-2, levels)[1:]
+        slopes.append(ModalProperties.from_levels(q, 150.0 - 400.0 * q, 0.01 * (1.0 - np.exp(-q / 5e-3)), 1.0).tail)
+    np.testing.assert_allclose(slopes[1][[2, 4]], slopes[0][[2, 4]], rtol=0.05)
+    assert slopes[0][4] > 0.0

@@ -1,0 +1,63 @@
+"""Figure of predicted sweeps: motion and force over the momentary frequency, as a recording shows them."""
+
+from typing import Any
+
+import numpy as np
+
+from identification import Predictions
+from identification.prediction.sweep_prediction import as_recorded
+from rig.figures.style import MAIN, REJECTED, SECOND, engineering
+
+__all__ = ["draw_sweeps"]
+
+_MOST_SWEEPS = 4
+
+
+def draw_sweeps(area: Any, predictions: Predictions) -> None:
+    """One row per sweep, motion and force; of many the first four."""
+    count = len(predictions.sweeps)
+    shown = min(count, _MOST_SWEEPS)
+    axes = area.subplots(shown, 2, squeeze=False)
+    for index in range(shown):
+        _sweep(axes[index], predictions, index)
+    for axis in axes[-1]:
+        axis.set_xlabel("frequency, Hz")
+    heading = None if count == shown else f"the first {shown} of {count} sweeps"
+    entries = axes[0, 0].get_legend_handles_labels()
+    area.legend(*entries, loc="outside upper left", fontsize=7, ncols=3, title=heading, title_fontsize=7)
+
+
+def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
+    """Amplitudes over the momentary frequency; smoothed like the recording, if there is one."""
+    sweep, recorded = predictions.sweeps[index], predictions.sweep_references[index]
+    amplitude, force = np.abs(sweep.drive_m), np.abs(sweep.force)
+    top = float(amplitude.max())
+    if recorded is not None:
+        measured, amplitude, force = as_recorded(sweep, recorded)
+        top = max(float(amplitude.max()), float(measured.max()))
+    unit = engineering(np.array([top]))[1]
+    scale = {"mm": 1e3, "µm": 1e6}[unit]
+    if recorded is not None:
+        axes[0].plot(recorded.frequency_hz, scale * measured, color=REJECTED, lw=2.4, label="recorded")
+        axes[1].plot(recorded.frequency_hz, np.abs(recorded.force), color=REJECTED, lw=2.4)
+    axes[0].plot(sweep.frequency_hz, scale * amplitude, color=MAIN, lw=1.0, label=_origin(sweep.origin))
+    axes[1].plot(sweep.frequency_hz, force, color=MAIN, lw=1.0)
+    limit = scale * top / sweep.range_use
+    axes[0].axhline(limit, color=SECOND, lw=0.7, ls="--", label="identified up to")
+    axes[0].set_ylim(0.0, 1.08 * scale * top)
+    axes[1].set_ylim(0.0, 1.08 * max(float(force.max()), 0.0 if recorded is None else np.abs(recorded.force).max()))
+    axes[0].set(ylabel=f"displacement, {unit}")
+    axes[1].set(ylabel="force, N")
+    axes[0].set_title(_heading(predictions, index), fontsize=8, loc="left")
+
+
+def _origin(origin: str) -> str:
+    return "predicted from the plan" if origin.startswith("planned") else f"predicted from {origin}"
+
+
+def _heading(predictions: Predictions, index: int) -> str:
+    """Name of the sweep, its error or how much of the identified range it uses."""
+    sweep, error = predictions.sweeps[index], predictions.sweep_errors[index]
+    if error is not None:
+        return f"{error.name}: peak {100 * error.peak_error:+.2f} %, range use {error.range_use:.2f}"
+    return f"{sweep.origin.removeprefix('planned ')}, range use {sweep.range_use:.2f}"

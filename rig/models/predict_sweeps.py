@@ -1,0 +1,128 @@
+"""Sweeps, recorded ones and planned ones, as a nonlinear-mode model predicts them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from identification import (
+    Exciter,
+    HalfPeriods,
+    LinearModes,
+    NonlinearMode,
+    PredictionError,
+    SweepPrediction,
+    Transient,
+    VoltageSweep,
+    compare_sweep,
+    predict_sweep,
+    zero_crossings,
+)
+from rig.bench import Bench
+from rig.campaigns.plans import bench_of, load_plan
+from rig.campaigns.sweep import SweepPlan
+from rig.errors import ConfigurationError, RecordingError
+from rig.measurements import bench_of_recording, point_rows, sweeps
+from rig.recording.reader import Recording
+
+__all__ = ["SweepModels", "Swept", "planned_sweeps", "recorded_sweeps"]
+
+
+@dataclass(frozen=True)
+class SweepModels:
+    """What sweeps are predicted with."""
+
+    mode: NonlinearMode
+    """The nonlinear mode."""
+    modes: LinearModes | None
+    """The other modes."""
+    exciter: Exciter | None
+    """Exciter; without it the recorded force is imposed."""
+    zero_crossings: bool
+    """Whether that force is read from its zero crossings."""
+    allow_extrapolation: bool
+    """Whether to answer beyond twice the largest modal amplitude identified."""
+
+    def predict(self, given: Transient | HalfPeriods | VoltageSweep) -> SweepPrediction:
+        """`identification.predict_sweep` with these."""
+        return predict_sweep(
+            self.mode,
+            given,
+            exciter=self.exciter,
+            modes=self.modes,
+            allow_extrapolation=self.allow_extrapolation,
+        )
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A predicted sweep, the recorded one if there is one, and what a user should know about the two."""
+
+    prediction: SweepPrediction
+    """The prediction."""
+    recorded: Transient | None
+    """Force and drive point as recorded."""
+    error: PredictionError | None
+    """How far apart they are."""
+    notes: tuple[str, ...]
+    """Models that may not belong to the rig."""
+
+
+def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
+    """Every sweep of a recording; `RecordingError` where it holds something else."""
+    with Recording(path) as recording:
+        if recording.kind != "sweep":
+            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
+        notes = _strangers(bench_of_recording(recording), models, str(path))
+        recorded = sweeps(recording)
+        rejected = {point["number"] for point in recording.points} - set(recorded)
+        if rejected or not recording.complete:
+            notes += (f"{path}: is not complete; sweeps accepted, and predicted: {len(recorded)}",)
+        for number, sweep in recorded.items():
+            name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
+            predicted = models.predict(_half_periods(recording, number) if models.zero_crossings else sweep)
+            yield Swept(predicted, _force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), notes)
+
+
+def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
+    """Every level of a plan's sweep; `ConfigurationError` where it is no sweep, or not linear in time."""
+    plan = load_plan(plan_source)
+    if not isinstance(plan, SweepPlan):
+        raise ConfigurationError(f"{plan_source}: is a plan of kind {plan.kind}, wanted is a sweep")
+    if plan.rate_hz_per_s is None:
+        raise ConfigurationError(
+            f"{plan_source}: rate_octaves_per_min: a logarithmic sweep cannot be predicted; give rate_hz_per_s"
+        )
+    notes = _strangers(bench_of(plan, plan_source), models, plan_source)
+    for level_v in plan.levels_v:
+        predicted = models.predict(VoltageSweep(plan.start_hz, plan.stop_hz, plan.rate_hz_per_s, level_v))
+        yield Swept(predicted, None, None, notes)
+
+
+def _strangers(bench: Bench, models: SweepModels, source: str) -> tuple[str, ...]:
+    """Models of another rig: an exciter may move on to another structure, but that only its user knows."""
+    notes = []
+    if models.mode.specimen not in ("", bench.specimen.name):
+        notes.append(
+            f"the model is of {models.mode.specimen}, {source} of {bench.specimen.name}: not the same specimen"
+        )
+    here = f"{bench.name}, {bench.specimen.name}"  # as the identification of an exciter calls it
+    if models.exciter is not None and models.exciter.source not in ("", here):
+        notes.append(
+            f"the exciter model is of {models.exciter.source}, {source} of {here}: right only if amplifier, exciter and "
+            "stinger are the same"
+        )
+    return tuple(notes)
+
+
+def _half_periods(recording: Recording, number: int) -> HalfPeriods:
+    """The force of a recorded sweep between its zero crossings."""
+    bench = bench_of_recording(recording)
+    column = next(index for index, channel in enumerate(bench.channels) if channel.role == "force")
+    force = point_rows(recording, number)["inputs"][:, column].astype(float)
+    return zero_crossings(force, sample_rate_hz=bench.sample_rate_hz)
+
+
+def _force_and_drive(sweep: Transient) -> Transient:
+    """What a comparison shows of a sweep."""
+    rows = [row for row, channel in enumerate(sweep.channels) if channel.role in ("force", "drive")]
+    return replace(sweep, channels=tuple(sweep.channels[row] for row in rows), fundamentals=sweep.fundamentals[rows])

@@ -1,0 +1,59 @@
+"""``rig identify`` for exciters: its numbers against the rig's own, and one line for every mistake."""
+
+import json
+
+import pytest
+
+from identification.prediction.exciter import PARAMETERS
+from simulators.virtual_rig import VirtualRig
+
+
+def test_an_exciter_is_that_of_the_rig_within_its_errors(command, shelf):
+    done = command(f"show {shelf}/EX.h5 --json")
+    summary = json.loads(done.out)
+    assert (summary["kind"], summary["specimen"]) == ("exciter", "magnet-beam, magnet beam (one-sided)")
+    assert summary["band_hz"] == [8.0, 200.0]
+    found = summary["parameters"]
+    assert set(found) == {*PARAMETERS, "damping_n_s_m"}
+    own = VirtualRig.shipped("magnet-beam").exciter
+    gain = own.amplifier_gain * own.force_factor_n_a / own.resistance_ohm
+    damping = own.suspension_damping_n_s_m + own.force_factor_n_a**2 / own.resistance_ohm
+    for name, value, within in (
+        ("force_per_volt_n_v", gain, 2e-4),
+        ("moving_mass_kg", own.armature_mass_kg, 5e-3),
+        ("suspension_stiffness_n_m", own.suspension_stiffness_n_m, 1e-3),
+        ("damping_n_s_m", damping, 5e-4),
+    ):
+        assert found[name]["value"] == pytest.approx(value, rel=within)
+        assert abs(found[name]["value"] - value) < 4.0 * found[name]["std"]
+    assert found["damping_n_s_m"]["std"] < 0.01 * found["suspension_damping_n_s_m"]["std"]
+
+
+def test_an_exciter_is_shown_with_units_and_drawn(command, shelf, tmp_path):
+    shown = command(f"show {shelf}/EX.h5")
+    assert shown.status == 0
+    for text in ("damping by both", "N s/m", "moving mass", "trust their sum"):
+        assert text in shown.out
+    assert command(f"plot {shelf}/EX.h5 -o EX.png").status == 0
+    assert (tmp_path / "EX.png").stat().st_size > 20_000
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("exciter.h5 modal.h5 --model exciter", "2 files given, allowed is one multisine recording"),
+        ("backbone.h5 --model exciter", "holds a backbone; an exciter model comes from a multisine"),
+        ("exciter.h5 --model exciter --modes LIN.h5", "--modes: means nothing to --model exciter, which takes --band"),
+        ("exciter.h5 --model exciter --band 100 50", "--band = 100 50"),
+        ("exciter.h5 --model exciter --band 20 22", "9 excited lines in 20 to 22 Hz, needs at least 20"),
+        ("exciter.h5 --model shaker", "--model = 'shaker'"),
+        ("nothing.h5 --model exciter", "nothing.h5"),
+    ],
+)
+def test_every_mistake_is_named_in_one_line_and_leaves_no_file(command, shelf, monkeypatch, line, said):
+    monkeypatch.chdir(shelf)
+    done = command(f"identify {line} -o wrong.h5")
+    assert done.status != 0
+    assert said in done.err
+    assert len(done.err.strip().splitlines()) == 1
+    assert not (shelf / "wrong.h5").exists()
