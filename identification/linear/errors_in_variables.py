@@ -24,7 +24,7 @@ from identification.channels import find_role
 from identification.linear.accelerance import WeightedResponses, Weighting, known_covariance, motion_factors, pooled
 from identification.linear.response_matrix import FrequencyResponseMatrix
 
-__all__ = ["DrivenResponses", "driven_responses", "over_force"]
+__all__ = ["DrivenResponses", "driven_responses", "is_driven", "over_force"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -74,7 +74,7 @@ class DrivenResponses:
         return self._weighted(local, motion / self._not_zero(force), force)
 
     def around(self, model: Complex) -> WeightedResponses:
-        """What a weighted fit to has the maximum-likelihood solution where it returns ``model``, complex[n_lines, n_outputs]."""
+        """Responses to which a weighted fit returns ``model``, complex[n_lines, n_outputs], where that is most likely."""
         misfit = self.value[:, 1:] - model * self.value[:, :1]
         smooth = self._misfit(model, self.smooth)
         cross = self.smooth[:, 0, :1] * np.conj(model) - self.smooth[:, 0, 1:]
@@ -104,6 +104,11 @@ class DrivenResponses:
     def _not_zero(self, force: Complex) -> Complex:
         least = _SMALLEST * np.sqrt(np.mean(np.abs(self.value[:, 0]) ** 2))
         return np.asarray(np.where(np.abs(force) < least, least, force))
+
+
+def is_driven(responses: FrequencyResponseMatrix) -> bool:
+    """Whether the force is among the outputs, over one input that drives it."""
+    return len(responses.inputs) == 1 and any(channel.role == "force" for channel in responses.outputs)
 
 
 def driven_responses(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> DrivenResponses | None:
