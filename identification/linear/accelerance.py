@@ -15,7 +15,15 @@ from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 
-__all__ = ["WeightedResponses", "Weighting", "weighted_accelerance", "weighted_responses"]
+__all__ = [
+    "WeightedResponses",
+    "Weighting",
+    "known_covariance",
+    "motion_factors",
+    "pooled",
+    "weighted_accelerance",
+    "weighted_responses",
+]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -25,6 +33,11 @@ _NEIGHBOURS = 4
 """Lines on either side that a weight is the mean of: with five realisations 32 degrees of freedom, a quarter more scatter."""
 _FLOOR = 1e-9
 """Least eigenvalue of a covariance, relative to its largest: keeps an all but exact line from outweighing all others."""
+
+_TIMES_OVER = 4
+"""Samples per direction of a covariance that weights need at least."""
+_ROUNDING = 1e-13
+"""Standard deviation, relative to the response, below which a covariance is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,36 +86,53 @@ def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting 
 
     Raises `IdentificationError` where the covariance asked for is not known or the responses are zero.
     """
+    covariance, kind = known_covariance(responses, weighting)
+    count = responses.value[0].size
+    modulus = np.abs(responses.value).reshape(-1, count)
+    if not np.all(np.max(modulus, axis=0) > 0.0):
+        raise IdentificationError("value: a response is zero at all lines")
+    if covariance is None:
+        variance = np.maximum(modulus, 1e-3 * np.max(modulus, axis=0)) ** 2
+        smooth = variance[:, :, None] * np.eye(count, dtype=np.complex128)
+    else:
+        smooth = pooled(covariance)
+    return WeightedResponses(responses.frequency_hz, responses.value, covariance, smooth, kind)
+
+
+def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -> tuple[Complex | None, str]:
+    """The covariance asked for and its kind; None and ``relative`` where there is none, or none but rounding.
+
+    Raises `IdentificationError` where the covariance asked for is not known.
+    """
     known = {"total": responses.total_covariance, "noise": responses.noise_covariance}
     if weighting not in ("auto", "relative", *known):
         raise IdentificationError(f"weighting: is '{weighting}', allowed are auto, total, noise, relative")
     if known.get(weighting, 0) is None:
         raise IdentificationError(f"weighting: is '{weighting}', but the responses have no {weighting}_covariance")
-    kinds = [kind for kind, value in known.items() if value is not None] if weighting == "auto" else [weighting]
-    kind = kinds[0] if kinds else "relative"
-    covariance = known.get(kind)
-    count = responses.value[0].size
-    modulus = np.abs(responses.value).reshape(-1, count)
-    if not np.all(np.max(modulus, axis=0) > 0.0):
-        raise IdentificationError("value: a response is zero at all lines")
-    if covariance is None or not np.any(covariance):
-        covariance, kind = None, "relative"
-        variance = np.maximum(modulus, 1e-3 * np.max(modulus, axis=0)) ** 2
-        smooth = variance[:, :, None] * np.eye(count, dtype=np.complex128)
-    else:
-        smooth = _neighbours(covariance)
-    return WeightedResponses(responses.frequency_hz, responses.value, covariance, smooth, kind)
+    size = np.abs(responses.value).reshape(responses.value.shape[0], -1)
+    for kind in ("total", "noise") if weighting == "auto" else (weighting,):
+        covariance = known.get(kind)
+        if covariance is not None:
+            deviation = np.sqrt(np.maximum(np.einsum("kii->ki", covariance).real, 0.0))
+            if np.all(np.median(deviation, axis=0) > _ROUNDING * np.median(size, axis=0)):
+                return covariance, kind
+    return None, "relative"
 
 
-def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
-    """The same, every output turned into an acceleration (m/s2); raises where an output is no motion or at 0 Hz."""
+def motion_factors(responses: FrequencyResponseMatrix) -> Complex:
+    """complex[n_lines, n_outputs]: what makes accelerations of motions; 1 for a force. Raises at 0 Hz."""
     if responses.frequency_hz[0] == 0.0:
         raise IdentificationError(
             "frequency_hz: begins at 0 Hz, where no motion is an acceleration; select a band above"
         )
+    order = [0 if channel.role == "force" else 2 - MOTION_ORDER[channel.motion] for channel in responses.outputs]
+    return np.asarray((2j * np.pi * responses.frequency_hz[:, None]) ** np.array(order))
+
+
+def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
+    """The same, every output turned into an acceleration (m/s2); raises where an output is no motion or at 0 Hz."""
     plain = weighted_responses(responses, weighting)
-    order = np.array([2 - MOTION_ORDER[channel.motion] for channel in responses.outputs])
-    factor = plain.s[:, None] ** np.repeat(order, len(responses.inputs))
+    factor = np.repeat(motion_factors(responses), len(responses.inputs), axis=1)
 
     def scaled(covariance: Complex) -> Complex:
         return np.asarray(factor[:, :, None] * covariance * np.conj(factor[:, None, :]))
@@ -116,10 +146,14 @@ def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weightin
     )
 
 
-def _neighbours(covariance: Complex) -> Complex:
-    """Mean over the neighbours of each line, its own left out; floored so that it can be inverted."""
+def pooled(covariance: Complex) -> Complex:
+    """Mean over the neighbours of each line, its own left out; floored so that it can be inverted.
+
+    As many lines are taken as it needs to tell all directions several times over: a sample covariance of few realisations
+    is of low rank.
+    """
     lines, count = covariance.shape[:2]
-    reach = min(_NEIGHBOURS, lines - 1)
+    reach = min(max(_NEIGHBOURS, -(-_TIMES_OVER * count // (2 * _rank(covariance)))), lines - 1)
     number = np.arange(lines)
     first, last = np.maximum(number - reach, 0), np.minimum(number + reach, lines - 1)
     running = np.concatenate([np.zeros((1, count, count)), np.cumsum(covariance, axis=0)])
@@ -129,3 +163,11 @@ def _neighbours(covariance: Complex) -> Complex:
     largest = np.einsum("kii->ki", smooth).real
     floor = _FLOOR * np.maximum(largest, np.max(largest, axis=0) * 1e-12 + 1e-300)
     return np.asarray(0.5 * (smooth + np.conj(np.swapaxes(smooth, 1, 2))) + floor[:, :, None] * np.eye(count))
+
+
+def _rank(covariance: Complex) -> int:
+    """Directions that the covariance of a single line tells, at most a few lines looked at."""
+    some = covariance[:: max(1, covariance.shape[0] // 16)]
+    unit = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", some).real, 1e-300))
+    values = np.linalg.eigvalsh(some * unit[:, :, None] * unit[:, None, :])
+    return max(1, int(np.median(np.count_nonzero(values > 1e-9, axis=1))))

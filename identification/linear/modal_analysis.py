@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
+from identification.linear.errors_in_variables import DrivenResponses, driven_responses, is_driven, over_force
 from identification.linear.modal_notes import modal_notes
 from identification.linear.modal_parameters import accepted, as_linear_modes
 from identification.linear.modes import LinearModes
-from identification.linear.rational_fractions import ModalFit, fit_modes
+from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.linear.stabilisation import StabilisationDiagram, diagram
+from identification.linear.stabilisation import StabilisationDiagram
+from identification.linear.stabilisation import diagram as stability
 from identification.validation import finite_array
 
 __all__ = ["linear_modes"]
@@ -23,6 +25,9 @@ Float = NDArray[np.float64]
 
 _NEAR = 0.05
 """A starting frequency takes the nearest pole of the diagram within this part of it."""
+_ROUNDS = 20
+_AT_REST_STD = 0.01
+"""Part of its standard error by which no pole moves any more."""
 _START_DAMPING = 0.005
 """Damping ratio to start with where the diagram has no pole near."""
 
@@ -30,12 +35,13 @@ _START_DAMPING = 0.005
 def linear_modes(
     responses: FrequencyResponseMatrix,
     *,
-    modes: int | Sequence[float] | None = None,
+    modes: int | Sequence[float] | LinearModes | None = None,
     lowest_hz: float | None = None,
     highest_hz: float | None = None,
     complex_residues: bool = False,
     weighting: Weighting = "auto",
     orders: Sequence[int] | None = None,
+    diagram: StabilisationDiagram | None = None,
 ) -> LinearModes:
     """Linear modes from the frequency responses of all motions to the one drive force.
 
@@ -45,10 +51,12 @@ def linear_modes(
     Parameters
     ----------
     responses
-        Motions over the force, one of them of role ``drive``; best by the voltage as instrument.
+        Motions over the force, one of them of role ``drive``, best by the voltage as instrument; or better still force and
+        motions over the voltage (``best_linear_approximation(..., inputs=("voltage",), outputs=("force", ...))``), whose
+        noise counts rightly even where it is above the force (`errors_in_variables`).
     modes
         None: what the stabilisation diagram shows, without what turns out not to be a mode. A number: the most prominent
-        that many. Frequencies (Hz): a mode near each.
+        that many. Frequencies (Hz): a mode near each. Modes of another level: the fit starts from them.
     lowest_hz, highest_hz
         Band of the fit; all lines if None.
     complex_residues
@@ -59,6 +67,8 @@ def linear_modes(
         the first of these that is known (``auto``).
     orders
         Orders of the stabilisation diagram.
+    diagram
+        The stabilisation diagram of these responses, if it is known already.
 
     Raises
     ------
@@ -66,20 +76,53 @@ def linear_modes(
         Without exactly one drive channel and one force, with too few lines, or where no mode is found.
     """
     find_role(responses.outputs, "drive")
-    if len(responses.inputs) != 1 or responses.inputs[0].role != "force":
+    driven = is_driven(responses)
+    if not driven and (len(responses.inputs) != 1 or responses.inputs[0].role != "force"):
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in responses.inputs)
-        raise IdentificationError(f"inputs: are {names}; modes need the responses to one force, at the drive point")
+        raise IdentificationError(
+            f"inputs: are {names}; modes need the responses to one force, at the drive point, or that force among the outputs"
+        )
     band = responses.select(
         lowest_hz=0.0 if lowest_hz is None else lowest_hz, highest_hz=np.inf if highest_hz is None else highest_hz
     )
-    data = weighted_accelerance(band, weighting)
+    joint = driven_responses(band, weighting) if driven else None
+    band = over_force(band) if driven else band
+    data = joint.first_guess() if joint else weighted_accelerance(band, "relative" if driven else weighting)
     if isinstance(modes, int) and modes < 1:
         raise IdentificationError(f"modes: is {modes}, needs at least 1")
-    stable = diagram(data, orders)
-    start = _start(stable, data, None if modes is None or isinstance(modes, int) else modes)
+    if isinstance(modes, LinearModes):
+        start, modes = _poles_of(modes, data), None
+    else:
+        stable = stability(data, orders) if diagram is None else diagram
+        start = _start(stable, data, None if modes is None or isinstance(modes, int) else modes)
     fit, rejected = _without_spurious(data, band, start, normal=not complex_residues, modes=modes)
+    if joint is not None:
+        fit, data = _most_likely(joint, fit, normal=not complex_residues)
     result = as_linear_modes(fit, band, data, normal=not complex_residues)
     return replace(result, notes=(*band.notes, *rejected, *modal_notes(result, data, fit.converged)))
+
+
+def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
+    """The maximum-likelihood fit from one near it: fits to what is linear about each one, until nothing moves."""
+    for _ in range(_ROUNDS):
+        before = fit
+        basis = modal_basis(joint.s, fit.poles, normal)
+        data = joint.around(basis @ fit.terms.T)
+        fit = fit_modes(data, fit.poles, normal=normal)
+        std = np.sqrt(np.maximum(np.diag(fit.covariance)[: fit.poles.size - 1], 1e-300))
+        if np.all(np.abs(fit.poles - before.poles)[:-1] < _AT_REST_STD * std):
+            return fit, data
+    return replace(fit, converged=False), data
+
+
+def _poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
+    """The poles of known modes in the band."""
+    inside = (modes.frequency_hz >= data.frequency_hz[0]) & (modes.frequency_hz <= data.frequency_hz[-1])
+    if not np.any(inside):
+        raise IdentificationError(
+            f"modes: none of those given is in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
+        )
+    return np.concatenate([2.0 * np.pi * modes.frequency_hz[inside], np.abs(modes.damping_ratio[inside])])
 
 
 def _start(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequence[float] | None) -> Float:

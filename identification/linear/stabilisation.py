@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
+from identification.linear.errors_in_variables import driven_responses, is_driven, over_force
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.subspace import observable_space
 from identification.validation import read_only
@@ -111,7 +112,7 @@ def stabilisation(
     Parameters
     ----------
     responses
-        One or several inputs and outputs; every output a motion.
+        One or several inputs and outputs, every output a motion; or force and motions over a voltage.
     orders
         Numbers of states, 2 to 40 in steps of two if None (fewer where there are few lines).
     weighting
@@ -126,8 +127,12 @@ def stabilisation(
     IdentificationError
         On orders that are not above zero, or too high for the number of lines.
     """
+    joint = driven_responses(responses, weighting) if is_driven(responses) else None
+    plain = over_force(responses) if is_driven(responses) and joint is None else responses
     return diagram(
-        weighted_accelerance(responses, weighting), orders, (frequency_tolerance, damping_tolerance, lowest_mac)
+        joint.first_guess() if joint else weighted_accelerance(plain, weighting),
+        orders,
+        (frequency_tolerance, damping_tolerance, lowest_mac),
     )
 
 

@@ -90,8 +90,12 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
     else:
         tensor = data.smooth.reshape(lines, outputs, inputs, outputs, inputs)
         one = np.einsum("koipi->kop", tensor)
-        spread = np.einsum("kr,ks,kop->rosp", powers, np.conj(powers), one, optimize=True)
-        colour = np.linalg.cholesky(spread.reshape(remainder.shape).real)
+        # On the unit circle the product of two powers is the power of their difference.
+        lags = (powers.T @ (np.conj(powers[:, :1]) * one.reshape(lines, -1))).real.reshape(-1, outputs, outputs)
+        number = np.arange(block_rows)
+        apart = np.abs(number[:, None] - number)
+        blocks = np.where((number[:, None] >= number)[:, :, None, None], lags[apart], lags[apart].swapaxes(2, 3))
+        colour = np.linalg.cholesky(blocks.swapaxes(1, 2).reshape(remainder.shape))
     vectors, values, _ = np.linalg.svd(np.linalg.solve(colour, remainder))
     return ObservableSpace(np.asarray(colour @ vectors), values, outputs)
 

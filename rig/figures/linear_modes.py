@@ -15,6 +15,7 @@ __all__ = ["draw_linear_modes"]
 
 _MOST_OUTPUTS = 4
 _MOST_DOTS = 4000
+_POOLED_LINES = 21
 
 
 def draw_linear_modes(
@@ -51,20 +52,39 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
     colours = (MAIN, SECOND, "#4f8f4f", "#8064a2")
     for row, (channel, colour) in enumerate(zip(responses.outputs[:_MOST_OUTPUTS], colours, strict=False)):
         measured = responses.value[every, row, 0]
-        label = f"{channel.name}, {channel.unit}/{responses.inputs[0].unit}"
+        label = f"{channel.name}, {_unit(channel.unit, responses.inputs[0].unit)}"
         size.semilogy(frequency[every], np.abs(measured), ".", ms=2.5, color=colour, alpha=0.5, label=label)
         if np.isfinite(errors[:, row, 0]).any():
-            size.semilogy(frequency[every], errors[every, row, 0], color=colour, lw=0.5, alpha=0.45)
+            size.semilogy(frequency[every], _smooth(errors[:, row, 0])[every], color=colour, lw=0.6, alpha=0.6, ls="--")
         phase.plot(frequency[every], np.degrees(np.angle(measured)), ".", ms=2.5, color=colour, alpha=0.5)
         if channel.name in known:
             model = fitted.path(channel.name)
             size.semilogy(fitted.frequency_hz, np.abs(model), color=colour, lw=1.0)
-            phase.plot(fitted.frequency_hz, np.degrees(np.angle(model)), color=colour, lw=1.0)
+            phase.plot(fitted.frequency_hz, _broken(np.degrees(np.angle(model))), color=colour, lw=1.0)
     size.plot([], [], color=REJECTED, lw=1.0, label="model")
-    size.plot([], [], color=REJECTED, lw=0.5, alpha=0.6, label="standard error")
+    size.plot([], [], color=REJECTED, lw=0.6, ls="--", label="standard error")
     size.set(ylabel=f"frequency response ({responses.estimator})")
-    size.legend(fontsize=8, loc="best")
+    size.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=6, handlelength=1.2, columnspacing=1.2)
+    size.tick_params(labelbottom=False)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+
+
+def _unit(output: str, source: str) -> str:
+    """Unit of a response, as it is printed."""
+    return f"({output.replace('^2', '2').replace('s2', 's²')})/{source}"
+
+
+def _smooth(errors: np.ndarray) -> np.ndarray:
+    """Root of the mean square over neighbouring lines: the scatter of a standard error says nothing."""
+    window = np.ones(min(_POOLED_LINES, errors.size))
+    power = np.convolve(errors**2, window, mode="same") / np.convolve(np.ones(errors.size), window, mode="same")
+    return np.asarray(np.sqrt(power))
+
+
+def _broken(angle_deg: np.ndarray) -> np.ndarray:
+    """An angle without the strokes where it turns over from 180 to -180."""
+    jump = np.abs(np.diff(angle_deg, prepend=angle_deg[:1])) > 180.0
+    return np.where(jump, np.nan, angle_deg)
 
 
 def _around(modes: LinearModes) -> np.ndarray:
@@ -91,8 +111,8 @@ def _stabilisation(
         axis.patch.set_visible(False)
     kinds = (
         (~diagram.frequency_stable, ".", REJECTED, "new"),
-        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "frequency stable"),
-        (diagram.stable, "o", MAIN, "frequency, damping, shape stable"),
+        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "frequency"),
+        (diagram.stable, "o", MAIN, "frequency, damping and shape stable"),
     )
     for which, marker, colour, label in kinds:
         at = which & diagram.physical
@@ -101,8 +121,8 @@ def _stabilisation(
         )
     for frequency in modes.frequency_hz:
         axis.axvline(frequency, color=MAIN, lw=0.5, alpha=0.4)
-    axis.set(xlabel="frequency, Hz", ylabel="model order", ylim=(0, 1.35 * diagram.orders.max()))
-    axis.legend(fontsize=7, loc="upper center", ncols=3, handletextpad=0.2, columnspacing=1.0)
+    axis.set(xlabel="frequency, Hz", ylabel="model order", ylim=(0, 1.05 * diagram.orders.max()))
+    _legend_above(axis, 3)
 
 
 def _shapes(axis: "Axes", modes: LinearModes) -> None:
@@ -115,18 +135,18 @@ def _shapes(axis: "Axes", modes: LinearModes) -> None:
         error = 1.96 * np.nan_to_num(modes.shapes_std[:, mode])
         colour = _shade(mode, count)
         x = at + (mode - 0.5 * (count - 1)) * width
-        axis.bar(x, modes.shapes[:, mode], 0.9 * width, yerr=error, color=colour, label=label, ecolor=REJECTED)
+        axis.bar(x, modes.shapes[:, mode], 0.9 * width, yerr=error, color=colour, label=label, capsize=2)
     axis.axhline(0.0, color=REJECTED, lw=0.8)
     axis.set_xticks(at, [channel.name for channel in modes.channels])
     axis.set_ylabel("mode shape, kg$^{-1/2}$")
-    axis.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    _legend_above(axis, min(count, 3))
 
 
 def _mac(axis: "Axes", modes: LinearModes) -> None:
     """MAC of every mode with every other."""
     unit = modes.shapes / np.linalg.norm(modes.shapes, axis=0)
     mac = (unit.T @ unit) ** 2
-    axis.imshow(mac, cmap="Blues", vmin=0.0, vmax=1.0)
+    axis.imshow(mac, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
     names = [f"{frequency:.1f}" for frequency in modes.frequency_hz]
     axis.set_xticks(range(len(names)), names)
     axis.set_yticks(range(len(names)), names)
@@ -135,7 +155,22 @@ def _mac(axis: "Axes", modes: LinearModes) -> None:
     axis.set_title("MAC of the modes at these sensors", fontsize=9)
     for (row, column), value in np.ndenumerate(mac):
         colour = "white" if value > 0.6 else "black"
-        axis.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
+        axis.text(
+            column, row, f"{value:.2f}", ha="center", va="center", fontsize=8 if len(mac) < 9 else 6, color=colour
+        )
+
+
+def _legend_above(axis: "Axes", columns: int) -> None:
+    """Legend over the panel, where it hides nothing."""
+    axis.legend(
+        fontsize=7,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=columns,
+        handletextpad=0.3,
+        columnspacing=1.0,
+        handlelength=1.2,
+    )
 
 
 def _shade(index: int, count: int) -> Any:

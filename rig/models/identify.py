@@ -12,6 +12,8 @@ from identification import (
     LinearModes,
     ModalAnalysis,
     NonlinearMode,
+    PeriodicSpectra,
+    best_linear_approximation,
     combined,
     extrapolated_to_zero,
     identify_exciter,
@@ -21,7 +23,7 @@ from identification import (
     stepped_sine_mode,
 )
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import Estimator, backbone, bench_of_recording, response_matrices, spectra
+from rig.measurements import Estimator, backbone, bench_of_recording, spectra
 from rig.models.files import KINDS, load, load_as
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.linear_modes import LINEAR_MODES
@@ -109,25 +111,44 @@ def _backbone(path: Path) -> Backbone:
 def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
     """From multisines or frequency responses; levels are extrapolated to zero force."""
     estimator = cast(Estimator, request.estimator)
-    matrices = [matrix for path in paths for matrix in _matrices(path, estimator)]
+    pairs = [pair for path in paths for pair in _matrices(path, estimator)]
     if request.band_hz is not None:
         low, high = request.band_hz
-        matrices = [matrix.select(lowest_hz=low, highest_hz=high) for matrix in matrices]
-    matrices.sort(key=lambda matrix: matrix.input_rms or (0.0,))
-    found = [linear_modes(matrix, modes=request.count) for matrix in matrices]
-    lowest = matrices[0]
+        pairs = [
+            (shown.select(lowest_hz=low, highest_hz=high), fitted.select(lowest_hz=low, highest_hz=high))
+            for shown, fitted in pairs
+        ]
+    pairs.sort(key=lambda pair: pair[0].input_rms or (0.0,))
+    lowest, fitted = pairs[0]
+    diagram = stabilisation(fitted)
+    found = [linear_modes(fitted, modes=request.count, diagram=diagram)]
+    found += [linear_modes(higher, modes=found[0]) for _, higher in pairs[1:]]
     modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
-    return ModalAnalysis(modes, lowest, stabilisation(lowest))
+    return ModalAnalysis(modes, lowest, diagram)
 
 
-def _matrices(path: Path, estimator: Estimator) -> list[FrequencyResponseMatrix]:
+def _matrices(path: Path, estimator: Estimator) -> list[tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]]:
+    """Responses by level: as they are shown, and as they are fitted.
+
+    With the voltage as instrument the fit is to force and motions over the voltage.
+    """
     kind = kind_of(path)
     if kind == "multisine":
         with Recording(path) as recording:
-            return list(response_matrices(recording, estimator=estimator).values())
+            specimen = bench_of_recording(recording).specimen.name
+            measured = list(spectra(recording).values())
+        shown = [best_linear_approximation(s, estimator=estimator, specimen=specimen) for s in measured]
+        if estimator != "instrument":
+            return [(matrix, matrix) for matrix in shown]
+        return [(matrix, _over_voltage(s, specimen)) for matrix, s in zip(shown, measured, strict=True)]
     if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
-        return [matrix]
+        return [(matrix, matrix)]
     raise RecordingError(f"{path}: holds a {kind}; a linear model comes from multisines or frequency response matrices")
+
+
+def _over_voltage(measured: PeriodicSpectra, specimen: str) -> FrequencyResponseMatrix:
+    names = [channel.name for channel in measured.channels if channel.role in ("force", "drive", "response")]
+    return best_linear_approximation(measured, inputs=("voltage",), outputs=names, specimen=specimen)
 
 
 def _exciter(paths: Sequence[Path], request: Request) -> Exciter:

@@ -83,10 +83,10 @@ def test_complex_residues_are_recovered_and_their_collinearity_told() -> None:
 def test_close_modes_and_coarse_lines_are_named() -> None:
     close = np.array([20.0, 33.0, 33.4])
     exact = accelerance(poles_hz=close, damping=DAMPING[[0, 1, 1]])
-    notes = linear_modes(measured(5, 0.1, exact=exact), modes=list(close)).notes
+    notes = linear_modes(measured(5, 0.02, exact=exact), modes=list(close)).notes
     assert any("Hz are close: " in note and "MAC" in note for note in notes)
     exact = accelerance(damping=np.array([0.0008, 0.008, 0.002]))
-    notes = linear_modes(measured(6, 0.1, exact=exact), modes=list(FREQUENCY_HZ)).notes
+    notes = linear_modes(measured(6, 0.02, exact=exact), modes=list(FREQUENCY_HZ)).notes
     assert any("Hz: half-power bandwidth" in note for note in notes)
 
 
@@ -118,3 +118,25 @@ def test_the_stabilisation_diagram_shows_columns_at_the_modes() -> None:
     assert not np.any(diagram.stable & ~diagram.frequency_stable)
     with pytest.raises(IdentificationError, match=r"orders: \[0, 4\]"):
         stabilisation(measured(8, 0.5), orders=[4, 0])
+
+
+def test_two_forces_make_one_diagram() -> None:
+    one = measured(9, 0.0).value[:, :, 0]
+    s, omega = 2j * np.pi * LINES_HZ[:, None], 2 * np.pi * FREQUENCY_HZ
+    two = s**2 / (s**2 + 2 * DAMPING * omega * s + omega**2) @ (SHAPES * SHAPES[1]).T + 0.2
+    random = np.random.default_rng(9)
+    value = np.stack([one, two], axis=2)
+    value = value + 0.01 * (random.normal(size=value.shape) + 1j * random.normal(size=value.shape)) / np.sqrt(2.0)
+    responses = FrequencyResponseMatrix(
+        outputs=CHANNELS,
+        inputs=(*FORCE, Channel("second", "force", "N")),
+        frequency_hz=LINES_HZ,
+        value=value,
+        noise_covariance=np.broadcast_to(1e-4 * np.eye(4), (LINES_HZ.size, 4, 4)),
+    )
+    diagram = stabilisation(responses, range(2, 21, 2))
+    found = diagram.frequency_hz[diagram.columns()]
+    for frequency in FREQUENCY_HZ:
+        assert np.min(np.abs(found / frequency - 1)) < 1e-3
+    with pytest.raises(IdentificationError, match=r"inputs: are force \(force\), second \(force\)"):
+        linear_modes(responses)
