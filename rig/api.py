@@ -3,14 +3,14 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from identification import Backbone, FrequencyResponse, PeriodicSpectra, Transient
+from identification import Backbone, FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra, Transient
 from rig.bench import Bench, load_bench
 from rig.campaigns.execution import Progress
 from rig.campaigns.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.runner import carry_out, take_up
 from rig.errors import ConfigurationError
-from rig.measurements import backbone, frequency_responses, spectra, sweeps
+from rig.measurements import Estimator, backbone, frequency_responses, response_matrices, spectra, sweeps
 from rig.recording.reader import Recording
 
 __all__ = ["Run", "resume", "run"]
@@ -43,6 +43,10 @@ class Run:
     def spectra(self) -> dict[float, PeriodicSpectra]:
         """Spectra of all realisations of a multisine test, by level in V RMS."""
         return spectra(self.recording)
+
+    def response_matrices(self, *, estimator: Estimator = "instrument") -> dict[float, FrequencyResponseMatrix]:
+        """Frequency responses from the force to every motion of a multisine test, by level in V RMS."""
+        return response_matrices(self.recording, estimator=estimator)
 
     def close(self) -> None:
         """Let go of the file; a temporary one is removed."""

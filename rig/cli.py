@@ -11,7 +11,7 @@ from rig.cli_analyse import app as analyse_app
 from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
-from rig.cli_options import Json, Output, Overwrite, Realtime
+from rig.cli_options import Json, Output, Overwrite, Realtime, show_file
 
 __all__ = ["app", "main"]
 
@@ -109,15 +109,7 @@ def show(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")], json: Json = False
 ) -> None:
     """What is in a file: points, quality, statistics of the loop."""
-    from rig.console import print_json
-    from rig.summary import summarise
-    from rig.tables import print_summary
-
-    summary = summarise(file)
-    if json:
-        print_json(summary)
-    else:
-        print_summary(summary)
+    show_file(file, json)
 
 
 @app.command("plot")

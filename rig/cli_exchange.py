@@ -5,11 +5,9 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["export_", "import_"]
+from rig.cli_options import Json, Output, Overwrite, keep_existing, show_file
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
-Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
+__all__ = ["export_", "import_"]
 
 
 def import_(
@@ -24,20 +22,13 @@ def import_(
     json: Json = False,
 ) -> None:
     """Bring in measurements and modes from elsewhere."""
-    from rig.console import print_json
-    from rig.exchange.export import keep_existing
-    from rig.exchange.kinds import described
     from rig.exchange.reading import import_file
-    from rig.exchange.store import save
+    from rig.models.files import save
 
-    keep_existing(file, output, overwrite)
+    keep_existing([file], output, overwrite)
     found = import_file(file, format_, mapping, units=units, drive=drive, item=item)
     save(found, output)
-    summary = described(found)
-    if json:
-        print_json(summary)
-    else:
-        print(f"{summary['kind']}: {summary['holds']}")
+    show_file(output, json)
 
 
 def export_(
@@ -52,11 +43,11 @@ def export_(
 ) -> None:
     """Write what is in a file for other programs."""
     from rig.console import print_json
-    from rig.exchange.export import export_file, keep_existing
+    from rig.exchange.export import export_file
     from rig.exchange.reading import format_of
 
     format_ = format_of(output, to, "--to")
-    keep_existing(file, output, overwrite)
+    keep_existing([file], output, overwrite)
     written = export_file(file, output, format_, data=data, points=tuple(point or ()), item=item)
     if json:
         print_json({"file": str(output), "format": format_, "written": [one.summary() for one in written]})

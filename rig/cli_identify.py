@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rig.cli_options import Json, Output, Overwrite, keep_existing
+from rig.cli_options import Json, Output, Overwrite, keep_existing, show_file
 
 __all__ = ["identify", "predict"]
 
@@ -34,7 +34,7 @@ def identify(
     keep_existing(files, output, overwrite)
     request = Request(kind=model, modes=modes, estimator=estimator, band_hz=band, count=count)
     save(identify_model(files, request), output)
-    _show(output, json)
+    show_file(output, json)
 
 
 def predict(
@@ -84,13 +84,4 @@ def predict(
         allow_extrapolation=allow_extrapolation,
     )
     save(predict_vibrations(model, request), output)
-    _show(output, json)
-
-
-def _show(output: Path, json: bool) -> None:
-    from rig.console import print_json
-    from rig.summary import summarise
-    from rig.tables import print_summary
-
-    summary = summarise(output)
-    print_json(summary) if json else print_summary(summary)
+    show_file(output, json)

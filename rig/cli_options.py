@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["Json", "Output", "Overwrite", "Realtime", "keep_existing"]
+__all__ = ["Json", "Output", "Overwrite", "Realtime", "keep_existing", "show_file"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
@@ -15,12 +15,27 @@ Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
 
 
 def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> None:
-    """Refuse to write over a folder, over what is read, or over what exists unless that was asked for."""
+    """Refuse to write over a folder, in no folder, over what is read, or over what exists unless that was asked for."""
     from rig.errors import RecordingError
 
     if output.is_dir():
         raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
+    if not output.parent.is_dir():
+        raise RecordingError(f"{output}: there is no folder {output.parent}")
     if output.exists() and any(source.exists() and output.samefile(source) for source in sources):
         raise RecordingError(f"{output}: is the file that is read; choose another name")
     if output.exists() and not overwrite:
         raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")
+
+
+def show_file(path: Path, json: bool) -> None:
+    """Print what is in a file."""
+    from rig.console import print_json
+    from rig.summary import summarise
+    from rig.tables import print_summary
+
+    summary = summarise(path)
+    if json:
+        print_json(summary)
+    else:
+        print_summary(summary)

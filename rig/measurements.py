@@ -1,7 +1,7 @@
 """Recordings as measurements in memory, the form that `identification` takes."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from identification import (
     Transient,
     best_linear_approximation,
 )
+from identification.multisine.best_linear_approximation import Estimator
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import backbone_of
@@ -26,6 +27,7 @@ from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
 __all__ = [
+    "Estimator",
     "backbone",
     "bench_of_recording",
     "frequency_responses",
@@ -90,7 +92,7 @@ def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
 
 
 def response_matrices(
-    recording: Recording, *, estimator: Literal["instrument", "H1", "H2"] = "instrument"
+    recording: Recording, *, estimator: Estimator = "instrument"
 ) -> dict[float, FrequencyResponseMatrix]:
     """Frequency responses from the force to every motion, by level (V RMS), with their covariance.
 

@@ -11,7 +11,7 @@ from rig.exchange.sources import read_objects
 from rig.exchange.uff.writing import write_uff
 from rig.exchange.whole_file import whole_file
 
-__all__ = ["export_file", "keep_existing", "write_contents"]
+__all__ = ["export_file", "write_contents"]
 
 _WRITERS = {"mat": write_mat, "uff": write_uff, "csv": write_csv}
 
@@ -38,15 +38,3 @@ def write_contents(items: list[Contents], output: Path, format_: str) -> None:
             _WRITERS[format_](items, part)
         except RigError as error:
             raise type(error)(f"{output}: {error}") from None
-
-
-def keep_existing(source: Path, output: Path, overwrite: bool) -> None:
-    """Refuse an output that is a folder, the source itself, in no folder, or there already; raises `RecordingError`."""
-    if output.is_dir():
-        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
-    if not output.parent.is_dir():
-        raise RecordingError(f"{output}: there is no folder {output.parent}")
-    if output.exists() and source.exists() and output.samefile(source):
-        raise RecordingError(f"{output}: is the file that is read; choose another name")
-    if output.exists() and not overwrite:
-        raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")

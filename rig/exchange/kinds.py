@@ -24,7 +24,7 @@ from rig.exchange.contents import Contents, unit_of
 from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
 from rig.exchange.time_data import TimeData
 
-__all__ = ["KINDS", "described", "put_together", "taken_apart"]
+__all__ = ["KINDS", "put_together", "taken_apart"]
 
 
 def _nonlinear_mode(mode: NonlinearMode) -> Contents:
@@ -116,20 +116,3 @@ def put_together(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, 
             except (KeyError, TypeError, ValueError) as error:
                 raise IdentificationError(f"{kind}: does not fit together ({error})") from None
     raise IdentificationError(f"kind: is '{kind}', known are {', '.join(kind.name for kind in KINDS)}")
-
-
-def described(value: Any) -> dict[str, Any]:
-    """Kind of an object, its title, and in ``holds`` what a line can say of it."""
-    contents = taken_apart(value)
-    summary = contents.summary()
-    if isinstance(value, tuple):
-        return {**summary, "holds": f"{len(value)} levels"}
-    if isinstance(value, FrequencyResponseMatrix):
-        names = [", ".join(channel.name for channel in channels) for channels in (value.outputs, value.inputs)]
-        band = f"{value.frequency_hz[0]:g} to {value.frequency_hz[-1]:g} Hz"
-        return {
-            **summary,
-            "holds": f"{summary['rows']} lines, {band}, of {names[0]} to {names[1]}",
-        }
-    what = "modes" if isinstance(value, LinearModes) else "points"
-    return {**summary, "holds": f"{summary['rows']} {what}"}

@@ -10,9 +10,9 @@ import numpy as np
 from identification import ModalAnalysis
 from rig.campaigns.evaluate import VOLTAGE, channels_of
 from rig.errors import ConfigurationError, RecordingError
-from rig.exchange.store import load
 from rig.exchange.time_data import TimeData
 from rig.measurements import backbone, bench_of_recording, frequency_responses, point_rows, response_matrices, sweeps
+from rig.models.files import load
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 

@@ -3,12 +3,13 @@
 from pathlib import Path
 from typing import Any
 
+from identification import LinearModes, ModalAnalysis
 from rig.errors import RecordingError
-from rig.exchange.measured_backbone import MEASURED_BACKBONE
 from rig.models.exciter import EXCITER
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.kind import Kind
 from rig.models.linear_modes import LINEAR_MODES
+from rig.models.measured_backbone import MEASURED_BACKBONE
 from rig.models.nonlinear_mode import NONLINEAR_MODE
 from rig.models.predictions import PREDICTIONS
 from rig.models.response_matrix import RESPONSE_MATRIX
@@ -22,8 +23,11 @@ KINDS = {kind.name: kind for kind in _ALL}
 
 
 def save(thing: Any, path: Path) -> None:
-    """Write a model, a prediction or an imported measurement, whole or not at all."""
-    kind = next(kind for kind in KINDS.values() if isinstance(thing, kind.holds))
+    """Write a model, a prediction or an imported measurement, whole or not at all; linear modes alone as a modal analysis."""
+    thing = ModalAnalysis(thing) if isinstance(thing, LinearModes) else thing
+    kind = next((kind for kind in KINDS.values() if isinstance(thing, kind.holds)), None)
+    if kind is None:
+        raise RecordingError(f"{path}: a {type(thing).__name__} has no file of its own; known are {', '.join(KINDS)}")
     write_arrays(path, kind.name, *kind.pack(thing))
 
 

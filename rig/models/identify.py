@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Any, cast, get_args
 
 from identification import (
     Backbone,
@@ -21,7 +21,7 @@ from identification import (
     stepped_sine_mode,
 )
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import backbone, bench_of_recording, response_matrices, spectra
+from rig.measurements import Estimator, backbone, bench_of_recording, response_matrices, spectra
 from rig.models.files import KINDS, load, load_as
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.linear_modes import LINEAR_MODES
@@ -29,8 +29,6 @@ from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 __all__ = ["Request", "identify_model", "modes_in"]
-
-Estimator = Literal["instrument", "H1", "H2"]
 
 
 @dataclass(frozen=True, kw_only=True)
