@@ -1,13 +1,17 @@
 """The page on the file format names everything that points of every kind hold."""
 
 import re
+from dataclasses import fields
 
 import pytest
 
 import rig
+from identification import FrequencyResponseMatrix, LinearModes, NonlinearMode
+from identification.nonlinear.nonlinear_modes import STANDARD_ERRORS
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
+from rig.models import files
 from tests.docs.pages import ROOT
 
 SMALL = {"bench": "magnet-beam", "levels_v": [0.4]}
@@ -49,3 +53,27 @@ def test_every_key_of_a_point_is_on_the_page(kind):
     assert point["accepted"], point["reason"]
     keys = {key for key in point if kind != "sweep" or not BY_RULE.fullmatch(key)}
     assert keys <= named
+
+
+def named_in(heading: str) -> list[str]:
+    """Everything between backticks, in the order of the page."""
+    return re.findall(r"`(\w[\w-]*)`", section(heading))
+
+
+MODELS = "HDF5 file of a model or of imported measurements"
+
+
+def test_every_kind_of_file_is_in_the_table():
+    assert re.findall(r"^\| `([a-z-]+)` \|", section(MODELS), re.MULTILINE) == list(files.KINDS)
+
+
+@pytest.mark.parametrize("model", [NonlinearMode, LinearModes, FrequencyResponseMatrix])
+def test_every_field_of_a_model_is_on_the_page(model):
+    texts = {"channels", "specimen", "notes", "source"}
+    assert {field.name for field in fields(model)} - set(named_in(MODELS)) <= texts
+
+
+def test_standard_errors_are_named_in_the_order_of_the_arrays():
+    named = named_in(MODELS)
+    places = [named.index(name) for name in STANDARD_ERRORS.values()]
+    assert places == sorted(places)
