@@ -59,6 +59,7 @@ LAW = np.dtype(
         ("k3", "f8"),
         ("k4", "f8"),
         ("largest_v", "f8"),
+        ("period_mean", "i8"),
     ]
 )
 """Frozen coefficients of the law (one record), made by `controller.pll.PhaseLockedLoop.build`."""

@@ -78,6 +78,9 @@ class PhaseLockedLoop(BaseModel):
     """Wanted lag of the drive-point acceleration behind the force, deg; -90 is phase resonance."""
     mean_corner_hz: float = Field(0.3, gt=0, le=100)
     """Corner of the high-pass that takes the mean out of every input before it is demodulated, Hz."""
+    period_mean: bool = False
+    """Whether the frequency follows the mean of the phase error over the last whole period, instead of every sample of it:
+    the detector's ripple then no longer modulates the output, whose harmonics change those of the force."""
     lock: LockRule = LockRule()
     """When a lock counts as gained and as lost."""
 
@@ -128,6 +131,7 @@ class PhaseLockedLoop(BaseModel):
         out["amplitude_law"] = amplitude_law
         out["k3"], out["k4"] = self.k3, self.k4
         out["largest_v"] = largest_v
+        out["period_mean"] = self.period_mean
         return out
 
 

@@ -58,7 +58,9 @@ def shapes_for(
             f"modes: {listed} Hz look alike at {', '.join(channels)} (errors grow {gain:.0f} times, allowed is "
             f"{_LARGEST_GAIN:g}); measure where their shapes differ"
         )
-    found = ModeShapes(channels, shapes, 0, modes.shapes_std[np.ix_(rows, columns)])
+    found = ModeShapes(
+        channels, shapes, 0, modes.shapes_std[np.ix_(rows, columns)], _shape_covariance(modes, rows, columns)
+    )
     return found, tested, (*notes, *_unlike(found, backbone))
 
 
@@ -105,6 +107,16 @@ def _common(modes: LinearModes, backbone: Backbone) -> tuple[tuple[str, ...], li
         if name not in known
     ]
     return names, notes
+
+
+def _shape_covariance(modes: LinearModes, rows: Sequence[int], columns: Sequence[int]) -> Float | None:
+    """Covariance of the chosen shape values, row by row; None where it is not known."""
+    if modes.covariance is None:
+        return None
+    count = modes.frequency_hz.size
+    at = (2 * count + count * np.asarray(rows)[:, None] + np.asarray(columns)).ravel()
+    chosen = modes.covariance[np.ix_(at, at)]
+    return np.asarray(chosen) if np.isfinite(chosen).all() else None
 
 
 def _error_gain(shapes: Float) -> float:

@@ -29,12 +29,17 @@ class ModeShapes:
         Column of the mode that is tested.
     shapes_std
         Standard errors of ``shapes``, kg^-1/2, NaN where unknown; None if none is known.
+    covariance
+        float[n_channels n_modes, n_channels n_modes] of ``shapes`` row by row, takes the place of ``shapes_std``; None if
+        only those are known. A modal analysis scales all channels of a mode by the drive point's residue, so that their
+        errors go together.
     """
 
     channels: tuple[str, ...]
     shapes: Float
     mode: int = 0
     shapes_std: Float | None = None
+    covariance: Float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
@@ -46,6 +51,11 @@ class ModeShapes:
             object.__setattr__(self, "shapes_std", read_only(self.shapes_std, np.float64))
             if np.shape(self.shapes_std) != shapes.shape:
                 raise IdentificationError(f"shapes_std: shape {np.shape(self.shapes_std)}, shapes have {shapes.shape}")
+        if self.covariance is not None:
+            covariance = finite_array("covariance", self.covariance, np.float64, 2)
+            object.__setattr__(self, "covariance", covariance)
+            if covariance.shape != (shapes.size, shapes.size):
+                raise IdentificationError(f"covariance: shape {covariance.shape} for {shapes.size} shape values")
         if not shapes.shape[1] or np.linalg.matrix_rank(shapes) < shapes.shape[1]:
             raise IdentificationError(
                 f"shapes: {shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes"
@@ -57,6 +67,19 @@ class ModeShapes:
     def tested(self) -> Float:
         """float[n_channels]: shape of the tested mode."""
         return np.asarray(self.shapes[:, self.mode])
+
+    def draw(self, draws: int, rng: np.random.Generator) -> Float | None:
+        """float[draws, n_channels, n_modes]: shapes as they might be, normally distributed; None if no error is known."""
+        if self.covariance is not None:
+            values, vectors = np.linalg.eigh(self.covariance)
+            root = vectors * np.sqrt(np.maximum(values, 0.0))
+            errors = rng.standard_normal((draws, values.size)) @ root.T
+            return np.asarray(self.shapes + errors.reshape(draws, *self.shapes.shape)) if errors.any() else None
+        if self.shapes_std is None or not np.nan_to_num(self.shapes_std).any():
+            return None
+        return np.asarray(
+            self.shapes + np.nan_to_num(self.shapes_std) * rng.standard_normal((draws, *self.shapes.shape))
+        )
 
     def fundamental_m(self, point: PeriodicVibration) -> Complex:
         """complex[n_channels]: fundamental of the displacement at the channels of the shapes, m."""

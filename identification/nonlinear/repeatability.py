@@ -169,8 +169,21 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
         response_harmonics_m=_mean_harmonics(levels, modes, "response_harmonics_m", harmonics),
         source="several backbones",
         specimen=modes[0].specimen,
-        notes=tuple(dict.fromkeys([note for mode in modes for note in mode.notes])),
+        notes=(*_scatter_notes(modes), *dict.fromkeys([note for mode in modes for note in mode.notes])),
     )
+
+
+def _scatter_notes(modes: Sequence[NonlinearMode]) -> tuple[str, ...]:
+    """How far whole runs lie apart, in one line each for frequency and damping; none where it is not known."""
+    found = repeatability(modes)
+    notes = []
+    for name, what in (("modal_frequency_hz", "modal frequency"), ("damping_ratio", "damping")):
+        size, low, high = (100.0 * part for part in found.scatter(name))
+        if np.isfinite(size):
+            notes.append(
+                f"{len(modes)} runs: {what} scatters by {size:.2g} % from run to run (95 %: {low:.2g} to {high:.2g} %)"
+            )
+    return tuple(notes)
 
 
 _COMPARED = ("modal_frequency_hz", "damping_ratio")

@@ -15,6 +15,7 @@ from identification.backbones import Backbone
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
+from identification.nonlinear.mode_shapes import ModeShapes
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
 from identification.nonlinear.properties import States, properties
 from identification.signals.fourier import batches_of
@@ -26,6 +27,7 @@ Float = NDArray[np.float64]
 
 _BOUNDED = ("mac", "force_purity", "response_purity")
 _TAILS = (2.5, 97.5)
+_STANDS_OUT = 2.5  # of its standard error per part, a drift that noise alone reaches in 4 % of cases
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +72,16 @@ def propagated(
     states: States,
     backbone: Backbone,
     rows: tuple[int, ...],
-    shapes: Float | None,
-    shapes_std: Float | None,
+    shapes: ModeShapes | None,
     model: ErrorModel,
 ) -> dict[str, Float]:
     """Standard errors, their systematic parts and intervals, by field of `NonlinearMode`.
 
-    ``rows`` are the channels of ``states.deflection_m``; ``shapes`` float[C, M] is what ``states.inverse`` inverts.
+    ``rows`` are the channels of ``states.deflection_m``; ``shapes`` are what ``states.inverse`` inverts.
     """
     estimate = properties(states)
     rng = np.random.default_rng(model.seed)
-    wrong = _systematic(states, backbone, rows, shapes, shapes_std, model, rng)
+    wrong = _systematic(states, backbone, rows, shapes, model, rng)
     both = _random(wrong if wrong is not None else _repeated(states, model.draws), states, backbone, rows, rng)
     total = _deviations(estimate, properties(both))
     systematic = {name: np.zeros_like(total[name]) for name in total}
@@ -135,16 +136,15 @@ def _systematic(
     states: States,
     backbone: Backbone,
     rows: tuple[int, ...],
-    shapes: Float | None,
-    shapes_std: Float | None,
+    shapes: ModeShapes | None,
     model: ErrorModel,
     rng: np.random.Generator,
 ) -> States | None:
     """States with the errors that all points share; None where there are none."""
     calibration = model.per_channel("calibration_std", backbone)
     skew = np.radians(model.per_channel("phase_skew_std_deg", backbone))
-    known = np.nan_to_num(shapes_std) if shapes_std is not None else np.zeros((0, 0))
-    if not (calibration.any() or skew.any() or known.any()):
+    drawn = None if shapes is None else shapes.draw(model.draws, rng)
+    if not (calibration.any() or skew.any() or drawn is not None):
         return None
     count = len(backbone.channels)
     gain = 1.0 + calibration * rng.standard_normal((model.draws, count))
@@ -160,14 +160,15 @@ def _systematic(
     if rows:
         turns = np.stack([turned(row)[..., 1] for row in rows], axis=-1)
         wrong = replace(wrong, deflection_m=wrong.deflection_m * turns)
-    if shapes is None or not known.any():
+    if shapes is None or drawn is None:
         return wrong
-    drawn = shapes + known * rng.standard_normal((model.draws, *shapes.shape))
-    inverse = np.zeros((model.draws, shapes.shape[1], len(rows)))
-    inverse[..., : shapes.shape[0]] = np.linalg.pinv(drawn)
+    inverse = np.zeros((model.draws, drawn.shape[2], len(rows)))
+    inverse[..., : drawn.shape[1]] = np.linalg.pinv(drawn)
     wrong = replace(wrong, inverse=inverse)
-    same = states.linear_columns == tuple(range(shapes.shape[0])) and np.array_equal(states.linear_shape, shapes[:, 0])
-    return replace(wrong, linear_shape=drawn[..., 0]) if same else wrong
+    same = states.linear_columns == tuple(range(drawn.shape[1]))
+    if same and np.array_equal(states.linear_shape, shapes.tested):
+        return replace(wrong, linear_shape=drawn[..., shapes.mode])
+    return wrong
 
 
 def _random(
@@ -210,12 +211,19 @@ def _to_displacement(points: tuple[PeriodicVibration, ...], row: int) -> Float:
 
 
 def _drift_noise(states: States, backbone: Backbone, rng: np.random.Generator, draws: int) -> Complex:
-    """complex[draws, n]: the slope of a line over -1/2 ... 1/2 has the variance of its mean times twelve."""
+    """complex[draws, n]: what the drift may be wrong by.
+
+    The slope of a line over -1/2 ... 1/2 has the variance of its mean times twelve. And where a vibration has not come to
+    rest its properties are those of a steady one to first order only (joints with memory dissipate otherwise while
+    they creep): as much as stands out of the noise is counted once more.
+    """
     row = find_role(backbone.channels, "drive")
     relative = [
         0.0 if point.drift is None else _errors(point)[row, 1] / abs(point.harmonics[row, 1]) / point.periods
         for point in backbone.points
     ]
-    std = np.sqrt(12.0) * np.array(relative) * states.frequency_hz
+    noise = np.sqrt(12.0) * np.array(relative) * states.frequency_hz
+    plain = np.sqrt(np.maximum(np.abs(states.drift) ** 2 - (_STANDS_OUT * noise) ** 2, 0.0))
+    std = np.hypot(noise, plain)
     size = (draws, std.size)
     return np.asarray(std * (rng.standard_normal(size) + 1j * rng.standard_normal(size)))

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
+from identification.signals.rounding import rounding_errors
 from identification.validation import finite_array, positive
 
 __all__ = ["batches_of", "periodic_vibration"]
@@ -40,6 +41,7 @@ def periodic_vibration(
     *,
     sample_rate_hz: float,
     harmonics: int = 7,
+    resolution: ArrayLike | None = None,
     phase_lag_target_deg: float = 90.0,
     settled: bool = True,
 ) -> PeriodicVibration:
@@ -57,6 +59,8 @@ def periodic_vibration(
         Samples per second.
     harmonics
         Highest harmonic H.
+    resolution
+        float[n_channels], step of each channel's converter in the unit of the channel, 0 for none; left out if unknown.
     phase_lag_target_deg, settled
         Handed on to the result.
 
@@ -65,7 +69,8 @@ def periodic_vibration(
     PeriodicVibration
         From the whole periods at the start of the record. ``harmonics_std`` is the scatter of the residual's
         coefficients over up to 20 batches of whole periods, which counts coloured noise and slow wander at its full
-        weight; below four periods it takes the residual for white noise. It knows nothing of calibration or of
+        weight; below four periods it takes the residual for white noise. With ``resolution``, what rounding repeats in every
+        period is counted beside (`identification.signals.rounding`). It knows nothing of calibration or of
         run-to-run scatter.
 
     Raises
@@ -87,18 +92,33 @@ def periodic_vibration(
     design = _design(theta, harmonics)
     solution = _least_squares(design, data.T)
     residual = data.T - design @ solution
+    coefficients, residual_rms = _coefficients(solution, harmonics), np.sqrt(np.mean(residual**2, axis=0))
+    scatter = _standard_errors(theta, design[:, : 2 * harmonics + 1], residual, periods)
+    rounding = rounding_errors(coefficients, _steps(resolution, len(channels)), residual_rms)
     return PeriodicVibration(
         channels=tuple(channels),
         frequency_hz=frequency_hz,
-        harmonics=_coefficients(solution, harmonics),
+        harmonics=coefficients,
         periods=periods,
-        residual_rms=np.sqrt(np.mean(residual**2, axis=0)),
-        harmonics_std=_standard_errors(theta, design[:, : 2 * harmonics + 1], residual, periods),
+        residual_rms=residual_rms,
+        harmonics_std=np.hypot(scatter, rounding),
         drift=_relative_drift(solution, harmonics),
         phase_lag_target_deg=phase_lag_target_deg,
         settled=settled,
         warnings=warnings,
     )
+
+
+def _steps(resolution: ArrayLike | None, channels: int) -> Float:
+    """float[n_channels]: converter steps; zeros where they are not known."""
+    if resolution is None:
+        return np.zeros(channels)
+    steps = finite_array("resolution", resolution, np.float64, 1)
+    if steps.size != channels or np.any(steps < 0.0):
+        raise IdentificationError(
+            f"resolution: is {resolution}, needs {channels} numbers of 0 or above, one per channel"
+        )
+    return steps
 
 
 def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float, int, int, tuple[str, ...]]:

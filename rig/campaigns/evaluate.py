@@ -92,6 +92,7 @@ def recorded_vibration(
         channels_of(bench),
         sample_rate_hz=bench.sample_rate_hz,
         harmonics=harmonics,
+        resolution=[channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels],
         phase_lag_target_deg=phase_lag_target_deg,
     )
     return _without_skew(vibration, bench)

@@ -124,6 +124,8 @@ def close_period(t: TickArrays, present: bool) -> None:
     """An oscillator period has ended at the inputs: lock state and settle rule take its means."""
     law, loop = t.law[0], t.loop[0]
     n = loop.sum_samples
+    if n > 0:
+        loop.mean_error = loop.sum_error / n
     if n > 0 and loop.drive != WAVEFORM:
         error = loop.sum_error / n if present else math.nan
         open_loop = loop.drive == TONE
@@ -172,7 +174,7 @@ def choose_frequency(t: TickArrays, present: bool) -> int:
         loop.omega = t.progress[0].omega
     elif present:
         loop.omega, loop.phase_integral = proportional_integral(
-            loop.error,
+            loop.mean_error if law.period_mean == 1 else loop.error,
             loop.phase_integral,
             law.kp,
             law.ki,

@@ -25,6 +25,7 @@ LOOP = np.dtype(
         ("amplitude_integral", "f8"),
         ("sign_mean", "f8"),
         ("error", "f8"),
+        ("mean_error", "f8"),
         ("sum_error", "f8"),
         ("sum_force", "f8"),
         ("sum_response", "f8"),

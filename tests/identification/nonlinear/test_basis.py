@@ -93,3 +93,12 @@ def test_errors_of_the_shapes_are_carried_through_and_missing_ones_named() -> No
     np.testing.assert_allclose(mode.systematic("modal_amplitude") / mode.modal_amplitude, q_std, rtol=0.1)
     unknown = nonlinear_mode(BACKBONE, modes=linear_modes(std=np.nan))
     assert any("standard errors of some mode shapes are unknown" in note for note in unknown.notes)
+
+
+def test_the_covariance_of_the_chosen_shape_values_comes_along_in_the_backbones_order() -> None:
+    modes = linear_modes()
+    values = np.arange(1.0, 9.0)  # two frequencies, two dampings, tip in modes 1 and 2, drive in modes 1 and 2
+    found, _, _ = shapes_for(replace(modes, covariance=np.outer(values, values)), BACKBONE)
+    np.testing.assert_array_equal(found.covariance, np.outer([7.0, 5.0], [7.0, 5.0]))
+    unknown, _, _ = shapes_for(replace(modes, covariance=np.full((8, 8), np.nan)), BACKBONE)
+    assert unknown.covariance is None

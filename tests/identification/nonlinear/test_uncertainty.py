@@ -56,6 +56,31 @@ def test_one_percent_of_the_shape_is_two_percent_of_the_damping_at_all_points_al
     np.testing.assert_allclose(mode.systematic("force_n"), 0.0)
 
 
+def test_errors_of_shapes_that_go_together_do_not_average_over_the_channels() -> None:
+    backbone = Backbone((noisy_point(relative=1e-6),))
+    std = 0.01 * SHAPE[:, None]
+    common = ModeShapes(("drive", "tip"), SHAPE[:, None], 0, std, covariance=std @ std.T)
+    apart = ModeShapes(("drive", "tip"), SHAPE[:, None], 0, std)
+    together, single = (identify(backbone, mode_shapes=shapes, draws=4000) for shapes in (common, apart))
+    assert together.systematic("modal_amplitude") / together.modal_amplitude == pytest.approx(0.01, rel=0.05)
+    expected = 0.01 * np.linalg.norm(SHAPE**2) / np.sum(SHAPE**2)
+    assert single.systematic("modal_amplitude") / single.modal_amplitude == pytest.approx(expected, rel=0.05)
+    assert together.systematic("mac") == pytest.approx(0.0, abs=1e-12)  # the whole shape grows, none of it turns
+    with pytest.raises(IdentificationError, match=r"covariance: shape \(1, 1\) for 2 shape values"):
+        ModeShapes(("drive", "tip"), SHAPE[:, None], covariance=np.eye(1))
+
+
+def test_a_drift_that_stands_out_of_the_noise_widens_frequency_and_damping() -> None:
+    point = noisy_point(relative=1e-5)
+    still = identify(Backbone((replace(point, drift=np.zeros(3, complex)),), drive_mode_shape=PHI))
+    rate = 0.01 * np.ones(3) * (1 + 1j)
+    moving = identify(Backbone((replace(point, drift=rate),), drive_mode_shape=PHI))
+    sigma = 0.01 * np.sqrt(2) * point.frequency_hz / point.periods
+    assert moving.damping_ratio_std[0] == pytest.approx(sigma / (2 * np.pi * point.frequency_hz), rel=0.1)
+    assert moving.damping_ratio_std[0] > 3 * still.damping_ratio_std[0]
+    assert moving.modal_frequency_std_hz[0] > 3 * still.modal_frequency_std_hz[0]
+
+
 def test_gain_and_skew_of_the_sensors_are_counted_where_they_act() -> None:
     backbone = Backbone((noisy_point(relative=1e-7),), drive_mode_shape=PHI)
     gain = identify(backbone, calibration_std={"force": 0.01})

@@ -21,12 +21,12 @@ def _tick(lead, bench=None, law=None):
     return Tick(bench or bench_with(), law or preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), HELD, lead)
 
 
-def _wired(lead_whole, lead_fraction, samples=20_000, bench=None, skew=(0.0, 0.0)):
+def _wired(lead_whole, lead_fraction, samples=20_000, bench=None, skew=(0.0, 0.0), law=None):
     """A tick whose inputs are its own output, late by the lead and by the channels' skew: force as it is, drive a quarter
     turn ahead of it, so that the lag is that of phase resonance."""
     bench = bench or bench_with()
     still = preset("magnet-beam").model_copy(update={"k1": 0.0, "k2": 0.0})  # the oscillator keeps its 24 Hz
-    tick = _tick(lead_whole + lead_fraction, bench, still)
+    tick = _tick(lead_whole + lead_fraction, bench, law or still)
     omega, dt = 2 * math.pi * 24.0, 1 / bench.sample_rate_hz
     readings, rows = tick.buffers(samples)
     estimates = np.zeros(samples, complex)
@@ -61,6 +61,19 @@ def test_skew_between_channels_is_taken_out_of_the_lag():
     _, uncompensated = _wired(1, 0.5, skew=(3.5, 0.0))
     expected = 2 * math.pi * 24.0 * 3.5 / 5000
     assert np.mean(uncompensated["phase_error_rad"][-5000:]) == pytest.approx(expected, rel=0.03)
+
+
+def test_with_the_mean_of_periods_the_detectors_ripple_leaves_the_frequency_alone():
+    proportional = preset("magnet-beam").model_copy(update={"k2": 0.0})
+    swings = {}
+    for period_mean in (False, True):
+        _, rows = _wired(1, 0.5, law=proportional.model_copy(update={"period_mean": period_mean}))
+        frequency_hz, theta = rows["frequency_hz"][-6250:], rows["theta_rad"][-6250:]
+        swings[period_mean] = abs(np.mean(frequency_hz * np.exp(-2j * theta)))
+        assert np.mean(frequency_hz) == pytest.approx(24.0, abs=0.01)
+    assert swings[False] > 1e-4
+    assert swings[True] < 0.02 * swings[False]
+    assert np.count_nonzero(np.diff(frequency_hz)) <= 31  # once a period
 
 
 def test_a_row_shows_output_phase_and_amplitude_that_belong_to_the_same_instant():

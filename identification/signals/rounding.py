@@ -1,0 +1,59 @@
+"""What a converter's rounding does to Fourier coefficients.
+
+A sample is rounded to a whole number of steps q. Over a settled vibration the rounding error ``e(x)`` repeats with the
+period, so that more periods do not average it out; noise before the converter does: under Gaussian noise of standard
+deviation sigma its mean is (Widrow & Kollar, Quantization Noise, the expansion of the sawtooth)
+
+    e(x) = sum_n (-1)^n q/(pi n) exp(-2 (pi n sigma/q)^2) sin(2 pi n x/q).
+
+With ``G_n,h`` the Fourier coefficients of ``exp(2 pi i n x(theta)/q)``, and with nothing known of where between two steps
+the vibration is centred, harmonic h gets an error of variance ``sum_n (q/(pi n))^2 exp(-4 (pi n sigma/q)^2)
+(|G_n,h|^2 + |G_n,-h|^2)``, half of it in each of its two parts. Above about half a step of noise nothing is left of it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["rounding_errors"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_INSTANTS = 16384  # of a period: enough for vibrations of some hundred steps, beyond which the error is negligible
+_ORDERS = 6
+_NEGLIGIBLE = 1e-3
+
+
+def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) -> Float:
+    """Standard error of real part and imaginary part of each coefficient that rounding leaves.
+
+    Parameters
+    ----------
+    harmonics
+        complex[n_channels, H + 1], as measured.
+    resolution
+        float[n_channels], step q of the converter in the unit of the channel; 0 for none.
+    residual_rms
+        float[n_channels], what the harmonics leave of the record: noise and the rounding's own ``q^2/12``.
+
+    Returns
+    -------
+    float[n_channels, H + 1]
+    """
+    out = np.zeros(harmonics.shape)
+    orders = np.arange(harmonics.shape[1])
+    turns = np.exp(2j * np.pi * np.outer(np.arange(_INSTANTS) / _INSTANTS, orders[1:]))
+    for row in np.flatnonzero(resolution > 0.0):
+        step = resolution[row]
+        position = np.real(turns @ harmonics[row, 1:]) / step
+        noise = max((residual_rms[row] / step) ** 2 - 1.0 / 12.0, 0.0)
+        variance = np.zeros(orders.size)
+        for order in range(1, _ORDERS + 1):
+            size = step / (np.pi * order) * np.exp(-2.0 * (np.pi * order) ** 2 * noise)
+            if size < _NEGLIGIBLE * step:
+                break
+            spread = np.abs(np.fft.fft(np.exp(2j * np.pi * order * position)) / _INSTANTS) ** 2
+            variance += size**2 * 0.5 * (spread[orders] + spread[-orders])
+        variance[0] *= 0.5
+        out[row] = np.sqrt(variance)
+    return out
