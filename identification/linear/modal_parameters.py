@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from identification.channels import find_role
 from identification.linear.accelerance import WeightedResponses
 from identification.linear.modes import LinearModes
-from identification.linear.rational_fractions import ModalFit, fit_modes
+from identification.linear.rational_fractions import RESIDUAL_TERMS, ModalFit, fit_modes
 from identification.linear.response_matrix import FrequencyResponseMatrix
 
 __all__ = ["accepted", "as_linear_modes", "phase_collinearity"]
@@ -85,7 +85,9 @@ def as_linear_modes(
 
     std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     steps = np.maximum(1e-3 * std, 1e-9 * np.abs(parameters) + 1e-300)
-    used = list(range(2 * count)) + [nonlinear + o * terms + t for o in range(rows) for t in range(terms - 2)]
+    used = list(range(2 * count)) + [
+        nonlinear + o * terms + t for o in range(rows) for t in range(terms - RESIDUAL_TERMS)
+    ]
     jacobian = np.zeros((count * (2 + rows), parameters.size))
     for index in used:
         step = np.zeros(parameters.size)
@@ -106,8 +108,9 @@ def as_linear_modes(
         shapes=values[2 * count :].reshape(rows, count),
         shapes_std=errors[2 * count :].reshape(rows, count),
         phase_collinearity=phase_collinearity(_residues(loose.poles, loose.terms, False))[rise],
-        lower=fit.terms[:, -2].astype(np.complex128),
-        upper=fit.terms[:, -1].astype(np.complex128),
+        lower=fit.terms[:, -5].astype(np.complex128),
+        upper=fit.terms[:, -2].astype(np.complex128),
+        small_terms=fit.terms[:, [-4, -3, -1]],
         upper_hz=1.0 / (2.0 * np.pi * np.sqrt(fit.poles[-1])) if fit.poles[-1] > 0.0 else np.inf,
         lowest_hz=float(data.frequency_hz[0]),
         highest_hz=float(data.frequency_hz[-1]),

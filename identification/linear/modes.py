@@ -2,11 +2,13 @@
 
 The accelerance is, with ``s = i W``,
 
-    H_o(s) = sum_k phi_ok phi_dk s^2 / (s^2 + 2 z_k w_k s + w_k^2) + L_o + U_o s^2 / (1 + s^2 / w_u^2),
+    H_o(s) = sum_k phi_ok phi_dk s^2 / (s^2 + 2 z_k w_k s + w_k^2)
+             + L_o + L'_o / s + L''_o / s^2 + U_o s^2 / (1 + s^2 / w_u^2) + U'_o s^3 / (1 + s^2 / w_u^2)^2,
 
 phi mass-normalised shapes at the channel o and at the drive point d, L_o what lower modes and rigid-body motion leave
 in the band (inertia), U_o what higher modes leave (stiffness, growing towards the nearest of them, at w_u; a plain
-stiffness where w_u is infinite). Complex residues ``rho_ok`` in place of ``phi_ok phi_dk`` turn a term into
+stiffness where w_u is infinite), L', L'' and U' the little that their damping and the lower modes' stiffness add.
+Complex residues ``rho_ok`` in place of ``phi_ok phi_dk`` turn a term into
 ``s^2 (a + b s) / (s^2 + 2 z w s + w^2)`` with ``rho = a + b p`` at the pole ``p = -z w + i w sqrt(1 - z^2)``.
 """
 
@@ -31,7 +33,7 @@ Float = NDArray[np.float64]
 _POLES = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "phase_collinearity")
 _SHAPES = ("shapes", "shapes_std")
 _RESIDUALS = ("lower", "upper")
-_OPTIONAL = ("covariance", "residues")
+_OPTIONAL = ("covariance", "residues", "small_terms")
 _SCALARS = ("lowest_hz", "highest_hz", "upper_hz", "force_rms_n", "fit_residual")
 
 
@@ -53,6 +55,8 @@ class LinearModes:
         float[n_modes], how well the complex residues of a mode lie on one line, in [0, 1]; NaN if unknown.
     lower, upper
         complex[n_channels], residual terms L (1/kg) and U (s^2/kg) of the accelerance.
+    small_terms
+        float[n_channels, 3], L' (1/(kg s)), L'' (1/(kg s^2)) and U' (s^3/kg); None for none.
     lowest_hz, highest_hz
         Band that the model was fitted in.
     upper_hz
@@ -94,6 +98,7 @@ class LinearModes:
     fit_residual: float = np.nan
     covariance: Float | None = None
     residues: Complex | None = None
+    small_terms: Float | None = None
     specimen: str = ""
     notes: tuple[str, ...] = ()
 
@@ -109,6 +114,7 @@ class LinearModes:
             (_RESIDUALS, (rows,), np.complex128),
             (("covariance",), (parameters, parameters), np.float64),
             (("residues",), (rows, modes), np.complex128),
+            (("small_terms",), (rows, 3), np.float64),
         ):
             for name in names:
                 if name in _OPTIONAL and getattr(self, name) is None:
@@ -160,7 +166,11 @@ class LinearModes:
             slope = self.residues.imag / (omega * np.sqrt(1.0 - self.damping_ratio**2))
             constant = self.residues.real + slope * self.damping_ratio * omega
             modes = modal @ constant.T + (s * modal) @ slope.T
-        return np.asarray(modes + self.lower + self.upper * s**2 / (1.0 + (s / (2.0 * np.pi * self.upper_hz)) ** 2))
+        near = 1.0 + (s / (2.0 * np.pi * self.upper_hz)) ** 2
+        rest = self.lower + self.upper * s**2 / near
+        if self.small_terms is not None:
+            rest = rest + np.hstack([1.0 / s, 1.0 / s**2, s**3 / near**2]) @ self.small_terms.T
+        return np.asarray(modes + rest)
 
     def receptance(self, frequency_hz: ArrayLike, output: str | None = None, *, without: int | None = None) -> Complex:
         """complex[n]: displacement of a channel (the drive point if None) over drive force, m/N."""

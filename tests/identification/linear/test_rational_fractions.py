@@ -10,7 +10,8 @@ from tests.identification.linear.structures import DAMPING, FAR_HZ, FREQUENCY_HZ
 def test_derivatives_by_the_poles_are_those_of_finite_differences(normal: bool) -> None:
     s = 2j * np.pi * np.array([15.0, 19.97, 34.0, 60.0])
     poles = np.concatenate([2 * np.pi * FREQUENCY_HZ, DAMPING, [1e-6]])
-    terms = np.random.default_rng(0).normal(size=(2, 5 if normal else 8))
+    terms = np.random.default_rng(0).normal(size=(2, 8 if normal else 11))
+    terms[:, -5:] *= [1.0, 1e2, 1e4, 1e-5, 1e-8]  # residual terms of like size in this band
     analytic = pole_derivatives(s, poles, terms, normal)
     for index in range(poles.size):
         step = np.zeros(poles.size)
@@ -26,7 +27,7 @@ def test_a_modal_model_without_noise_is_found_exactly_from_a_poor_start(normal: 
     fit = fit_modes(weighted_accelerance(measured()), start, normal=normal)
     assert fit.converged
     # Errors of 100 % a line leave the prior on the pole above the band a say; the modes must not feel it.
-    np.testing.assert_allclose(fit.omega, 2 * np.pi * FREQUENCY_HZ, rtol=1e-6)
+    np.testing.assert_allclose(fit.omega, 2 * np.pi * FREQUENCY_HZ, rtol=3e-6)
     np.testing.assert_allclose(fit.zeta, DAMPING, rtol=1e-3)
     np.testing.assert_allclose(fit.terms[:, :3], SHAPES * SHAPES[0], rtol=1e-3, atol=1e-3)
     assert 1 / (2 * np.pi * np.sqrt(fit.poles[-1])) == pytest.approx(FAR_HZ, rel=0.1)
