@@ -37,9 +37,10 @@ def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
         return
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
-    low, high = np.maximum(1.0 - mode.interval("mac")[order, ::-1].T, 1e-12)
+    away = np.maximum(1.0 - mode.mac[order], 1e-12)
+    low, high = np.maximum(1.0 - mode.interval("mac")[order, ::-1].T, 0.1 * np.nanmin(away))  # to zero, off the axis
     axis.fill_between(amplitude, low, high, color=MAIN, alpha=0.2, lw=0)
-    axis.semilogy(amplitude, np.maximum(1.0 - mode.mac[order], 1e-12), "o-", ms=4, color=MAIN)
+    axis.semilogy(amplitude, away, "o-", ms=4, color=MAIN)
     axis.set(xlabel=f"displacement amplitude, {unit}", ylabel="1 - MAC against the linear shape")
 
 

@@ -13,6 +13,10 @@ from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 MODES = {"magnet-beam": 0, "magnet-beam-symmetric": 0, "friction-beam": 2}
+FINE_STEPS = {
+    "magnet-beam": {"substeps": 8, "oversampling": 8},
+    "friction-beam": {"substeps": 16, "oversampling": 4},
+}
 FILTERED = {"oversampling": 4, "anti_alias_hz": 1500.0, "anti_alias_order": 8, "substeps": 8}
 
 
@@ -115,23 +119,29 @@ def test_random_errors_are_those_of_runs_that_differ_by_noise_alone() -> None:
         assert 0.6 < ratio < 1.25, name
 
 
-def test_the_truth_lies_in_the_interval_where_the_outputs_stairs_do_not_alias() -> None:
-    virtual = VirtualRig.shipped("magnet-beam")
-    levels = load_plan("magnet-beam/backbone").levels
-    truth = phase_resonance_backbone(virtual, voltages_v=beside(levels))
-    speeds = 2j * np.pi * np.outer(truth.frequency_hz, np.arange(16)) * truth.drive_harmonics_m
-    powers = np.real(truth.force_harmonics_n * np.conj(speeds))
-    recorded = (
-        truth.damping_ratio_total_power * powers[:, 1:8].sum(axis=1) / powers[:, 1:].sum(axis=1)
-    )  # seven harmonics
-    hits = []
-    for seed in range(1, 9):
-        backbone = measured("magnet-beam", seed, converter=FILTERED)
+@pytest.mark.parametrize(
+    ("name", "seeds"),
+    [("magnet-beam", 5), pytest.param("magnet-beam", 20, marks=pytest.mark.slow), ("friction-beam", 5),
+     pytest.param("friction-beam", 20, marks=pytest.mark.slow)],
+)  # fmt: skip
+def test_the_truth_lies_in_the_interval(name: str, seeds: int) -> None:
+    virtual, levels = VirtualRig.shipped(name), load_plan(f"{name}/backbone").levels
+    steps = FINE_STEPS[name]  # harmonic balance knows no time step
+    near = np.linspace(0.994, 1.004, 11)
+    truth = phase_resonance_backbone(virtual, voltages_v=np.outer(levels, near).ravel())
+    seen_m = truth.amplitude_m / np.hypot(1.0, virtual.sensors[0].high_pass_hz / truth.frequency_hz)
+    rows = [slice(11 * level, 11 * level + 11) for level in range(len(levels))]
+    hits: dict[str, list[np.ndarray]] = {"modal_frequency_hz": [], "damping_ratio": []}
+    for seed in range(1, seeds + 1):
+        backbone = measured(name, seed, converter=steps)
         mode = nonlinear_mode(backbone, seed=seed)  # the drive point alone, as harmonic balance has its amplitude
-        low, high = mode.interval("damping_ratio_total_power").T
-        exact = PchipInterpolator(truth.amplitude_m, recorded)(mode.amplitude_m)
-        hits.append((low <= exact) & (exact <= high))
-    assert 0.88 <= np.mean(hits) <= 0.995
+        for quantity, hit in hits.items():
+            low, high = mode.interval(quantity).T
+            exact = getattr(truth, quantity)
+            at = [np.interp(a, seen_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)]
+            hit.append((low <= at) & (at <= high))
+    for quantity, hit in hits.items():
+        assert 0.85 <= np.mean(hit) <= 1.0 if seeds < 20 else 0.88 <= np.mean(hit) <= 0.995, (quantity, np.mean(hit))
 
 
 def test_scatter_of_the_specimen_from_run_to_run_is_recovered() -> None:

@@ -69,6 +69,8 @@ def shown_default(field: Any) -> str:
     value = field.default
     if value in (None, "", PydanticUndefined) or isinstance(value, BaseModel):
         return "–"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"  # as TOML has it
     return f"`{shown_number(value) if isinstance(value, float) else value}`"
 
 
