@@ -20,11 +20,19 @@ FINE_STEPS = {
 FILTERED = {"oversampling": 4, "anti_alias_hz": 1500.0, "anti_alias_order": 8, "substeps": 8}
 
 
+def fine(name: str) -> BackbonePlan:
+    """The plan for models, at the levels of the paper's."""
+    plan = load_plan(f"{name}/backbone")
+    if name == "magnet-beam-symmetric":
+        return plan
+    return load_plan(f"{name}/backbone-fine").model_copy(update={"levels_v": plan.levels_v})
+
+
 def measured(
     name: str, seed: int, plan: BackbonePlan | None = None, changes: dict | None = None, **options
 ) -> Backbone:
     bench = bench_with(changes, name=name, **options)
-    with rig.run(plan or load_plan(f"{name}/backbone"), bench=bench, seed=seed) as run:
+    with rig.run(plan or fine(name), bench=bench, seed=seed) as run:
         return run.backbone()
 
 
@@ -97,7 +105,7 @@ def test_a_linear_rig_returns_its_own_damping(name: str) -> None:
     k = MODES[name]
     modes = virtual.linear_modes
     levels = (1.0, 1.5, 2.0)
-    plan = load_plan(f"{name}/backbone")
+    plan = fine(name)
     centre = float(modes.frequency_hz[k])
     controller = plan.controller.model_copy(
         update={"centre_frequency_hz": centre, "frequency_window_hz": (0.9 * centre, 1.1 * centre)}
@@ -119,12 +127,9 @@ def test_random_errors_are_those_of_runs_that_differ_by_noise_alone() -> None:
         assert 0.6 < ratio < 1.25, name
 
 
-@pytest.mark.parametrize(
-    ("name", "seeds"),
-    [("magnet-beam", 5), pytest.param("magnet-beam", 20, marks=pytest.mark.slow), ("friction-beam", 5),
-     pytest.param("friction-beam", 20, marks=pytest.mark.slow)],
-)  # fmt: skip
-def test_the_truth_lies_in_the_interval(name: str, seeds: int) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["magnet-beam", "friction-beam"])
+def test_the_truth_lies_in_the_interval(name: str) -> None:
     virtual, levels = VirtualRig.shipped(name), load_plan(f"{name}/backbone").levels
     steps = FINE_STEPS[name]  # harmonic balance knows no time step
     near = np.linspace(0.994, 1.004, 11)
@@ -132,7 +137,7 @@ def test_the_truth_lies_in_the_interval(name: str, seeds: int) -> None:
     seen_m = truth.amplitude_m / np.hypot(1.0, virtual.sensors[0].high_pass_hz / truth.frequency_hz)
     rows = [slice(11 * level, 11 * level + 11) for level in range(len(levels))]
     hits: dict[str, list[np.ndarray]] = {"modal_frequency_hz": [], "damping_ratio": []}
-    for seed in range(1, seeds + 1):
+    for seed in range(1, 16):
         backbone = measured(name, seed, converter=steps)
         mode = nonlinear_mode(backbone, seed=seed)  # the drive point alone, as harmonic balance has its amplitude
         for quantity, hit in hits.items():
@@ -141,7 +146,7 @@ def test_the_truth_lies_in_the_interval(name: str, seeds: int) -> None:
             at = [np.interp(a, seen_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)]
             hit.append((low <= at) & (at <= high))
     for quantity, hit in hits.items():
-        assert 0.85 <= np.mean(hit) <= 1.0 if seeds < 20 else 0.88 <= np.mean(hit) <= 0.995, (quantity, np.mean(hit))
+        assert 0.88 <= np.mean(hit) <= 0.998, (quantity, np.mean(hit))
 
 
 def test_scatter_of_the_specimen_from_run_to_run_is_recovered() -> None:

@@ -91,10 +91,12 @@ def test_the_examples_of_the_document_run(output, monkeypatch):
     with JournalWriter.create("other.journal", header()):
         pass
     codes = re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.S)
-    assert len(codes) == 2
     for code in codes:
         exec(code, found := {})
-    assert found["first_second"].shape == (5000, 4)
+        if "first_second" in found:
+            assert found["first_second"].shape == (5000, 4)
+            return
+    pytest.fail("no example reads the first second")
 
 
 def test_the_journal_and_the_file_made_of_it_say_the_same(tmp_path):
