@@ -18,13 +18,15 @@ from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.validation import finite_array
 
-__all__ = ["FLAGGED_BEYOND", "REFUSED_BEYOND", "Damping", "ExtrapolationError", "ModalProperties"]
+__all__ = ["FLAGGED_BEYOND", "HIGHER_LEVELS", "REFUSED_BEYOND", "Damping", "ExtrapolationError", "ModalProperties"]
 
 Float = NDArray[np.float64]
 Damping = Literal["fundamental", "total-power"]
 
 FLAGGED_BEYOND = 1.25
 REFUSED_BEYOND = 2.0
+HIGHER_LEVELS = "measure higher levels, or allow extrapolation (allow_extrapolation, --allow-extrapolation)"
+"""What to do about an `ExtrapolationError`, from Python and at the command line."""
 _TAIL_FROM = 0.5
 _FEWEST_TAIL_LEVELS = 3
 _SAME_LEVEL = 0.02
@@ -203,7 +205,7 @@ class ModalProperties:
         if amplitude.size and not np.max(amplitude) <= self.highest_q:
             raise ExtrapolationError(
                 f"modal amplitude: {np.max(amplitude):g} kg^1/2 m is {np.max(self.range_use(amplitude)):.2f} times the "
-                f"largest identified, allowed is up to {REFUSED_BEYOND:g}; measure higher levels, or allow_extrapolation"
+                f"largest identified, allowed is up to {REFUSED_BEYOND:g}; {HIGHER_LEVELS}"
             )
         held = np.clip(amplitude, *self.q_range)
         interval = np.searchsorted(self.modal_amplitude, held, side="right") - 1

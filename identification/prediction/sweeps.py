@@ -31,7 +31,13 @@ from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.exciter import Exciter
 from identification.prediction.kernels import DIVERGED, modal_rate, slow_flow
-from identification.prediction.properties import FLAGGED_BEYOND, REFUSED_BEYOND, ExtrapolationError, ModalProperties
+from identification.prediction.properties import (
+    FLAGGED_BEYOND,
+    HIGHER_LEVELS,
+    REFUSED_BEYOND,
+    ExtrapolationError,
+    ModalProperties,
+)
 from identification.prediction.sweep_inputs import SweepInput, VoltageSweep, force_input, voltage_input
 from identification.prediction.sweep_prediction import SweepPrediction
 from identification.signals.half_periods import HalfPeriods
@@ -181,7 +187,7 @@ def _integrate(
         if not p.allow_extrapolation:
             raise ExtrapolationError(
                 f"modal amplitude: exceeds {REFUSED_BEYOND:g} times the largest identified ({p.q_range[1]:.4g} kg^1/2 m) "
-                f"{where}; identify higher levels, or allow_extrapolation"
+                f"{where}; {HIGHER_LEVELS}"
             )
         notes += (f"the amplitude is unbounded: the prediction ends {where}",)
     amplitude, rate = out[:count], rate[:count]
