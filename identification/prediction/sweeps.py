@@ -75,7 +75,7 @@ def predict_sweep(
     mode
         Identified mode, or its properties over the modal amplitude (``damping`` and ``allow_extrapolation`` are theirs then).
     sweep
-        Without ``exciter`` the force is imposed: fundamentals (`Transient`) or half periods of the recorded force. With
+        Without ``exciter`` the force is imposed: fundamentals (`Transient`) or (half) periods of the recorded force. With
         it the voltage is: that of a recording (`Transient`), or a `VoltageSweep` that is yet to be made.
     exciter
         Exciter of this very rig.

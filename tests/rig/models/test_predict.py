@@ -99,7 +99,14 @@ def test_a_sweep_that_is_yet_to_be_made_is_the_one_that_is_then_recorded(at_shel
     assert names[2:] == [f"planned {v} V, 18 to 34 Hz, 2 Hz/s" for v in (0.4, 0.9)]
 
 
-@pytest.mark.parametrize(("options", "origin"), [("", "demodulation"), (" --zero-crossings", "zero crossings")])
+@pytest.mark.parametrize(
+    ("options", "origin"),
+    [
+        ("", "demodulation"),
+        (" --zero-crossings half-periods", "zero crossings"),
+        (" --zero-crossings periods", "zero crossings"),
+    ],
+)
 def test_without_an_exciter_the_recorded_force_is_imposed(at_shelf, options, origin):
     done = at_shelf(f"predict NM.h5 --sweep sweep.h5{options} --allow-extrapolation --json")
     assert done.status == 0, done.err
@@ -144,8 +151,12 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
         ("NM.h5 --frequency-response 0.1 --force peak", "--force = 'peak': allowed are fundamental, rms, pure-sine"),
         ("NM.h5 --reference stepped.h5 --over time", "--over = 'time': allowed are frequency, phase"),
         ("NM.h5 --frequency-response 0.1 --exciter EX.h5", "--exciter: is for sweeps, and none is given"),
-        ("NM.h5 --frequency-response 0.1 --zero-crossings", "--zero-crossings: is for recorded sweeps"),
-        ("NM.h5 --sweep sweep.h5 --exciter EX.h5 --zero-crossings", "--zero-crossings: are those of an imposed force"),
+        ("NM.h5 --sweep sweep.h5 --zero-crossings all", "--zero-crossings = 'all': allowed are half-periods, periods"),
+        ("NM.h5 --frequency-response 0.1 --zero-crossings periods", "--zero-crossings: is for recorded sweeps"),
+        (
+            "NM.h5 --sweep sweep.h5 --exciter EX.h5 --zero-crossings periods",
+            "--zero-crossings: are those of an imposed force",
+        ),
         ("NM.h5 --sweep sweep.h5 --exciter LIN.h5", "LIN.h5: holds a linear-modes, wanted is"),
         ("NM.h5 --sweep sweep.h5 --modes EX.h5", "EX.h5: holds a exciter, wanted is"),
         ("NM.h5 --sweep backbone.h5", "holds a backbone, wanted is a sweep recording"),
