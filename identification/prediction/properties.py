@@ -141,14 +141,15 @@ class ModalProperties:
             max(_slope(q[last], z[last]), 0.0),
             shape[-1],
         )
+        cubics = _pchip(q, np.column_stack([omega, z, shape]))
         return cls(
             modal_amplitude=q,
             omega_rad_s=omega,
             damping=z,
             drive_shape_at=shape,
-            omega_coefficients=_pchip(q, omega),
-            damping_coefficients=_pchip(q, z),
-            drive_shape_coefficients=_pchip(q, shape),
+            omega_coefficients=cubics[0],
+            damping_coefficients=cubics[1],
+            drive_shape_coefficients=cubics[2],
             tail=np.array(tail),
             allow_extrapolation=allow_extrapolation,
         )
@@ -228,12 +229,12 @@ def _merged(table: Float) -> Float:
 
 
 def _pchip(q: Float, values: Float) -> Float:
-    """float[4, max(n - 1, 1)]: cubics of the monotone interpolation, highest power first."""
+    """float[m, 4, max(n - 1, 1)]: cubics of the monotone interpolation of [n, m] values, highest power first."""
     if q.size == 1:
-        return np.array([[0.0], [0.0], [0.0], [values[0]]])
+        return np.concatenate([np.zeros((values.shape[1], 3, 1)), values.T[:, :, None]], axis=1)
     from scipy.interpolate import PchipInterpolator
 
-    return np.asarray(PchipInterpolator(q, values).c)
+    return np.ascontiguousarray(np.moveaxis(PchipInterpolator(q, values).c, 2, 0))
 
 
 def _slope(x: Float, y: Float) -> float:
