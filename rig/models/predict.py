@@ -162,7 +162,7 @@ def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
         return cast(tuple[FrequencyResponse, ...], load_as(FREQUENCY_RESPONSES, path))
     if kind != "stepped-sine":
         raise RecordingError(
-            f"{path}: holds a {kind}; a reference is a stepped-sine recording or imported stepped sines"
+            f"{path}: is a file of kind {kind}; a reference is a stepped-sine recording or imported stepped sines"
         )
     with Recording(path) as recording:
         return frequency_responses(recording)
