@@ -234,5 +234,7 @@ class Exciter:
                 source=attributes["source"],
                 notes=tuple(attributes["notes"]),
             )
+        except IdentificationError:
+            raise
         except (KeyError, TypeError, ValueError) as error:
             raise IdentificationError(f"exciter: {error} is missing or unknown") from None
