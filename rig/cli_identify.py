@@ -58,8 +58,13 @@ def predict(
         Path | None, typer.Option(help="Exciter model: sweeps are predicted from the voltage, not from the force.")
     ] = None,
     zero_crossings: Annotated[
-        bool, typer.Option("--zero-crossings", help="Read an imposed force from its zero crossings, as the paper did.")
-    ] = False,
+        str | None,
+        typer.Option(
+            metavar="WHICH",
+            help="Read an imposed force between its zero crossings, as the paper did: half-periods (between all of them) or "
+            "periods (those in the same direction).",
+        ),
+    ] = None,
     modes: Annotated[Path | None, typer.Option(help="Linear model: other modes and other sensors.")] = None,
     reference: Annotated[
         list[Path] | None,

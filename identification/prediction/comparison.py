@@ -119,7 +119,8 @@ def compare(
     channel
         Predicted channel that belongs to the response; the drive point if None.
     over
-        ``frequency``: at each frequency of the reference the stable prediction; where there are two, the nearer one.
+        ``frequency``: at each frequency of the reference the stable prediction; where there are two, the nearer one. A
+        response to the recorded force is compared point by point, unstable states included.
         ``phase``: at each phase lag of the reference, which tells all branches apart, unstable ones included.
     phase_window_deg
         Only points of the reference whose lag is within this of 90 degrees count for the envelope error.
@@ -137,6 +138,8 @@ def compare(
     used = np.abs(reference.phase_lag_deg - 90.0) <= phase_window_deg
     if over == "phase":
         predicted = _at_lags(prediction, amplitude, channel, reference.phase_lag_deg)
+    elif prediction.force == "recorded" and np.array_equal(prediction.frequency_hz, reference.frequency_hz):
+        predicted = amplitude
     else:
         predicted = _at_frequencies(prediction, amplitude, reference)
     used &= np.isfinite(predicted)

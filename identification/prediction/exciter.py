@@ -218,6 +218,11 @@ class Exciter:
         """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
         try:
             values = finite_array("values", arrays["values"], np.float64, 1)
+            if values.size != len(PARAMETERS):
+                raise IdentificationError(
+                    f"exciter: has {values.size} parameters, needs {len(PARAMETERS)} ({', '.join(PARAMETERS)}); "
+                    "identify it anew"
+                )
             lowest, highest, residual = np.asarray(arrays["fit"], dtype=np.float64).tolist()
             return cls(
                 **dict(zip(PARAMETERS, values.tolist(), strict=True)),
@@ -229,5 +234,7 @@ class Exciter:
                 source=attributes["source"],
                 notes=tuple(attributes["notes"]),
             )
+        except IdentificationError:
+            raise
         except (KeyError, TypeError, ValueError) as error:
             raise IdentificationError(f"exciter: {error} is missing or unknown") from None

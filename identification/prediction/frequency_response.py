@@ -11,7 +11,7 @@ from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.motion import fundamental_motion, range_notes
-from identification.prediction.properties import ExtrapolationError, ModalProperties
+from identification.prediction.properties import HIGHER_LEVELS, ExtrapolationError, ModalProperties
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.prediction.steady_states import OneMode, Path
 from identification.validation import positive
@@ -46,8 +46,8 @@ def frequency_response(
     force
         What "constant" means. ``fundamental``: |F_1| is held, and the force has the harmonics that the exciter gave it
         when the mode was identified, whose power is in the damping. ``rms``: the same with the RMS of the whole force held;
-        the ratio of fundamental to RMS is interpolated over q as recorded at phase resonance. ``pure-sine``: a force
-        without harmonics, with the damping from the total power.
+        the ratio of fundamental to RMS is interpolated over q as recorded at phase resonance, and a note says so.
+        ``pure-sine``: a force without harmonics, with the damping from the total power.
     modes
         Linear modes, for the responses at their other channels (the tested mode's shape, scaled by the drive point's
         response), and for the contribution of the other modes.
@@ -81,6 +81,10 @@ def frequency_response(
     )
     one = OneMode(properties, _fundamental(mode, level, force))
     paths, notes = _branches(one, level)
+    if force == "rms":
+        notes.append(
+            "the force's harmonics per fundamental are those recorded at phase resonance, off resonance as well"
+        )
     s = [_parameters(one, path, points | 1, lowest_share) for path in paths]  # odd: the largest q is among them
     q, sign = np.concatenate([path.at(each) for path, each in zip(paths, s, strict=True)], axis=1)
     omega = one.omega(q, sign)
@@ -142,11 +146,7 @@ def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
     limit = min(one.properties.highest_q, _FARTHEST * largest)
     paths, opened = one.paths(limit)
     if opened is not None and (opened <= largest or not paths):
-        advice = (
-            "measure higher levels"
-            if one.properties.allow_extrapolation
-            else ("measure higher levels, or allow_extrapolation")
-        )
+        advice = "measure higher levels" if one.properties.allow_extrapolation else HIGHER_LEVELS
         raise ExtrapolationError(
             f"force_n: {level:g} N drives the mode beyond {limit / largest:g} times the largest modal amplitude "
             f"identified ({largest:g} kg^1/2 m); {advice}"

@@ -18,13 +18,15 @@ from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.validation import finite_array
 
-__all__ = ["FLAGGED_BEYOND", "REFUSED_BEYOND", "Damping", "ExtrapolationError", "ModalProperties"]
+__all__ = ["FLAGGED_BEYOND", "HIGHER_LEVELS", "REFUSED_BEYOND", "Damping", "ExtrapolationError", "ModalProperties"]
 
 Float = NDArray[np.float64]
 Damping = Literal["fundamental", "total-power"]
 
 FLAGGED_BEYOND = 1.25
 REFUSED_BEYOND = 2.0
+HIGHER_LEVELS = "measure higher levels, or allow extrapolation (allow_extrapolation, --allow-extrapolation)"
+"""What to do about an `ExtrapolationError`, from Python and at the command line."""
 _TAIL_FROM = 0.5
 _FEWEST_TAIL_LEVELS = 3
 _SAME_LEVEL = 0.02
@@ -139,14 +141,15 @@ class ModalProperties:
             max(_slope(q[last], z[last]), 0.0),
             shape[-1],
         )
+        cubics = _pchip(q, np.column_stack([omega, z, shape]))
         return cls(
             modal_amplitude=q,
             omega_rad_s=omega,
             damping=z,
             drive_shape_at=shape,
-            omega_coefficients=_pchip(q, omega),
-            damping_coefficients=_pchip(q, z),
-            drive_shape_coefficients=_pchip(q, shape),
+            omega_coefficients=cubics[0],
+            damping_coefficients=cubics[1],
+            drive_shape_coefficients=cubics[2],
             tail=np.array(tail),
             allow_extrapolation=allow_extrapolation,
         )
@@ -203,7 +206,7 @@ class ModalProperties:
         if amplitude.size and not np.max(amplitude) <= self.highest_q:
             raise ExtrapolationError(
                 f"modal amplitude: {np.max(amplitude):g} kg^1/2 m is {np.max(self.range_use(amplitude)):.2f} times the "
-                f"largest identified, allowed is up to {REFUSED_BEYOND:g}; measure higher levels, or allow_extrapolation"
+                f"largest identified, allowed is up to {REFUSED_BEYOND:g}; {HIGHER_LEVELS}"
             )
         held = np.clip(amplitude, *self.q_range)
         interval = np.searchsorted(self.modal_amplitude, held, side="right") - 1
@@ -226,12 +229,12 @@ def _merged(table: Float) -> Float:
 
 
 def _pchip(q: Float, values: Float) -> Float:
-    """float[4, max(n - 1, 1)]: cubics of the monotone interpolation, highest power first."""
+    """float[m, 4, max(n - 1, 1)]: cubics of the monotone interpolation of [n, m] values, highest power first."""
     if q.size == 1:
-        return np.array([[0.0], [0.0], [0.0], [values[0]]])
+        return np.concatenate([np.zeros((values.shape[1], 3, 1)), values.T[:, :, None]], axis=1)
     from scipy.interpolate import PchipInterpolator
 
-    return np.asarray(PchipInterpolator(q, values).c)
+    return np.ascontiguousarray(np.moveaxis(PchipInterpolator(q, values).c, 2, 0))
 
 
 def _slope(x: Float, y: Float) -> float:

@@ -33,7 +33,8 @@ class SteadyPrediction:
     force_n
         Force held: peak of its fundamental (N), or its RMS (N) where ``force`` is ``rms``.
     force
-        What is held: ``fundamental`` (its harmonics as recorded), ``rms`` (as recorded), ``pure-sine`` (no harmonics).
+        What is held: ``fundamental`` (its harmonics as recorded), ``rms`` (as recorded), ``pure-sine`` (no harmonics);
+        or ``recorded``: each point has the force that it had in a test, and ``force_n`` is their median.
     channels
         Names of the points, the drive point first.
     frequency_hz, modal_amplitude, fundamental_n
@@ -70,7 +71,7 @@ class SteadyPrediction:
     @property
     def name(self) -> str:
         """What was predicted, for tables."""
-        kind = {"fundamental": "", "rms": " RMS", "pure-sine": " pure sine"}[self.force]
+        kind = {"fundamental": "", "rms": " RMS", "pure-sine": " pure sine", "recorded": " recorded"}[self.force]
         return f"{self.force_n:g} N{kind}"
 
     def motion_m(self, channel: str | None = None) -> Complex:

@@ -98,8 +98,12 @@ class OneMode:
         opened = ends.pop() if inside[-1] else None
         return [Path(low, high, low > 0.0) for low, high in zip(ends[::2], ends[1::2], strict=True)], opened
 
-    def amplitudes(self, omega: float, highest_q: float) -> Float:
-        """float[n]: all modal amplitudes up to ``highest_q`` that are steady states at the frequency ``omega``, rising."""
+    def amplitudes(self, omega: float, highest_q: float, *, missed: float = 0.0) -> Float:
+        """float[n]: all modal amplitudes up to ``highest_q`` that are steady states at the frequency ``omega``, rising.
+
+        With ``missed`` those too at which the force misses a pair of solutions, just beyond their fold, by less than that
+        share of itself: once for the pair.
+        """
         from scipy.optimize import brentq
 
         def surplus(q: Float) -> Float:
@@ -108,9 +112,14 @@ class OneMode:
         grid = highest_q * np.geomspace(_LOWEST_SHARE, 1.0, _GRID)
         values = surplus(grid)
         changes = np.flatnonzero((values[1:] > 0.0) != (values[:-1] > 0.0))
-        return np.array(
-            [brentq(lambda q: float(surplus(np.array(q))), grid[k], grid[k + 1], rtol=1e-12) for k in changes]
-        )
+        found = [brentq(lambda q: float(surplus(np.array(q))), grid[k], grid[k + 1], rtol=1e-12) for k in changes]
+        before, here, after = values[:-2], values[1:-1], values[2:]
+        bend = before - 2.0 * here + after
+        turns = (here - before) * (after - here) < 0.0
+        close = np.abs(here) < missed * self.modal_force(grid[1:-1])
+        near = np.flatnonzero(turns & close & (here * bend > 0.0))  # a maximum below zero, a minimum above
+        shift = 0.5 * (before - after)[near] / bend[near]
+        return np.sort([*found, *(grid[near + 1] * (grid[1] / grid[0]) ** shift)])
 
     def omega(self, q: Float, sign: Float) -> Float:
         """float[n]: frequency W of the vibration, rad/s; NaN where that branch has none (below its static deflection)."""

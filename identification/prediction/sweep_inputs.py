@@ -11,10 +11,13 @@ from identification.signals.half_periods import HalfPeriods
 from identification.signals.transients import Transient
 from identification.validation import positive
 
-__all__ = ["SweepInput", "VoltageSweep", "force_input", "voltage_input"]
+__all__ = ["BY_ZERO_CROSSINGS", "SweepInput", "VoltageSweep", "force_input", "voltage_input"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
+
+BY_ZERO_CROSSINGS = "force by zero crossings"
+"""Origin of a force whose phase is not the sweep's: what follows from it has no phase to compare."""
 
 _INSTANTS_PER_PERIOD = 16
 _FEWEST_PER_PERIOD = 8
@@ -98,7 +101,7 @@ def voltage_input(source: Transient | VoltageSweep, channel: str) -> SweepInput:
 
 
 def force_input(source: Transient | HalfPeriods) -> SweepInput:
-    """The force of a recorded sweep: fundamentals, or half periods joined by monotone cubics with a phase of zero."""
+    """The force of a recorded sweep: fundamentals, or (half) periods joined by monotone cubics with a phase of zero."""
     if isinstance(source, Transient):
         force = source.fundamentals[find_role(source.channels, "force")]
         return _even(source, force, source.window_periods, "force by demodulation")
@@ -108,7 +111,7 @@ def force_input(source: Transient | HalfPeriods) -> SweepInput:
     frequency, magnitude = (
         PchipInterpolator(source.time_s, values)(time_s) for values in (source.frequency_hz, source.magnitude)
     )
-    return SweepInput(time_s, frequency, magnitude.astype(np.complex128), 0, "force by zero crossings")
+    return SweepInput(time_s, frequency, magnitude.astype(np.complex128), 0, BY_ZERO_CROSSINGS)
 
 
 def _instants(start_s: float, stop_s: float, highest_hz: float) -> Float:

@@ -11,7 +11,7 @@ from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.prediction.comparison import PredictionError
 from identification.prediction.properties import ModalProperties
-from identification.prediction.sweep_inputs import SweepInput
+from identification.prediction.sweep_inputs import BY_ZERO_CROSSINGS, SweepInput
 from identification.signals.transients import Transient
 
 __all__ = ["SweepPrediction", "as_recorded", "compare_sweep"]
@@ -104,10 +104,19 @@ class SweepPrediction:
         """Largest modal amplitude over the largest identified."""
         return float(np.max(np.abs(self.modal_amplitude))) / self.largest_identified
 
-    def peak(self) -> tuple[float, float]:
-        """Largest displacement of the drive point (m), and the frequency (Hz) at which it occurs."""
+    def peak(self, sweep: Transient | None = None) -> tuple[float, float]:
+        """Largest displacement of the drive point (m), and the frequency (Hz) at which it occurs.
+
+        With the recorded ``sweep`` that is the sweep's own frequency at that instant: the one between zero crossings jumps.
+        """
         where = int(np.argmax(np.abs(self.drive_m)))
-        return float(abs(self.drive_m[where])), float(self.frequency_hz[where])
+        return float(abs(self.drive_m[where])), float(self.swept_hz(sweep)[where])
+
+    def swept_hz(self, sweep: Transient | None = None) -> Float:
+        """float[n]: frequency at each instant, Hz; that of the recorded ``sweep`` where the force is by zero crossings."""
+        if sweep is None or self.origin != BY_ZERO_CROSSINGS:
+            return self.frequency_hz
+        return np.asarray(np.interp(self.time_s, sweep.time_s, sweep.frequency_hz))
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Arrays by name, and the attributes (ready for JSON) that go with them."""
@@ -144,9 +153,11 @@ def as_recorded(prediction: SweepPrediction, sweep: Transient) -> tuple[Float, F
     """
     row = find_role(sweep.channels, "drive")
     order = MOTION_ORDER[sweep.channels[row].motion]
+    measured = np.abs(sweep.fundamentals[row]) / (2.0 * np.pi * sweep.frequency_hz) ** order
+    if prediction.origin == BY_ZERO_CROSSINGS:
+        return measured, np.abs(prediction.drive_m), np.abs(prediction.force)
     motion = (prediction.drive_m, prediction.drive_m_s, prediction.drive_m_s2)[order]
     window = 0 if prediction.window_periods else sweep.window_periods
-    measured = np.abs(sweep.fundamentals[row]) / (2.0 * np.pi * sweep.frequency_hz) ** order
     smoothed = np.abs(prediction.smoothed(motion, window))
     predicted = smoothed / (2.0 * np.pi * prediction.frequency_hz) ** order
     return measured, predicted, np.abs(prediction.smoothed(prediction.force, window))
@@ -157,7 +168,10 @@ def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = 
 
     Compared is the fundamental of the drive channel, be it displacement, velocity or acceleration, over that power of the
     momentary W that makes it a displacement. The prediction is smoothed like the recording, which lowers a fast
-    sweep's peak. Raises `IdentificationError` where they have no time in common, or the recording no drive channel.
+    sweep's peak. Where the force is by zero crossings, frequency and phase jump: there the predicted displacement is taken
+    as it is, and the sweep's own frequency at the instant of its peak.
+
+    Raises `IdentificationError` where they have no time in common, or the recording no drive channel.
     """
     measured, predicted, _ = as_recorded(prediction, sweep)
     common = (sweep.time_s >= prediction.time_s[0]) & (sweep.time_s <= prediction.time_s[-1])
@@ -171,7 +185,7 @@ def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = 
     return PredictionError(
         name=name or prediction.origin,
         peak_error=float(predicted[here] / measured[there]) - 1.0,
-        peak_frequency_error=float(prediction.frequency_hz[here] / sweep.frequency_hz[there]) - 1.0,
+        peak_frequency_error=float(prediction.swept_hz(sweep)[here] / sweep.frequency_hz[there]) - 1.0,
         envelope_error=float(np.sqrt(np.mean(difference**2)) / measured[there]),
         range_use=prediction.range_use,
         notes=prediction.notes,

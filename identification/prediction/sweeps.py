@@ -31,7 +31,13 @@ from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.exciter import Exciter
 from identification.prediction.kernels import DIVERGED, modal_rate, slow_flow
-from identification.prediction.properties import FLAGGED_BEYOND, REFUSED_BEYOND, ExtrapolationError, ModalProperties
+from identification.prediction.properties import (
+    FLAGGED_BEYOND,
+    HIGHER_LEVELS,
+    REFUSED_BEYOND,
+    ExtrapolationError,
+    ModalProperties,
+)
 from identification.prediction.sweep_inputs import SweepInput, VoltageSweep, force_input, voltage_input
 from identification.prediction.sweep_prediction import SweepPrediction
 from identification.signals.half_periods import HalfPeriods
@@ -44,7 +50,7 @@ Float = NDArray[np.float64]
 
 _Tables = tuple[Float, Float, Float, Float, Float]
 
-_TABLE_SIZE = 512
+_TABLE_SIZE = 1024
 _UNBOUNDED = 1e3  # times the identified range: there the integration of an imposed force ends
 _AT_REST = 1e-3
 _SETTLED = 12.0  # time constants
@@ -69,7 +75,7 @@ def predict_sweep(
     mode
         Identified mode, or its properties over the modal amplitude (``damping`` and ``allow_extrapolation`` are theirs then).
     sweep
-        Without ``exciter`` the force is imposed: fundamentals (`Transient`) or half periods of the recorded force. With
+        Without ``exciter`` the force is imposed: fundamentals (`Transient`) or (half) periods of the recorded force. With
         it the voltage is: that of a recording (`Transient`), or a `VoltageSweep` that is yet to be made.
     exciter
         Exciter of this very rig.
@@ -124,10 +130,8 @@ def _coupled(
 ) -> tuple[Complex, Complex, Complex, Complex]:
     """``N V + N' V'`` and ``N V'`` (complex[n]), the load L (complex[n, 3]), and r of the other modes (complex[n, 2]).
 
-    All are smooth functions of frequency: they and their derivatives by s come from a table's cubic spline.
+    All are smooth functions of frequency: they and their derivatives by s are read from a fine table, on straight lines.
     """
-    from scipy.interpolate import CubicSpline
-
     low, high = float(given.frequency_hz.min()), float(given.frequency_hz.max())
     table_hz = np.linspace(low * (1.0 - 1e-6), high * (1.0 + 1e-6), _TABLE_SIZE)
     s = 2j * np.pi * table_hz
@@ -138,14 +142,16 @@ def _coupled(
     stiffness = exciter.dynamic_stiffness(s)
     shared = 1.0 + stiffness * (others + exciter.stinger_compliance(s))
     per_volt = exciter.force_per_volt(s) * exciter.path.factor(table_hz) / shared
-    columns = CubicSpline(table_hz, np.column_stack([per_volt, stiffness / shared, others]))
-    by_s = 1.0 / (2j * np.pi)
-    at = given.frequency_hz
-    value, slope, curvature = columns(at), by_s * columns(at, 1), by_s**2 * columns(at, 2)
+    value = np.column_stack([per_volt, stiffness / shared, others])
+    slope = np.gradient(value, s, axis=0, edge_order=2)
+    curvature = np.gradient(slope[:, 1], s, edge_order=2)
+    table = np.column_stack([value, slope, curvature])
+    place = (given.frequency_hz - table_hz[0]) / (table_hz[1] - table_hz[0])
+    row = place.astype(np.int64)
+    found = table[row] + (place - row)[:, None] * np.diff(table, axis=0)[row]
     rate = np.gradient(given.amplitude, given.step_s)
-    drive = value[:, 0] * given.amplitude + slope[:, 0] * rate
-    load = np.column_stack([value[:, 1], slope[:, 1], curvature[:, 1]])
-    return drive, value[:, 0] * rate, load, np.column_stack([value[:, 2], slope[:, 2]])
+    drive = found[:, 0] * given.amplitude + found[:, 3] * rate
+    return drive, found[:, 0] * rate, found[:, [1, 4, 6]], found[:, [2, 5]]
 
 
 def _integrate(
@@ -181,7 +187,7 @@ def _integrate(
         if not p.allow_extrapolation:
             raise ExtrapolationError(
                 f"modal amplitude: exceeds {REFUSED_BEYOND:g} times the largest identified ({p.q_range[1]:.4g} kg^1/2 m) "
-                f"{where}; identify higher levels, or allow_extrapolation"
+                f"{where}; {HIGHER_LEVELS}"
             )
         notes += (f"the amplitude is unbounded: the prediction ends {where}",)
     amplitude, rate = out[:count], rate[:count]

@@ -33,6 +33,10 @@ def plot(source: Path, figure: Path) -> None:
 
     if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+    if figure.is_dir():
+        raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
+    if figure.exists() and source.exists() and figure.samefile(source):
+        raise RecordingError(f"{figure}: is the file that is read; choose another name")
     kind = kind_of(source)
     with mpl.rc_context(STYLE):
         page = Figure(figsize=(9.0, 6.4), layout="constrained")

@@ -35,7 +35,7 @@ def load(path: Path) -> Any:
     """What `save` wrote; `RecordingError` where the file holds a recording or is damaged."""
     name, arrays, attributes = read_arrays(path)
     if name not in KINDS:
-        raise RecordingError(f"{path}: holds a {name}; known are {', '.join(KINDS)}")
+        raise RecordingError(f"{path}: is a file of kind {name}; known are {', '.join(KINDS)}")
     return KINDS[name].unpack(arrays, attributes)
 
 
@@ -43,5 +43,5 @@ def load_as(kind: Kind, path: Path) -> Any:
     """The same where one kind alone will do; `RecordingError` for any other."""
     found = kind_of(path)
     if found != kind.name:
-        raise RecordingError(f"{path}: holds a {found}, wanted is a {kind.name} file")
+        raise RecordingError(f"{path}: is a file of kind {found}, wanted is one of kind {kind.name}")
     return load(path)

@@ -29,7 +29,7 @@ from rig.models.files import load_as
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.identify import modes_in
 from rig.models.nonlinear_mode import NONLINEAR_MODE
-from rig.models.predict_sweeps import SweepModels, Swept, planned_sweeps, recorded_sweeps
+from rig.models.predict_sweeps import CROSSINGS, SweepModels, Swept, planned_sweeps, recorded_sweeps
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
@@ -53,8 +53,8 @@ class PredictionRequest:
     """Recordings whose sweeps are predicted."""
     planned: tuple[str, ...] = ()
     """Plans of sweeps that are yet to be made, by name or file."""
-    zero_crossings: bool = False
-    """Whether an imposed force is read from its zero crossings, the founding paper's way, or demodulated."""
+    zero_crossings: str | None = None
+    """Imposed force from its zero crossings, the founding paper's way: ``half-periods`` or ``periods``; else demodulated."""
     exciter: Path | None = None
     """Exciter model: sweeps are predicted from the voltage, else from the recorded force."""
     modes: Path | None = None
@@ -74,14 +74,15 @@ class PredictionRequest:
         for name, value, allowed in (
             ("--force", self.held, get_args(HeldForce)),
             ("--over", self.over, get_args(Over)),
+            ("--zero-crossings", self.zero_crossings, (None, *CROSSINGS)),
         ):
             if value not in allowed:
-                raise ConfigurationError(f"{name} = {value!r}: allowed are {', '.join(allowed)}")
-        if self.exciter is not None and self.zero_crossings:
+                raise ConfigurationError(f"{name} = {value!r}: allowed are {', '.join(filter(None, allowed))}")
+        if self.exciter is not None and self.zero_crossings is not None:
             raise ConfigurationError(
                 "--zero-crossings: are those of an imposed force; with --exciter the voltage is imposed"
             )
-        if self.zero_crossings and not self.sweeps:
+        if self.zero_crossings is not None and not self.sweeps:
             raise ConfigurationError("--zero-crossings: is for recorded sweeps; add --sweep, or leave it out")
         if self.exciter is not None and not (self.sweeps or self.planned):
             raise ConfigurationError(
@@ -161,7 +162,7 @@ def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
         return cast(tuple[FrequencyResponse, ...], load_as(FREQUENCY_RESPONSES, path))
     if kind != "stepped-sine":
         raise RecordingError(
-            f"{path}: holds a {kind}; a reference is a stepped-sine recording or imported stepped sines"
+            f"{path}: is a file of kind {kind}; a reference is a stepped-sine recording or imported stepped sines"
         )
     with Recording(path) as recording:
         return frequency_responses(recording)

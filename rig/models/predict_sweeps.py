@@ -24,7 +24,10 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.recording.reader import Recording
 
-__all__ = ["SweepModels", "Swept", "planned_sweeps", "recorded_sweeps"]
+__all__ = ["CROSSINGS", "SweepModels", "Swept", "planned_sweeps", "recorded_sweeps"]
+
+CROSSINGS = ("half-periods", "periods")
+"""Between which zero crossings a force can be read: all of them, or those in the same direction."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,8 @@ class SweepModels:
     """The other modes."""
     exciter: Exciter | None
     """Exciter; without it the recorded force is imposed."""
-    zero_crossings: bool
-    """Whether that force is read from its zero crossings."""
+    zero_crossings: str | None
+    """Between which zero crossings that force is read, one of `CROSSINGS`; None if it is demodulated."""
     allow_extrapolation: bool
     """Whether to answer beyond twice the largest modal amplitude identified."""
 
@@ -79,7 +82,8 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
             notes += (f"{path}: is not complete; sweeps accepted, and predicted: {len(recorded)}",)
         for number, sweep in recorded.items():
             name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
-            predicted = models.predict(_half_periods(recording, number) if models.zero_crossings else sweep)
+            which = models.zero_crossings
+            predicted = models.predict(sweep if which is None else _between_crossings(recording, number, which))
             yield Swept(predicted, _force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), notes)
 
 
@@ -114,12 +118,12 @@ def _strangers(bench: Bench, models: SweepModels, source: str) -> tuple[str, ...
     return tuple(notes)
 
 
-def _half_periods(recording: Recording, number: int) -> HalfPeriods:
+def _between_crossings(recording: Recording, number: int, which: str) -> HalfPeriods:
     """The force of a recorded sweep between its zero crossings."""
     bench = bench_of_recording(recording)
     column = next(index for index, channel in enumerate(bench.channels) if channel.role == "force")
     force = point_rows(recording, number)["inputs"][:, column].astype(float)
-    return zero_crossings(force, sample_rate_hz=bench.sample_rate_hz)
+    return zero_crossings(force, sample_rate_hz=bench.sample_rate_hz, whole_periods=which == "periods")
 
 
 def _force_and_drive(sweep: Transient) -> Transient:

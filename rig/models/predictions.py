@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from identification import FrequencyResponse, Predictions, ResponseBand, SteadyPrediction, SweepPrediction
+from identification import FrequencyResponse, Predictions, ResponseBand, SteadyPrediction, SweepPrediction, Transient
 from rig.console import number, print_table
 from rig.figures.predictions import draw_predictions
 from rig.models.kind import Kind
@@ -32,8 +32,8 @@ def _steady(
     }
 
 
-def _sweep(sweep: SweepPrediction, name: str) -> dict[str, Any]:
-    peak_m, peak_hz = sweep.peak()
+def _sweep(sweep: SweepPrediction, recorded: Transient | None, name: str) -> dict[str, Any]:
+    peak_m, peak_hz = sweep.peak(recorded)
     return {
         "name": name,
         "origin": sweep.origin,
@@ -52,7 +52,7 @@ def _summarise(predictions: Predictions) -> dict[str, Any]:
     return {
         "specimen": predictions.specimen,
         "frequency_responses": [_steady(*each) for each in steady],
-        "sweeps": [_sweep(sweep, name) for sweep, name in zip(predictions.sweeps, names, strict=True)],
+        "sweeps": [_sweep(*each) for each in zip(predictions.sweeps, predictions.sweep_references, names, strict=True)],
         "errors": [error.row() for error in predictions.errors],
         "notes": list(predictions.notes),
     }

@@ -10,12 +10,23 @@ import numpy as np
 import pytest
 
 import rig
-from identification import Channel, LinearModes, Transient, nonlinear_mode
+from identification import (
+    Channel,
+    LinearModes,
+    NonlinearMode,
+    Transient,
+    compare,
+    nonlinear_mode,
+    recorded_force_response,
+    zero_crossings,
+)
 from identification.prediction.exciter import Exciter
 from identification.prediction.exciter_fit import identify_exciter
 from identification.prediction.properties import ModalProperties
 from identification.prediction.sweep_prediction import compare_sweep
 from identification.prediction.sweeps import predict_sweep
+from rig.campaigns.plans import plan_from
+from rig.measurements import point_rows
 from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
@@ -38,9 +49,13 @@ def exciter_of(bench: str, noise: float = 1.0) -> Exciter:
 
 
 @cache
-def properties_of(bench: str) -> ModalProperties:
+def mode_of(bench: str) -> NonlinearMode:
     with rig.run(f"{bench}/backbone") as run:
-        return ModalProperties.of(nonlinear_mode(run.backbone()))
+        return nonlinear_mode(run.backbone())
+
+
+def properties_of(bench: str) -> ModalProperties:
+    return ModalProperties.of(mode_of(bench))
 
 
 @cache
@@ -116,3 +131,30 @@ def test_with_the_force_imposed_a_frequency_error_captures_the_slow_sweep() -> N
     captured = compare_sweep(predict_sweep(wrong, sweep), sweep)
     assert captured.peak_error > 1.0
     assert captured.verdict == "extrapolated far"
+
+
+def test_with_the_force_by_whole_periods_the_slow_sweep_is_captured_outright() -> None:
+    """Founding paper, magnet beam's second sweep: six times too large and far beyond its frequency."""
+    with rig.run("magnet-beam/sweep-2") as run:
+        ((number, sweep),) = run.sweeps().items()
+        force = point_rows(run.recording, number)["inputs"][:, 0].astype(float)
+    p = replace(properties_of("magnet-beam"), allow_extrapolation=True)
+    errors = {}
+    for whole in (False, True):
+        periods = zero_crossings(force, sample_rate_hz=5000.0, whole_periods=whole)
+        errors[whole] = compare_sweep(predict_sweep(p, periods), sweep)
+    assert 0.1 < errors[False].peak_error < 0.4
+    assert abs(errors[False].peak_frequency_error) < 0.05
+    assert 4.0 < errors[True].peak_error < 8.0
+    assert errors[True].peak_frequency_error > 0.3
+
+
+def test_a_constant_voltage_between_the_folds_is_predicted_on_the_states_it_held() -> None:
+    plan = {"kind": "stepped-sine", "bench": "magnet-beam", "start_hz": 24.3, "stop_hz": 25.2, "steps": 10}
+    with rig.run(plan_from(plan | {"levels_v": [1.5], "record_periods": 10}, "plan")) as run:
+        (reference,) = run.frequency_responses()
+    predicted = recorded_force_response(mode_of("magnet-beam"), reference, modes=modes_of("magnet-beam"))
+    assert np.count_nonzero(~predicted.stable) >= 3
+    error = compare(predicted, reference).error
+    assert abs(error.peak_error) < 0.02
+    assert error.envelope_error < 0.01

@@ -121,6 +121,10 @@ def test_arrays_that_lack_something_are_refused() -> None:
     del arrays["path"]
     with pytest.raises(IdentificationError, match="path"):
         Exciter.from_arrays(arrays, attributes)
+    arrays = TRUE.to_arrays()[0]
+    arrays["values"] = arrays["values"][:-1]
+    with pytest.raises(IdentificationError, match=r"^exciter: has 7 parameters, needs 8 .*; identify it anew$"):
+        Exciter.from_arrays(arrays, attributes)
 
 
 def test_bad_input_is_named() -> None:

@@ -13,6 +13,7 @@ from identification import (
     LinearModes,
     ModalProperties,
     NonlinearMode,
+    compare,
     frequency_response,
     recorded_force_response,
     response_band,
@@ -144,6 +145,8 @@ def test_what_constant_force_means_makes_the_difference() -> None:
     np.testing.assert_allclose(rms.fundamental_n, 0.5, rtol=1e-12)
     sine = frequency_response(mode, 0.5, force="pure-sine")
     assert sine.peak().amplitude_m == pytest.approx(fundamental.peak().amplitude_m / 0.9, rel=1e-5)
+    assert (fundamental.notes, sine.notes) == ((), ())
+    assert "off resonance" in rms.notes[0]
     assert (fundamental.name, rms.name[-4:], sine.name) == ("0.5 N", " RMS", "0.5 N pure sine")
 
 
@@ -197,6 +200,29 @@ def test_a_stepped_test_with_recorded_force_jumps_at_the_fold_that_its_direction
     found = recorded_force_response(mode, FrequencyResponse(frequency, ones, ones, "displacement", "force", 1.0))
     jump = int(np.argmax(np.abs(np.diff(found.modal_amplitude))))
     assert frequency[jump] == pytest.approx(upper if up else lower, abs=0.01)
+
+
+def test_a_test_at_constant_voltage_holds_states_that_are_unstable_under_its_force() -> None:
+    """All states of a response at constant force, as if each had been held: no other rule could tell three of them apart."""
+    mode = duffing(Q)
+    truth = frequency_response(mode, 1.0)
+    assert not truth.stable.all()
+    held = FrequencyResponse(
+        truth.frequency_hz, np.ones(truth.stable.size, complex), truth.motion_m(), "displacement", "voltage", 1.0
+    )
+    found = recorded_force_response(mode, held)
+    # next to a fold two states have nearly the same lag, and the force of either is nearly that of the fold
+    np.testing.assert_allclose(found.modal_amplitude, truth.modal_amplitude, rtol=0.05)
+    assert (
+        np.count_nonzero(np.abs(found.modal_amplitude / truth.modal_amplitude - 1.0) > 1e-6) < 0.02 * truth.stable.size
+    )
+    assert np.count_nonzero(found.stable != truth.stable) < 0.02 * truth.stable.size
+    assert any("unstable under constant force" in note for note in found.notes)
+    error = compare(found, held).error
+    assert abs(error.peak_error) < 1e-6
+    assert error.envelope_error < 1e-3
+    by_force = recorded_force_response(mode, replace(held, controlled="force"))
+    assert compare(by_force, held).error.envelope_error > 0.05
 
 
 def test_extrapolation_is_flagged_and_refused() -> None:

@@ -177,6 +177,21 @@ def test_zero_crossings_and_demodulation_agree_on_a_pure_force() -> None:
     assert abs(one[-1] / other[-1] - 1.0) < 0.01
 
 
+def test_a_force_by_zero_crossings_is_compared_by_its_displacement(recorded: Transient) -> None:
+    """One rogue half period: frequency and phase jump, which an acceleration would multiply and a displacement does not."""
+    time_s = np.arange(0.0, 2.0, 0.02)
+    clean = HalfPeriods(time_s, 20.0 + 4.0 * time_s, np.full(time_s.size, 2.0))
+    jumping = clean.frequency_hz.copy()
+    jumping[60] = 60.0
+    for force in (clean, HalfPeriods(time_s, jumping, clean.magnitude)):
+        prediction = predict_sweep(duffing(4e-3), force)
+        error = compare_sweep(prediction, recorded)
+        largest = np.max(np.abs(recorded.fundamentals[1]))
+        assert error.peak_error == pytest.approx(prediction.peak()[0] / largest - 1.0)
+        at_s = prediction.time_s[np.argmax(np.abs(prediction.drive_m))]
+        assert prediction.peak(recorded)[1] == pytest.approx(20.0 + 4.0 * at_s, abs=1e-3)
+
+
 def test_beyond_twice_the_identified_amplitude_nothing_is_predicted_unless_allowed(recorded: Transient) -> None:
     with pytest.raises(ExtrapolationError, match="exceeds 2 times the largest identified"):
         predict_sweep(duffing(5e-4), recorded, exciter=EXCITER)

@@ -21,6 +21,9 @@ def test_an_even_harmonic_makes_half_periods_unequal_and_their_sum_a_period() ->
     halves = 0.5 / result.frequency_hz
     assert np.abs(np.diff(halves)).min() > 1e-3
     np.testing.assert_allclose(halves[1:] + halves[:-1], 1 / 25.0, rtol=1e-3)
+    whole = zero_crossings(np.sin(turn) + 0.3 * np.cos(2 * turn), sample_rate_hz=RATE_HZ, whole_periods=True)
+    np.testing.assert_allclose(whole.frequency_hz, 25.0, rtol=1e-3)
+    np.testing.assert_allclose(whole.magnitude, 1.3, rtol=1e-3)  # -1 - 0.3, at three quarters of the turn
 
 
 def test_samples_of_exactly_zero_are_neither_missed_nor_counted_twice() -> None:
@@ -36,3 +39,5 @@ def test_samples_of_exactly_zero_are_neither_missed_nor_counted_twice() -> None:
 def test_a_signal_that_never_returns_is_refused() -> None:
     with pytest.raises(IdentificationError, match="signal: has 1 zero crossings, needs at least 2"):
         zero_crossings(np.linspace(-1.0, 2.0, 100), sample_rate_hz=RATE_HZ)
+    with pytest.raises(IdentificationError, match="signal: has 1 upward zero crossings, needs at least 2"):
+        zero_crossings([1.0, -1.0, 1.0, -1.0], sample_rate_hz=RATE_HZ, whole_periods=True)

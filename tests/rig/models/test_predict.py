@@ -85,6 +85,19 @@ def test_a_file_of_predictions_is_shown_and_drawn(at_shelf, command, tmp_path):
     assert (tmp_path / "P.png").stat().st_size > 50_000
 
 
+def test_a_figure_replaces_no_folder_and_not_its_own_source(command, shelf, tmp_path):
+    shutil.copy(shelf / "NM.h5", tmp_path / "model.png")
+    before = (tmp_path / "model.png").read_bytes()
+    done = command(f"plot {tmp_path}/model.png -o {tmp_path}/model.png")
+    assert done.status != 0
+    assert "model.png: is the file that is read; choose another name" in done.err
+    assert (tmp_path / "model.png").read_bytes() == before
+    (tmp_path / "folder.png").mkdir()
+    done = command(f"plot {shelf}/NM.h5 -o {tmp_path}/folder.png")
+    assert done.status != 0
+    assert "folder.png: is a folder" in done.err
+
+
 def test_a_sweep_that_is_yet_to_be_made_is_the_one_that_is_then_recorded(at_shelf, tmp_path):
     (tmp_path / "plan.toml").write_text(
         'kind = "sweep"\nbench = "magnet-beam"\nstart_hz = 18.0\nstop_hz = 34.0\nrate_hz_per_s = 2.0\n'
@@ -99,7 +112,14 @@ def test_a_sweep_that_is_yet_to_be_made_is_the_one_that_is_then_recorded(at_shel
     assert names[2:] == [f"planned {v} V, 18 to 34 Hz, 2 Hz/s" for v in (0.4, 0.9)]
 
 
-@pytest.mark.parametrize(("options", "origin"), [("", "demodulation"), (" --zero-crossings", "zero crossings")])
+@pytest.mark.parametrize(
+    ("options", "origin"),
+    [
+        ("", "demodulation"),
+        (" --zero-crossings half-periods", "zero crossings"),
+        (" --zero-crossings periods", "zero crossings"),
+    ],
+)
 def test_without_an_exciter_the_recorded_force_is_imposed(at_shelf, options, origin):
     done = at_shelf(f"predict NM.h5 --sweep sweep.h5{options} --allow-extrapolation --json")
     assert done.status == 0, done.err
@@ -136,20 +156,30 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
     [
         ("NM.h5", "nothing to predict: give --frequency-response, --sweep, --planned-sweep or --reference"),
         ("nothing.h5 --frequency-response 0.1", "nothing.h5"),
-        ("LIN.h5 --frequency-response 0.1", "LIN.h5: holds a linear-modes, wanted is"),
+        ("LIN.h5 --frequency-response 0.1", "LIN.h5: is a file of kind linear-modes, wanted is one of kind "),
         ("NM.h5 --frequency-response 0", "force_n: is 0 N"),
         ("NM.h5 --frequency-response nan", "force_n: is nan N"),
         ("NM.h5 --frequency-response -0.1", "force_n: is -0.1 N"),
-        ("NM.h5 --frequency-response 2", "beyond 2 times the largest modal amplitude identified"),
+        (
+            "NM.h5 --frequency-response 2",
+            "measure higher levels, or allow extrapolation (allow_extrapolation, --allow-",
+        ),
         ("NM.h5 --frequency-response 0.1 --force peak", "--force = 'peak': allowed are fundamental, rms, pure-sine"),
         ("NM.h5 --reference stepped.h5 --over time", "--over = 'time': allowed are frequency, phase"),
         ("NM.h5 --frequency-response 0.1 --exciter EX.h5", "--exciter: is for sweeps, and none is given"),
-        ("NM.h5 --frequency-response 0.1 --zero-crossings", "--zero-crossings: is for recorded sweeps"),
-        ("NM.h5 --sweep sweep.h5 --exciter EX.h5 --zero-crossings", "--zero-crossings: are those of an imposed force"),
-        ("NM.h5 --sweep sweep.h5 --exciter LIN.h5", "LIN.h5: holds a linear-modes, wanted is"),
-        ("NM.h5 --sweep sweep.h5 --modes EX.h5", "EX.h5: holds a exciter, wanted is"),
+        ("NM.h5 --sweep sweep.h5 --zero-crossings all", "--zero-crossings = 'all': allowed are half-periods, periods"),
+        ("NM.h5 --frequency-response 0.1 --zero-crossings periods", "--zero-crossings: is for recorded sweeps"),
+        (
+            "NM.h5 --sweep sweep.h5 --exciter EX.h5 --zero-crossings periods",
+            "--zero-crossings: are those of an imposed force",
+        ),
+        ("NM.h5 --sweep sweep.h5 --exciter LIN.h5", "LIN.h5: is a file of kind linear-modes, wanted is one of kind "),
+        (
+            "NM.h5 --sweep sweep.h5 --modes EX.h5",
+            "EX.h5: is a file of kind exciter, wanted is one of kind linear-modes",
+        ),
         ("NM.h5 --sweep backbone.h5", "holds a backbone, wanted is a sweep recording"),
-        ("NM.h5 --reference sweep.h5", "holds a sweep; a reference is a stepped-sine recording"),
+        ("NM.h5 --reference sweep.h5", "sweep.h5: is a file of kind sweep; a reference is a stepped-sine recording"),
         ("NM.h5 --planned-sweep magnet-beam/sweep-1", "--planned-sweep: gives a voltage, which needs an exciter"),
         ("NM.h5 --planned-sweep magnet-beam/backbone --exciter EX.h5", "kind backbone, wanted is a sweep"),
         ("NM.h5 --planned-sweep nowhere.toml --exciter EX.h5", "nowhere.toml"),
