@@ -20,7 +20,7 @@ from identification import (
 from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
 from rig.exchange.backbone_table import backbone_from, backbone_parts
-from rig.exchange.contents import Contents, unit_of
+from rig.exchange.contents import Contents, Labels, unit_of
 from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
 from rig.exchange.time_data import TimeData
 
@@ -32,8 +32,9 @@ def _nonlinear_mode(mode: NonlinearMode) -> Contents:
     size = len(mode.force_n)
     rows = {name: 0 for name, array in arrays.items() if array.ndim and array.shape[0] == size}
     units = np.array([unit_of(name) for name in QUANTITIES])
-    further = {"systematic_std": units, "interval_95": units[:, None]}
-    labels = {"systematic_std": (QUANTITIES,), "interval_95": (QUANTITIES, ("low", "high"))}
+    further = {"systematic_std": units, "random_std": units, "interval_95": units[:, None]}
+    labels: dict[str, Labels] = dict.fromkeys(("systematic_std", "random_std"), (QUANTITIES,))
+    labels |= {"interval_95": (QUANTITIES, ("low", "high"))}
     return Contents("nonlinear-mode", mode.specimen, arrays, attributes, rows, further, labels)
 
 
