@@ -159,6 +159,16 @@ class NonlinearMode:
         """float[n, 2]: lower and upper end of the 95 % interval of ``quantity``."""
         return np.asarray(self.interval_95[:, _column(quantity)])
 
+    def bound_95(self, quantity: str) -> Float:
+        """float[n]: what to print behind +-: the distance to the farther end of the 95 % interval of ``quantity``.
+
+        Where the interval is not known, 1.96 standard errors.
+        """
+        ends = self.interval(quantity)
+        farther = np.max(np.abs(ends - np.asarray(getattr(self, quantity))[:, None]), axis=1)
+        normal = 1.96 * np.asarray(getattr(self, STANDARD_ERRORS[quantity]))
+        return np.asarray(np.where(np.isfinite(farther), farther, normal))
+
     @property
     def frequency_shift(self) -> float:
         """Modal frequency at the largest amplitude over that at the smallest, minus one."""
@@ -174,6 +184,8 @@ class NonlinearMode:
     def table(self) -> list[dict[str, float | None]]:
         """One dictionary per point, with None for what could not be had: ready for JSON."""
         columns = {name: getattr(self, name) for name in _TABLE}
+        columns["modal_frequency_bound_95_hz"] = self.bound_95("modal_frequency_hz")
+        columns["damping_ratio_bound_95"] = self.bound_95("damping_ratio")
         columns["f2_over_f1"] = self.force_harmonic_ratio(2)
         columns["f3_over_f1"] = self.force_harmonic_ratio(3)
         rows = range(len(self.force_n))
