@@ -90,6 +90,14 @@ def test_close_modes_and_coarse_lines_are_named() -> None:
     assert any("Hz: half-power bandwidth" in note for note in notes)
 
 
+@pytest.mark.parametrize("signs", [(-1.0, -1.0), (-1.0, 1.0)])
+def test_a_reversed_force_or_drive_channel_is_refused_and_polarity_named(signs: tuple[float, float]) -> None:
+    responses = measured(11, 0.1, exact=accelerance() * np.array(signs))
+    for modes in (None, 3, list(FREQUENCY_HZ)):
+        with pytest.raises(IdentificationError, match=r"residue of -.*polarity of force or drive channel is reversed"):
+            linear_modes(responses, modes=modes)
+
+
 def test_what_a_modal_analysis_needs_is_asked_for() -> None:
     responses = measured(7, 0.5)
     with pytest.raises(IdentificationError, match="'drive'"):
