@@ -43,7 +43,8 @@ def _linear_modes(modes: LinearModes) -> Contents:
     names = tuple(channel.name for channel in modes.channels)
     shapes = {name: 1 for name in arrays if name.startswith("shapes")}
     rows = {name: 0 for name, array in arrays.items() if array.shape == modes.frequency_hz.shape and name not in _SIDES}
-    units = {"lower": "1/kg", "upper": "s2/kg", "force_rms_n": "N"}
+    units: dict[str, Any] = {"lower": "1/kg", "upper": "s2/kg", "force_rms_n": "N", "residues": "1/kg"}
+    units["small_terms"] = np.array(["1/(kg s)", "1/(kg s2)", "s3/kg"])
     labels = dict.fromkeys(shapes, (names,))
     return Contents("linear-modes", modes.specimen, arrays, attributes, rows | shapes, units, labels)
 
