@@ -24,6 +24,15 @@ def identify(
     count: Annotated[
         int | None, typer.Option("--count", help="Number of modes of a linear model; found if left out.", min=1)
     ] = None,
+    resistance: Annotated[
+        float | None, typer.Option(metavar="OHM", help="Of an exciter's coil, cable and amplifier, if measured.")
+    ] = None,
+    amplifier_gain: Annotated[
+        float | None, typer.Option(metavar="V/V", help="Of the exciter's voltage amplifier; 1 if left out.")
+    ] = None,
+    stinger_stiffness: Annotated[
+        float | None, typer.Option(metavar="N_PER_M", help="Of the exciter's stinger (E A / l), if known.")
+    ] = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -32,7 +41,16 @@ def identify(
     from rig.models.identify import Request, identify_model
 
     keep_existing(files, output, overwrite)
-    request = Request(kind=model, modes=modes, estimator=estimator, band_hz=band, count=count)
+    request = Request(
+        kind=model,
+        modes=modes,
+        estimator=estimator,
+        band_hz=band,
+        count=count,
+        resistance_ohm=resistance,
+        amplifier_gain=amplifier_gain,
+        stinger_stiffness_n_m=stinger_stiffness,
+    )
     save(identify_model(files, request), output)
     show_file(output, json)
 

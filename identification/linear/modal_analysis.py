@@ -175,7 +175,9 @@ def _without_spurious(
             out = {int(np.argmin(prominence)): "is the least prominent"}
         names = [f"pole at {fit.omega[index] / (2 * np.pi):.5g} Hz {reason}" for index, reason in out.items()]
         if (out and not (modes is None or isinstance(modes, int))) or len(out) == count:
-            raise IdentificationError(f"modes: {'; '.join(names)}; no mode there that can be normalised")
+            reversed_ = any("residue of -" in name for name in names)
+            hint = ", or the polarity of force or drive channel is reversed" if reversed_ else ""
+            raise IdentificationError(f"modes: {'; '.join(names)}; no mode there that can be normalised{hint}")
         if not out:
             if isinstance(modes, int) and count < modes:
                 found = ", ".join(f"{f:.5g}" for f in np.sort(fit.omega) / (2 * np.pi))

@@ -10,7 +10,7 @@ from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
 from identification.linear.errors_in_variables import driven_responses, is_driven, over_force
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.linear.subspace import observable_space
+from identification.linear.subspace import observable_space, telling_rows
 from identification.validation import read_only
 
 __all__ = ["StabilisationDiagram", "stabilisation"]
@@ -20,6 +20,8 @@ Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
 _ORDERS = tuple(range(2, 41, 2))
+_LOWEST = 6
+"""Orders up to this one are tried however narrow the band is."""
 _LARGEST_DAMPING = 0.1
 
 
@@ -114,7 +116,7 @@ def stabilisation(
     responses
         One or several inputs and outputs, every output a motion; or force and motions over a voltage.
     orders
-        Numbers of states, 2 to 40 in steps of two if None (fewer where there are few lines).
+        Numbers of states, 2 to 40 in steps of two if None; fewer where there are few lines or the band is narrow.
     weighting
         As in `linear_modes`.
     frequency_tolerance, damping_tolerance
@@ -142,11 +144,15 @@ def diagram(
     """`stabilisation` of weighted accelerances."""
     lines, outputs, inputs = data.value.shape
     most = 2 * lines * inputs // (outputs + inputs) - 2
-    tried = sorted({order for order in _ORDERS if order <= most} if orders is None else set(orders))
+    middle = float(np.sqrt(np.abs(data.s[0]) * np.abs(data.s[-1])))
+    z = np.asarray((1.0 + data.s / middle) / (1.0 - data.s / middle))
+    if orders is None:
+        highest = min(most, max(telling_rows(z, _ORDERS[-1] + 2) - 2, _LOWEST))
+        orders = [order for order in _ORDERS if order <= highest]
+    tried = sorted(set(orders))
     if not tried or tried[0] < 1:
         raise IdentificationError(f"orders: {tried or 'none'} for {lines} lines, needs numbers from 1 to {most}")
-    middle = float(np.sqrt(np.abs(data.s[0]) * np.abs(data.s[-1])))
-    space = observable_space(data, np.asarray((1.0 + data.s / middle) / (1.0 - data.s / middle)), max(tried) + 2)
+    space = observable_space(data, z, max(tried) + 2)
     band_hz = (data.frequency_hz[0], data.frequency_hz[-1])
     parts: list[tuple[NDArray[np.generic], ...]] = []
     before: tuple[Float, Float, Complex] = (np.zeros(0), np.zeros(0), np.zeros((0, outputs), dtype=np.complex128))

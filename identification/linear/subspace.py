@@ -20,10 +20,15 @@ from identification.linear.accelerance import WeightedResponses, Weighting, weig
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.validation import positive
 
-__all__ = ["ObservableSpace", "StateSpace", "observable_space", "subspace"]
+__all__ = ["ObservableSpace", "StateSpace", "observable_space", "subspace", "telling_rows"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
+
+_TELLING = 1e-7
+"""Part of a block row, relative to the first, that those before it must not make up; sums have sixteen digits."""
+_FLOOR = 1e-13
+"""Least variance of a combination of block rows, relative to that of the rows: rounding of the sums stays below."""
 
 
 class StateSpace(NamedTuple):
@@ -95,9 +100,28 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
         number = np.arange(block_rows)
         apart = np.abs(number[:, None] - number)
         blocks = np.where((number[:, None] >= number)[:, :, None, None], lags[apart], lags[apart].swapaxes(2, 3))
-        colour = np.linalg.cholesky(blocks.swapaxes(1, 2).reshape(remainder.shape))
+        colour = _root(blocks.swapaxes(1, 2).reshape(remainder.shape))
     vectors, values, _ = np.linalg.svd(np.linalg.solve(colour, remainder))
     return ObservableSpace(np.asarray(colour @ vectors), values, outputs)
+
+
+def telling_rows(z: Complex, most: int) -> int:
+    """Block rows, at most so many, that points ``z`` tell apart: few where a narrow band is a short arc of the circle."""
+    powers = z[:, None] ** np.arange(most)
+    triangle = np.linalg.qr(np.vstack([powers.real, powers.imag]), mode="r")
+    own = np.abs(np.diag(triangle))
+    return int(np.argmin(np.append(own > _TELLING * own[0], False)))
+
+
+def _root(covariance: Float) -> Float:
+    """Lower triangle L with ``L L^T`` the covariance, floored.
+
+    Powers of z over a short arc of the circle (a narrow band) nearly depend on each other, and so does their noise.
+    """
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    correlation = covariance / np.outer(size, size)
+    floored = correlation + _FLOOR * np.eye(size.size)
+    return np.asarray(size[:, None] * np.linalg.cholesky(floored))
 
 
 def subspace(

@@ -80,7 +80,9 @@ class NonlinearMode:
         float[n], standard errors of the quantities of these names, everything that is known counted.
     systematic_std
         float[n, n_quantities], the part of the standard errors that all points share (shapes, calibration), in the order
-        of `QUANTITIES`; it does not become less by more points. See `systematic` and `random`.
+        of `QUANTITIES`; it does not become less by more points. See `systematic`.
+    random_std
+        float[n, n_quantities], the part that each point has for itself; see `random`.
     interval_95
         float[n, n_quantities, 2], interval that holds the true value in 95 % of cases; see `interval`.
     fit_residual
@@ -126,11 +128,13 @@ class NonlinearMode:
     force_purity_std: Float = field(default_factory=_unknown)
     response_purity_std: Float = field(default_factory=_unknown)
     systematic_std: Float = field(default_factory=_unknown)
+    random_std: Float = field(default_factory=_unknown)
     interval_95: Float = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
         n = len(self.force_n)
-        further = {"systematic_std": (n, len(QUANTITIES)), "interval_95": (n, len(QUANTITIES), 2)}
+        further: dict[str, tuple[int, ...]] = dict.fromkeys(("systematic_std", "random_std"), (n, len(QUANTITIES)))
+        further["interval_95"] = (n, len(QUANTITIES), 2)
         for name in _ARRAYS:
             harmonic = name in _HARMONICS
             array = read_only(getattr(self, name), np.complex128 if harmonic else np.float64)
@@ -148,13 +152,22 @@ class NonlinearMode:
         return np.asarray(self.systematic_std[:, _column(quantity)])
 
     def random(self, quantity: str) -> Float:
-        """float[n]: standard error of ``quantity`` that each point has for itself."""
-        total = np.asarray(getattr(self, STANDARD_ERRORS[QUANTITIES[_column(quantity)]]))
-        return np.asarray(np.sqrt(np.maximum(total**2 - self.systematic(quantity) ** 2, 0.0)))
+        """float[n]: standard error of ``quantity`` that each point has for itself; NaN if unknown."""
+        return np.asarray(self.random_std[:, _column(quantity)])
 
     def interval(self, quantity: str) -> Float:
         """float[n, 2]: lower and upper end of the 95 % interval of ``quantity``."""
         return np.asarray(self.interval_95[:, _column(quantity)])
+
+    def bound_95(self, quantity: str) -> Float:
+        """float[n]: what to print behind +-: the distance to the farther end of the 95 % interval of ``quantity``.
+
+        Where the interval is not known, 1.96 standard errors.
+        """
+        ends = self.interval(quantity)
+        farther = np.max(np.abs(ends - np.asarray(getattr(self, quantity))[:, None]), axis=1)
+        normal = 1.96 * np.asarray(getattr(self, STANDARD_ERRORS[quantity]))
+        return np.asarray(np.where(np.isfinite(farther), farther, normal))
 
     @property
     def frequency_shift(self) -> float:
@@ -171,6 +184,8 @@ class NonlinearMode:
     def table(self) -> list[dict[str, float | None]]:
         """One dictionary per point, with None for what could not be had: ready for JSON."""
         columns = {name: getattr(self, name) for name in _TABLE}
+        columns["modal_frequency_bound_95_hz"] = self.bound_95("modal_frequency_hz")
+        columns["damping_ratio_bound_95"] = self.bound_95("damping_ratio")
         columns["f2_over_f1"] = self.force_harmonic_ratio(2)
         columns["f3_over_f1"] = self.force_harmonic_ratio(3)
         rows = range(len(self.force_n))

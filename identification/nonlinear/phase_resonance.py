@@ -91,13 +91,15 @@ def nonlinear_mode(
         frequency is that of the vibration, and a note says so. Standard errors hold those of the Fourier coefficients,
         of the drift, of the shapes (where ``modes`` has them) and what is given here of the sensors. They do not hold
         what the output's stairs fold into readings without anti-alias filter, or the run-to-run scatter of the
-        specimen (`identification.combined` has that).
+        specimen and of the level that a run comes to rest at (`identification.combined` has that): at one voltage the
+        friction beam's amplitudes differ by up to 5e-5 from run to run, several of their standard errors; frequency,
+        damping and apparent mass at the amplitude that was reached do not.
 
     Raises
     ------
     IdentificationError
-        On unsettled points, a force or motion that is zero or drowns in noise, a modal frequency that is not real, modes
-        or channels that do not fit.
+        On unsettled points, a force or motion that is zero or drowns in noise, a modal frequency that is not real, negative
+        damping at most points (reversed polarity), modes or channels that do not fit.
     """
     notes: tuple[str, ...] = ()
     if modes is not None:
@@ -150,7 +152,7 @@ def _refuse(name: str, point: PeriodicVibration) -> None:
 
 
 def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
-    """Refuse points without a real modal frequency, or without a modal amplitude."""
+    """Refuse points without a real modal frequency or a modal amplitude, and a reversed polarity."""
     for number, point in enumerate(backbone.points):
         name = f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)"
         if found["modal_amplitude"][number] == 0.0:
@@ -160,6 +162,13 @@ def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
                 f"{name}: phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency, must be near 90 deg; "
                 "check the polarity of force and drive channel"
             )
+    damping = found["damping_ratio"]
+    negative = int(np.count_nonzero(damping < 0.0))
+    if 2 * negative > damping.size:
+        raise IdentificationError(
+            f"points: the damping ratio of {negative} of {damping.size} is negative, the force seems to draw power from the "
+            "specimen; check the polarity of force and drive channel"
+        )
 
 
 def _states(

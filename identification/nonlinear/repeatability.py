@@ -143,7 +143,7 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
     count = len(modes)
     out: dict[str, Float] = {"amplitude_m": levels}
     intervals = np.full((levels.size, len(QUANTITIES), 2), np.nan)
-    systematic = np.full((levels.size, len(QUANTITIES)), np.nan)
+    systematic, random = (np.full((levels.size, len(QUANTITIES)), np.nan) for _ in range(2))
     for column, name in enumerate(QUANTITIES):
         values = np.array([_at(levels, mode, getattr(mode, name)) for mode in modes])
         own = np.array([_at(levels, mode, mode.random(name)) for mode in modes])
@@ -153,7 +153,7 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
             mean, scatter = levels, np.zeros(levels.size)
         scatter = np.sqrt((1.0 + 1.0 / count) * np.fmax(scatter**2, np.mean(own**2, axis=0)))
         out[name], out[STANDARD_ERRORS[name]] = mean, np.hypot(scatter, np.nan_to_num(shared))
-        systematic[:, column] = shared
+        systematic[:, column], random[:, column] = shared, scatter
         half = np.hypot(t.ppf(0.975, count - 1) * scatter, 1.96 * np.nan_to_num(shared))
         intervals[:, column] = np.column_stack([mean - half, mean + half])
         if name in ("mac", "force_purity", "response_purity"):
@@ -164,6 +164,7 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
     return NonlinearMode(
         **out,
         systematic_std=systematic,
+        random_std=random,
         interval_95=intervals,
         force_harmonics=_mean_harmonics(levels, modes, "force_harmonics", harmonics),
         response_harmonics_m=_mean_harmonics(levels, modes, "response_harmonics_m", harmonics),

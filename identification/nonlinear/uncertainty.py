@@ -75,7 +75,7 @@ def propagated(
     shapes: ModeShapes | None,
     model: ErrorModel,
 ) -> dict[str, Float]:
-    """Standard errors, their systematic parts and intervals, by field of `NonlinearMode`.
+    """Standard errors, their systematic and random parts and intervals, by field of `NonlinearMode`.
 
     ``rows`` are the channels of ``states.deflection_m``; ``shapes`` are what ``states.inverse`` inverts.
     """
@@ -84,9 +84,12 @@ def propagated(
     wrong = _systematic(states, backbone, rows, shapes, model, rng)
     both = _random(wrong if wrong is not None else _repeated(states, model.draws), states, backbone, rows, rng)
     total = _deviations(estimate, properties(both))
-    systematic = {name: np.zeros_like(total[name]) for name in total}
+    systematic, random = {name: np.zeros_like(total[name]) for name in total}, total
     if wrong is not None:
+        # Each part by itself: their difference from the total would drown in the scatter of the draws.
         systematic = _deviations(estimate, properties(wrong))
+        alone = _random(_repeated(states, model.draws), states, backbone, rows, rng)
+        random = _deviations(estimate, properties(alone))
     known = np.array([point.harmonics_std is not None for point in backbone.points])
     out: dict[str, Float] = {}
     intervals = np.empty((len(backbone.points), len(QUANTITIES), 2))
@@ -102,6 +105,7 @@ def propagated(
     return {
         **out,
         "systematic_std": np.column_stack([_std(systematic[n]) for n in QUANTITIES]),
+        "random_std": np.column_stack([np.where(known, _std(random[n]), np.nan) for n in QUANTITIES]),
         "interval_95": intervals,
     }
 

@@ -20,7 +20,7 @@ from identification import (
 from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
 from rig.exchange.backbone_table import backbone_from, backbone_parts
-from rig.exchange.contents import Contents, unit_of
+from rig.exchange.contents import Contents, Labels, unit_of
 from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
 from rig.exchange.time_data import TimeData
 
@@ -32,8 +32,9 @@ def _nonlinear_mode(mode: NonlinearMode) -> Contents:
     size = len(mode.force_n)
     rows = {name: 0 for name, array in arrays.items() if array.ndim and array.shape[0] == size}
     units = np.array([unit_of(name) for name in QUANTITIES])
-    further = {"systematic_std": units, "interval_95": units[:, None]}
-    labels = {"systematic_std": (QUANTITIES,), "interval_95": (QUANTITIES, ("low", "high"))}
+    further = {"systematic_std": units, "random_std": units, "interval_95": units[:, None]}
+    labels: dict[str, Labels] = dict.fromkeys(("systematic_std", "random_std"), (QUANTITIES,))
+    labels |= {"interval_95": (QUANTITIES, ("low", "high"))}
     return Contents("nonlinear-mode", mode.specimen, arrays, attributes, rows, further, labels)
 
 
@@ -42,7 +43,8 @@ def _linear_modes(modes: LinearModes) -> Contents:
     names = tuple(channel.name for channel in modes.channels)
     shapes = {name: 1 for name in arrays if name.startswith("shapes")}
     rows = {name: 0 for name, array in arrays.items() if array.shape == modes.frequency_hz.shape and name not in _SIDES}
-    units = {"lower": "1/kg", "upper": "s2/kg", "force_rms_n": "N"}
+    units: dict[str, Any] = {"lower": "1/kg", "upper": "s2/kg", "force_rms_n": "N", "residues": "1/kg"}
+    units["small_terms"] = np.array(["1/(kg s)", "1/(kg s2)", "s3/kg"])
     labels = dict.fromkeys(shapes, (names,))
     return Contents("linear-modes", modes.specimen, arrays, attributes, rows | shapes, units, labels)
 

@@ -25,17 +25,25 @@ class ImportFailed(RigError):  # noqa: N818 (says what happened)
 
 
 def write_mat(items: Sequence[Contents], path: Path) -> None:
-    """Write one structure, or a 1 x n array of them, under the name of their kind; may raise anything SciPy does."""
+    """Write, under the name of each kind, one structure or a 1 x n array of them; may raise anything SciPy does."""
     from scipy.io import savemat
 
-    name = items[0].kind.replace("-", "_")
-    structures = [_structure(item) for item in items]
-    value: Any = structures[0]
-    if len(structures) > 1:
-        value = np.empty((1, len(structures)), dtype=[(key, object) for key in _names(structures)])
-        for column, structure in enumerate(structures):
-            value[0, column] = tuple(structure.get(key, np.zeros((0, 0))) for key in value.dtype.names)
-    savemat(str(path), {name: value}, appendmat=False, oned_as="column", long_field_names=False)
+    kinds = dict.fromkeys(item.kind for item in items)
+    variables = {
+        kind.replace("-", "_"): _variable([_structure(item) for item in items if item.kind == kind]) for kind in kinds
+    }
+    savemat(str(path), variables, appendmat=False, oned_as="column", long_field_names=False)
+
+
+def _variable(structures: Sequence[Mapping[str, Any]]) -> Any:
+    """One structure as it is, several as an array."""
+    if len(structures) == 1:
+        return structures[0]
+    names = _names(structures)
+    value = np.empty((1, len(structures)), dtype=[(name, object) for name in names])
+    for column, structure in enumerate(structures):
+        value[0, column] = tuple(structure.get(name, np.zeros((0, 0))) for name in names)
+    return value
 
 
 def _names(structures: Sequence[Mapping[str, Any]]) -> list[str]:

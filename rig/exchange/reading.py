@@ -183,9 +183,12 @@ def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
     if mapping is not None:
         return _mapped(time_data_in(datasets, units), mapping)
     kinds = {(dataset["type"], dataset.get("func_type", 0)) for dataset in datasets}
-    if (58, 4) in kinds:
+    modes = (55, 0) in kinds
+    if modes and (58, 4) in kinds and options["item"] not in (1, 2):
+        raise ImportFailed(f"{path}: holds modes and frequency responses; choose by --item 1 (modes) or 2 (responses)")
+    if (58, 4) in kinds and not (modes and options["item"] == 1):
         return responses_in(datasets, units)
-    if (55, 0) in kinds:
+    if modes:
         return modes_in(datasets, units, options["drive"])
     if (58, 1) in kinds:
         raise ImportFailed(f"{path}: holds time data; say by --mapping with kind = 'multisine' what was played")

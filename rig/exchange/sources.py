@@ -23,7 +23,7 @@ DATA = ("results", "time")
 
 
 def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) -> list[Any]:
-    """The objects in a file of ours: one, but for the levels of a multisine, sweeps, and time data by point.
+    """The objects in a file of ours: one, but for the levels of a multisine, sweeps, time data by point, modes with responses.
 
     Parameters
     ----------
@@ -48,7 +48,9 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     if data == "time" or points:
         raise RecordingError(f"{path}: holds a {kind}; samples of points are in recordings")
     found = load(path)
-    return [found.modes if isinstance(found, ModalAnalysis) else found]
+    if isinstance(found, ModalAnalysis):
+        return [found.modes] if found.responses is None else [found.modes, found.responses]
+    return [found]
 
 
 _RESULTS: dict[str, Callable[[Recording], list[Any]]] = {

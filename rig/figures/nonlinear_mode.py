@@ -59,17 +59,17 @@ def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
 
 
 def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = MAIN) -> None:
-    """Modal frequency and damping over the amplitude."""
+    """Modal frequency and damping over the amplitude, with their 95 % intervals."""
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
     error: dict[str, Any] = {"fmt": "o-", "ms": 4, "color": colour, "capsize": 2, "elinewidth": 0.8}
-    left.errorbar(amplitude, mode.modal_frequency_hz[order], 1.96 * mode.modal_frequency_std_hz[order], **error)
+    left.errorbar(amplitude, mode.modal_frequency_hz[order], mode.bound_95("modal_frequency_hz")[order], **error)
     left.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
     if np.isfinite(mode.damping_ratio).any():
         right.errorbar(
             amplitude,
             100 * mode.damping_ratio[order],
-            196 * mode.damping_ratio_std[order],
+            100 * mode.bound_95("damping_ratio")[order],
             label="one-mode fit" if mode.source == "stepped sine" else "active power of the fundamental",
             **error,
         )
@@ -77,7 +77,7 @@ def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: st
             right.errorbar(
                 amplitude,
                 100 * mode.damping_ratio_total_power[order],
-                196 * mode.damping_ratio_total_power_std[order],
+                100 * mode.bound_95("damping_ratio_total_power")[order],
                 label="active power of all harmonics",
                 **{**error, "fmt": "s--", "ms": 3.5, "color": SECOND},
             )

@@ -1,9 +1,9 @@
 """From recordings to models."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, cast
 
 from identification import (
     Backbone,
@@ -26,47 +26,13 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import Estimator, backbone, bench_of_recording, spectra
 from rig.models.files import KINDS, load, load_as
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
+from rig.models.identify_request import Request
 from rig.models.linear_modes import LINEAR_MODES
+from rig.models.points_left_out import points_left_out
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 __all__ = ["Request", "identify_model", "modes_in"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Request:
-    """What is to be identified, and how."""
-
-    kind: str = "nonlinear-mode"
-    """``nonlinear-mode``, ``linear`` or ``exciter``."""
-    modes: Path | None = None
-    """Linear model whose mode shapes a nonlinear mode uses."""
-    estimator: str = "instrument"
-    """Of the responses of a linear model: ``instrument``, ``H1`` or ``H2``."""
-    band_hz: tuple[float, float] | None = None
-    """Lines that a linear or exciter model is fitted to."""
-    count: int | None = None
-    """Number of modes of a linear model; found if None."""
-
-    def __post_init__(self) -> None:
-        if self.kind not in _MODELS:
-            raise ConfigurationError(f"--model = {self.kind!r}: allowed are {', '.join(_MODELS)}")
-        if self.estimator not in get_args(Estimator):
-            raise ConfigurationError(f"--estimator = {self.estimator!r}: allowed are {', '.join(get_args(Estimator))}")
-        if self.band_hz is not None and not 0.0 <= self.band_hz[0] < self.band_hz[1]:
-            raise ConfigurationError(
-                f"--band = {self.band_hz[0]:g} {self.band_hz[1]:g}: allowed is 0 <= LOW < HIGH, Hz"
-            )
-        given = {
-            "--modes": self.modes is not None,
-            "--band": self.band_hz is not None,
-            "--count": self.count is not None,
-            "--estimator": self.estimator != "instrument",
-        }
-        for name in (name for name, is_given in given.items() if is_given):
-            if name not in _OPTIONS[self.kind]:
-                allowed = ", ".join(_OPTIONS[self.kind]) or "no such option"
-                raise ConfigurationError(f"{name}: means nothing to --model {self.kind}, which takes {allowed}")
 
 
 def identify_model(paths: Sequence[Path], request: Request) -> Any:
@@ -91,27 +57,32 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
         if modes is not None:
             raise ConfigurationError("--modes: stepped sines of one sensor have no use for mode shapes; leave it out")
         return stepped_sine_mode([response for path in paths for response in load(path)])
-    backbones = [_backbone(path) for path in paths]
-    identified = [nonlinear_mode(measured, modes=modes) for measured in backbones]
+    identified = []
+    for path in paths:
+        measured, notes = _backbone(path)
+        found = nonlinear_mode(measured, modes=modes)
+        identified.append(replace(found, notes=(*notes, *found.notes)))
     return identified[0] if len(identified) == 1 else combined(identified)
 
 
-def _backbone(path: Path) -> Backbone:
+def _backbone(path: Path) -> tuple[Backbone, tuple[str, ...]]:
+    """A measured backbone, and what of its plan is not in it."""
     kind = kind_of(path)
     if kind in KINDS and isinstance(measured := load(path), Backbone):
-        return measured
+        return measured, ()
     if kind != "backbone":
         raise RecordingError(
             f"{path}: holds a {kind}; a nonlinear mode comes from backbones, or from stepped sines alone"
         )
     with Recording(path) as recording:
-        return backbone(recording)
+        return backbone(recording), points_left_out(recording)
 
 
 def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
     """From multisines or frequency responses; levels are extrapolated to zero force."""
     estimator = cast(Estimator, request.estimator)
-    pairs = [pair for path in paths for pair in _matrices(path, estimator)]
+    read = [_matrices(path, estimator) for path in paths]
+    pairs = [pair for found, _ in read for pair in found]
     if request.band_hz is not None:
         low, high = request.band_hz
         pairs = [
@@ -124,11 +95,14 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
     found = [linear_modes(fitted, modes=request.count, diagram=diagram)]
     found += [linear_modes(higher, modes=found[0]) for _, higher in pairs[1:]]
     modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
-    return ModalAnalysis(modes, lowest, diagram)
+    notes = [note for _, missing in read for note in missing]
+    return ModalAnalysis(replace(modes, notes=(*notes, *modes.notes)), lowest, diagram)
 
 
-def _matrices(path: Path, estimator: Estimator) -> list[tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]]:
-    """Responses by level: as they are shown, and as they are fitted.
+def _matrices(
+    path: Path, estimator: Estimator
+) -> tuple[list[tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]], tuple[str, ...]]:
+    """Responses by level: as they are shown, and as they are fitted; and what of the plan is not in them.
 
     With the voltage as instrument the fit is to force and motions over the voltage.
     """
@@ -136,13 +110,13 @@ def _matrices(path: Path, estimator: Estimator) -> list[tuple[FrequencyResponseM
     if kind == "multisine":
         with Recording(path) as recording:
             specimen = bench_of_recording(recording).specimen.name
-            measured = list(spectra(recording).values())
+            measured, missing = list(spectra(recording).values()), points_left_out(recording)
         shown = [best_linear_approximation(s, estimator=estimator, specimen=specimen) for s in measured]
         if estimator != "instrument":
-            return [(matrix, matrix) for matrix in shown]
-        return [(matrix, _over_voltage(s, specimen)) for matrix, s in zip(shown, measured, strict=True)]
+            return [(matrix, matrix) for matrix in shown], missing
+        return [(matrix, _over_voltage(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
     if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
-        return [(matrix, matrix)]
+        return [(matrix, matrix)], ()
     raise RecordingError(f"{path}: holds a {kind}; a linear model comes from multisines or frequency response matrices")
 
 
@@ -162,22 +136,22 @@ def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
     with Recording(paths[0]) as recording:
         bench = bench_of_recording(recording)
         _, at_level = max(spectra(recording).items())
-    return identify_exciter(
+        notes = points_left_out(recording)
+    found = identify_exciter(
         at_level,
         lowest_hz=low,
         highest_hz=high,
         sample_rate_hz=bench.sample_rate_hz,
+        stinger_stiffness_n_m=request.stinger_stiffness_n_m,
+        resistance_ohm=request.resistance_ohm,
+        amplifier_gain=1.0 if request.amplifier_gain is None else request.amplifier_gain,
         source=f"{bench.name}, {bench.specimen.name}",
     )
+    return replace(found, notes=(*notes, *found.notes))
 
 
 _MODELS: dict[str, Callable[[Sequence[Path], Request], Any]] = {
     "nonlinear-mode": _nonlinear_mode,
     "linear": _linear,
     "exciter": _exciter,
-}
-_OPTIONS = {
-    "nonlinear-mode": ("--modes",),
-    "linear": ("--estimator", "--band", "--count"),
-    "exciter": ("--band",),
 }

@@ -28,9 +28,9 @@ def _say(summary: dict[str, Any]) -> None:
                 number(p["force_n"], ".4f"),
                 number(p["amplitude_m"], ".5f", 1e3),
                 number(p["modal_frequency_hz"], ".4f"),
-                number(p["modal_frequency_std_hz"], ".4f", 1.96),
+                number(p["modal_frequency_bound_95_hz"], ".4f"),
                 number(p["damping_ratio"], ".4f", 100.0),
-                number(p["damping_ratio_std"], ".4f", 196.0),
+                number(p["damping_ratio_bound_95"], ".4f", 100.0),
                 number(p["damping_ratio_total_power"], ".4f", 100.0),
                 number(p["phase_lag_deg"], ".2f"),
             )

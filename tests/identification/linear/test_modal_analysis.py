@@ -90,6 +90,14 @@ def test_close_modes_and_coarse_lines_are_named() -> None:
     assert any("Hz: half-power bandwidth" in note for note in notes)
 
 
+@pytest.mark.parametrize("signs", [(-1.0, -1.0), (-1.0, 1.0)])
+def test_a_reversed_force_or_drive_channel_is_refused_and_polarity_named(signs: tuple[float, float]) -> None:
+    responses = measured(11, 0.1, exact=accelerance() * np.array(signs))
+    for modes in (None, 3, list(FREQUENCY_HZ)):
+        with pytest.raises(IdentificationError, match=r"residue of -.*polarity of force or drive channel is reversed"):
+            linear_modes(responses, modes=modes)
+
+
 def test_what_a_modal_analysis_needs_is_asked_for() -> None:
     responses = measured(7, 0.5)
     with pytest.raises(IdentificationError, match="'drive'"):
@@ -104,6 +112,17 @@ def test_what_a_modal_analysis_needs_is_asked_for() -> None:
     )
     with pytest.raises(IdentificationError, match="modes: "):
         linear_modes(empty)
+
+
+def test_a_band_that_is_narrow_against_its_frequency_tells_its_mode_or_that_there_is_none() -> None:
+    responses = measured(10, 0.05)
+    modes = linear_modes(responses, lowest_hz=52.0, highest_hz=68.0)
+    np.testing.assert_allclose(modes.frequency_hz, FREQUENCY_HZ[2:], rtol=1e-4)
+    np.testing.assert_allclose(modes.damping_ratio, DAMPING[2:], rtol=0.05)
+    near = linear_modes(responses, lowest_hz=57.0, highest_hz=65.0, modes=[60.9])
+    np.testing.assert_allclose(near.shapes, SHAPES[:, 2:], rtol=0.02)
+    with pytest.raises(IdentificationError, match="modes: "):
+        linear_modes(responses, lowest_hz=40.0, highest_hz=48.0)
 
 
 def test_the_stabilisation_diagram_shows_columns_at_the_modes() -> None:

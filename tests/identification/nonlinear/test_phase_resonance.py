@@ -159,10 +159,14 @@ def test_unsettled_and_dead_points_are_refused_by_name() -> None:
         nonlinear_mode(Backbone((good,)), mode_shapes=ModeShapes(("drive", "tip"), np.ones((2, 1))))
 
 
-def test_flipped_polarity_is_told_in_a_note_and_by_negative_damping() -> None:
-    point = one_mode_point()
-    mode = nonlinear_mode(Backbone((replace(point, harmonics=point.harmonics * [[1], [-1]]),), drive_mode_shape=PHI))
-    assert mode.damping_ratio[0] < 0.0
+@pytest.mark.parametrize("signs", [[[1], [-1]], [[-1], [1]]])
+def test_a_reversed_force_or_drive_is_refused_and_polarity_named(signs: list[list[int]]) -> None:
+    points = [one_mode_point(forces=(0, force)) for force in (0.1, 0.2, 0.3)]
+    flipped = [replace(point, harmonics=point.harmonics * signs) for point in points]
+    with pytest.raises(IdentificationError, match=r"damping ratio of 3 of 3 is negative.* check the polarity of force"):
+        nonlinear_mode(Backbone(tuple(flipped), drive_mode_shape=PHI))
+    mode = nonlinear_mode(Backbone((points[0], points[1], flipped[2]), drive_mode_shape=PHI))
+    assert np.sign(mode.damping_ratio).tolist() == [1.0, 1.0, -1.0]
     assert any("polarity" in note for note in mode.notes)
 
 

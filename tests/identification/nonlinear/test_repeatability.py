@@ -60,6 +60,27 @@ def test_the_combined_model_holds_what_a_further_run_does() -> None:
     assert len(model.table()) == model.amplitude_m.size
 
 
+def test_what_is_printed_behind_plus_or_minus_is_the_interval_of_so_few_runs() -> None:
+    rng = np.random.default_rng(3)
+    model = combined([run(rng, scatter=5e-4) for _ in range(3)])
+    rows = model.table()
+    for name, column in (
+        ("modal_frequency_hz", "modal_frequency_bound_95_hz"),
+        ("damping_ratio", "damping_ratio_bound_95"),
+    ):
+        low, high = model.interval(name).T
+        np.testing.assert_allclose([row[column] for row in rows], 0.5 * (high - low))
+    # Student's quantile of two degrees of freedom, not the normal one
+    np.testing.assert_allclose(model.bound_95("modal_frequency_hz") / model.modal_frequency_std_hz, 4.3027, rtol=1e-3)
+    single = nonlinear_mode(run(rng))
+    unknown = replace(single, interval_95=np.full(single.interval_95.shape, np.nan))
+    np.testing.assert_array_equal(unknown.bound_95("damping_ratio"), 1.96 * single.damping_ratio_std)
+    lopsided = single.interval_95.copy()
+    lopsided[..., 1] += 1.0
+    farther = replace(single, interval_95=lopsided).bound_95("damping_ratio")
+    np.testing.assert_allclose(farther, 1.0 + single.interval("damping_ratio")[:, 1] - single.damping_ratio)
+
+
 def test_passes_of_one_backbone_are_runs() -> None:
     rng = np.random.default_rng(1)
     up, down = run(rng), run(rng)

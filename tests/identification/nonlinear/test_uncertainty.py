@@ -56,6 +56,21 @@ def test_one_percent_of_the_shape_is_two_percent_of_the_damping_at_all_points_al
     np.testing.assert_allclose(mode.systematic("force_n"), 0.0)
 
 
+def test_the_random_part_is_the_same_however_large_the_systematic_one_is() -> None:
+    backbone = Backbone(tuple(noisy_point(90.0, 1e-3, (0, force, 0.1)) for force in (0.1, 0.2, 0.3)), "beam", PHI)
+    plain = identify(backbone)
+    skewed = identify(backbone, calibration_std=0.02, phase_skew_std_deg=1.0)
+    for name in ("modal_frequency_hz", "damping_ratio", "modal_amplitude", "force_n"):
+        np.testing.assert_allclose(skewed.random(name), plain.random(name), rtol=0.12)
+    np.testing.assert_array_equal(plain.random("damping_ratio"), plain.damping_ratio_std)
+    np.testing.assert_allclose(
+        np.hypot(skewed.random("damping_ratio"), skewed.systematic("damping_ratio")), skewed.damping_ratio_std, rtol=0.1
+    )
+    arrays, attributes = skewed.to_arrays()
+    again = NonlinearMode.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    np.testing.assert_array_equal(again.random("damping_ratio"), skewed.random("damping_ratio"))
+
+
 def test_errors_of_shapes_that_go_together_do_not_average_over_the_channels() -> None:
     backbone = Backbone((noisy_point(relative=1e-6),))
     std = 0.01 * SHAPE[:, None]

@@ -5,6 +5,7 @@ import json
 import os
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,12 @@ import pytest
 import scipy.io
 
 import rig
-from identification import FrequencyResponseMatrix, nonlinear_mode
+from identification import FrequencyResponseMatrix, ModalAnalysis, nonlinear_mode
 from rig.cli import main
 from rig.exchange.export import write_contents
 from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import import_file
-from rig.models.files import load
+from rig.models.files import load, save
 
 
 @pytest.fixture
@@ -55,6 +56,31 @@ def test_a_backbone_that_comes_back_gives_the_same_nonlinear_mode(command, backb
     again = nonlinear_mode(load(tmp_path / "back.h5"))
     np.testing.assert_array_equal(again.damping_ratio, mode.damping_ratio)
     np.testing.assert_array_equal(again.modal_frequency_hz, mode.modal_frequency_hz)
+
+
+def test_a_modal_analysis_goes_out_with_its_responses_and_each_part_comes_back(command, modes, matrix, tmp_path):
+    one_force = replace(
+        matrix, value=matrix.value[:, :, :1], inputs=matrix.inputs[:1], input_rms=(), noise_covariance=None
+    )
+    save(ModalAnalysis(modes, one_force), tmp_path / "lin.h5")
+    assert load(tmp_path / "lin.h5").modes.small_terms.tolist() == modes.small_terms.tolist()
+    for ending, several in (("uff", "choose by --item 1 (modes) or 2 (responses)"), ("mat", "choose by --item 1 to 2")):
+        status, out, err = command(f"export lin.h5 -o lin.{ending}")
+        assert status == 0, err
+        assert [line.split(":")[0] for line in out.splitlines()] == ["linear-modes", "frequency-response-matrix"]
+        status, _, err = command(f"import lin.{ending} -o both.h5")
+        assert (status, several in err) == (1, True), err
+        for number in (1, 2):
+            assert command(f"import lin.{ending} --item {number} -o {ending}{number}.h5")[0] == 0
+        np.testing.assert_allclose(load(tmp_path / f"{ending}1.h5").modes.shapes, modes.shapes, rtol=6e-6)
+        np.testing.assert_allclose(load(tmp_path / f"{ending}2.h5").value, one_force.value, rtol=2e-12, atol=1e-11)
+    again = load(tmp_path / "mat1.h5").modes
+    np.testing.assert_array_equal(again.accelerance([30.0, 200.0]), modes.accelerance([30.0, 200.0]))
+    status, _, err = command("export lin.h5 -o lin.csv")
+    assert (status, "choose by --item one of 1 (linear-modes, beam); 2 (frequency-response-matrix" in err) == (1, True)
+    assert command("export lin.h5 --item 1 -o lin.csv")[0] == 0
+    assert command("import lin.csv -o csv.h5")[0] == 0
+    np.testing.assert_array_equal(load(tmp_path / "csv.h5").modes.small_terms, modes.small_terms)
 
 
 def test_a_multisine_is_one_response_matrix_a_level(command, multisine_file, tmp_path):

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from identification.prediction.exciter import PARAMETERS
+from rig.recording.reader import Recording
 from simulators.virtual_rig import VirtualRig
 
 
@@ -38,6 +39,50 @@ def test_an_exciter_is_shown_with_units_and_drawn(command, shelf, tmp_path):
     assert (tmp_path / "EX.png").stat().st_size > 20_000
 
 
+def test_a_known_resistance_and_stinger_make_the_moving_mass_surer(command, shelf, monkeypatch):
+    monkeypatch.chdir(shelf)
+    rig = VirtualRig.shipped("magnet-beam")
+    known = f"--resistance {rig.exciter.resistance_ohm} --amplifier-gain {rig.exciter.amplifier_gain}"
+    known += f" --stinger-stiffness {rig.stinger.stiffness_n_m}"
+    done = command(f"identify exciter.h5 --model exciter {known} -o known.h5 --json")
+    assert done.status == 0, done.err
+    told = json.loads(done.out)["parameters"]
+    alone = json.loads(command("show EX.h5 --json").out)["parameters"]
+    assert told["moving_mass_kg"]["std"] < 0.7 * alone["moving_mass_kg"]["std"]
+    assert told["back_emf_damping_n_s_m"]["std"] < 0.01 * alone["back_emf_damping_n_s_m"]["std"]
+    for name, value in (
+        ("moving_mass_kg", rig.exciter.armature_mass_kg),
+        ("back_emf_damping_n_s_m", rig.exciter.force_factor_n_a**2 / rig.exciter.resistance_ohm),
+        ("suspension_damping_n_s_m", rig.exciter.suspension_damping_n_s_m),
+    ):
+        assert told[name]["value"] == pytest.approx(value, rel=5e-3)
+        assert abs(told[name]["value"] - value) < 4.0 * told[name]["std"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "first", "planned"),
+    [
+        ("modal", "--model linear --count 2", "1 of 2 points of the plan", "(1 of 2 at 0.05 V RMS)"),
+        ("exciter", "--model exciter", "1 of 2 points of the plan", "(1 of 2 at 1 V RMS)"),
+        ("backbone", "--modes LIN.h5", "1 of 7 points of the plan", "(1 of 1 at 0.2 V)"),
+    ],
+)
+def test_points_that_were_not_accepted_are_counted_in_a_note(
+    command, shelf, monkeypatch, kind, options, first, planned
+):
+    def points(recording):
+        measured = [point for part in recording.parts for point in part.points]
+        return [p if p["number"] != 1 else {**p, "accepted": False, "reason": "shaken by hand"} for p in measured]
+
+    monkeypatch.chdir(shelf)
+    monkeypatch.setattr(Recording, "points", property(points))
+    done = command(f"identify {kind}.h5 {options} -o fewer-{kind}.h5")
+    assert done.status == 0, done.err
+    wanted = f"note: {kind}.h5: {first} were not accepted and are left out {planned}; the first: shaken by hand"
+    assert wanted in done.out
+    assert "not accepted" not in command("show LIN.h5").out
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -45,6 +90,16 @@ def test_an_exciter_is_shown_with_units_and_drawn(command, shelf, tmp_path):
         ("backbone.h5 --model exciter", "holds a backbone; an exciter model comes from a multisine"),
         ("exciter.h5 --model exciter --modes LIN.h5", "--modes: means nothing to --model exciter, which takes --band"),
         ("exciter.h5 --model exciter --band 100 50", "--band = 100 50"),
+        ("exciter.h5 --model exciter --resistance 0", "--resistance = 0: allowed is any number above 0"),
+        (
+            "exciter.h5 --model exciter --stinger-stiffness nan",
+            "--stinger-stiffness = nan: allowed is any number above 0",
+        ),
+        ("exciter.h5 --model exciter --amplifier-gain 2", "--amplifier-gain: is for the resistance; add --resistance"),
+        (
+            "modal.h5 --model linear --resistance 3",
+            "--resistance: means nothing to --model linear, which takes --estimator",
+        ),
         ("exciter.h5 --model exciter --band 20 22", "9 excited lines in 20 to 22 Hz, needs at least 20"),
         ("exciter.h5 --model shaker", "--model = 'shaker'"),
         ("nothing.h5 --model exciter", "nothing.h5"),
