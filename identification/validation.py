@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from identification.errors import IdentificationError
 
-__all__ = ["finite_array", "positive", "read_only"]
+__all__ = ["finite_array", "one_specimen", "positive", "read_only"]
 
 
 def read_only(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
@@ -37,3 +37,11 @@ def positive(name: str, value: float, unit: str = "") -> float:
     if not (np.isfinite(number) and number > 0.0):
         raise IdentificationError(f"{name}: is {number:g}{unit and ' '}{unit}, must be finite and above zero")
     return number
+
+
+def one_specimen(**named: str) -> None:
+    """Raise `IdentificationError` where two of the specimens, given by what they belong to, have different names."""
+    known = {what: specimen for what, specimen in named.items() if specimen}
+    if len(set(known.values())) > 1:
+        listed = ", ".join(f"{what} of '{specimen}'" for what, specimen in known.items())
+        raise IdentificationError(f"specimen: {listed}; they must belong to one specimen")

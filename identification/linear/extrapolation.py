@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.linear.mode_correlation import mac_matrix
 from identification.linear.modes import LinearModes
+from identification.validation import one_specimen
 
 __all__ = ["extrapolated_to_zero"]
 
@@ -55,6 +56,7 @@ def extrapolated_to_zero(
     powers = np.atleast_1d(np.asarray(exponent, dtype=np.float64))
     if powers.size > 2 or not np.all(np.isfinite(powers)) or np.any(powers <= 0.0):
         raise IdentificationError(f"exponent: is {exponent}, needs one or two numbers above zero")
+    one_specimen(**{f"level {force_n:.4g} N": model.specimen for force_n, model in zip(force, models, strict=True)})
     if any(model.channels != models[0].channels for model in models):
         raise IdentificationError("channels: differ between the levels")
     kept, values, covariances = _common(models)

@@ -23,6 +23,8 @@ __all__ = ["linear_modes"]
 
 Float = NDArray[np.float64]
 
+_NEEDED = 2.0
+"""A pole whose loss multiplies the misfit by this is a mode, however few are asked for."""
 _NEAR = 0.05
 """A starting frequency takes the nearest pole of the diagram within this part of it."""
 _ROUNDS = 20
@@ -165,14 +167,20 @@ def _without_spurious(
 ) -> tuple[ModalFit, list[str]]:
     """Fit; leave out what is no mode, or, if a number was asked for, the least prominent; fit again until all are modes."""
     notes: list[str] = []
-    drive = find_role(band.outputs, "drive")
+    drive, whole = find_role(band.outputs, "drive"), np.inf
     while True:
         fit = fit_modes(data, poles, normal=normal)
+        if fit.residual > _NEEDED * max(whole, 1.0):
+            raise IdentificationError(
+                f"modes: {modes} wanted, but {notes[-1]} raises the misfit from {whole:.2g} to {fit.residual:.2g}: "
+                "it is a mode; ask for more modes, or for those of a narrower band"
+            )
         reasons, prominence = accepted(fit, data, drive, normal=normal)
         count = prominence.size
         out = {index: reason for index, reason in enumerate(reasons) if reason}
         if not out and isinstance(modes, int) and count > modes:
             out = {int(np.argmin(prominence)): "is the least prominent"}
+            whole = min(whole, fit.residual)
         names = [f"pole at {fit.omega[index] / (2 * np.pi):.5g} Hz {reason}" for index, reason in out.items()]
         if (out and not (modes is None or isinstance(modes, int))) or len(out) == count:
             reversed_ = any("residue of -" in name for name in names)

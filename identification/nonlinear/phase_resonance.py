@@ -36,6 +36,7 @@ from identification.nonlinear.mode_shapes import ModeShapes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.nonlinear.properties import States, properties
 from identification.nonlinear.uncertainty import ErrorModel, propagated
+from identification.validation import one_specimen
 
 __all__ = ["nonlinear_mode"]
 
@@ -47,6 +48,7 @@ _NO_SHAPE = (
     "give drive_mode_shape or mode_shapes"
 )
 _FAR_FROM_RESONANCE_DEG = 15.0
+_FEW_LEVELS = 4
 _FEW_PERIODS = 10
 _DROWNED = 3.0  # standard errors that force and motion have to stand above
 
@@ -105,6 +107,7 @@ def nonlinear_mode(
     if modes is not None:
         if mode_shapes is not None:
             raise IdentificationError("modes, mode_shapes: both given, allowed is one of them")
+        one_specimen(modes=modes.specimen, backbone=backbone.specimen)
         mode_shapes, _, notes = shapes_for(modes, backbone, mode)
     elif mode is not None:
         raise IdentificationError(f"mode: is {mode}, but there are no modes to choose from; give modes")
@@ -220,6 +223,12 @@ def _notes(backbone: Backbone, shapes: ModeShapes | None) -> tuple[str, ...]:
         notes.append(
             f"point{'s' if len(few) > 1 else ''} {', '.join(map(str, few))}: fewer than {_FEW_PERIODS} periods, standard "
             "errors are rough; record more"
+        )
+    levels = np.unique(np.round(np.log(backbone.amplitude_m), 2)).size
+    if levels < _FEW_LEVELS:
+        notes.append(
+            f"{levels} level{'s' if levels > 1 else ''} only: intervals are those of the levels, what lies between them or "
+            "beyond is not in them"
         )
     if any(point.phase_lag_deg < 0.0 for point in backbone.points):
         notes.append(

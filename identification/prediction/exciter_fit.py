@@ -25,13 +25,16 @@ from identification.multisine.spectra import PeriodicSpectra
 from identification.prediction.exciter import PARAMETERS, Exciter, VoltagePath
 from identification.validation import positive
 
-__all__ = ["identify_exciter"]
+__all__ = ["beside_resonance", "identify_exciter"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _COMPLIANCE = PARAMETERS.index("stinger_compliance_m_n")
 _STINGER_TIME = PARAMETERS.index("stinger_damping_time_s")
+_MASS = PARAMETERS.index("moving_mass_kg")
+_STIFFNESS = PARAMETERS.index("suspension_stiffness_n_m")
+_DAMPING = PARAMETERS.index("suspension_damping_n_s_m")
 _BACK_EMF = PARAMETERS.index("back_emf_damping_n_s_m")
 _FEWEST_LINES = 20
 _POOLED_LINES = 21
@@ -111,6 +114,8 @@ def identify_exciter(
             values, covariance, residual = damped
     if resistance_ohm is None:
         notes += ("suspension damping and back-EMF are told apart by the coil's inductance alone: trust their sum",)
+    _refuse_unphysical(values)
+    notes += beside_resonance(values, float(data.frequency_hz[0]), float(data.frequency_hz[-1]))
     spread = np.sqrt(np.diag(covariance))
     for name, value, std in zip(PARAMETERS, values, spread, strict=False):
         if std > _UNSURE * abs(value):
@@ -126,6 +131,32 @@ def identify_exciter(
         path=VoltagePath(rate, *_path(values)),
         source=source,
         notes=notes,
+    )
+
+
+def _refuse_unphysical(values: Float) -> None:
+    """Refuse masses, stiffnesses and dampings that no exciter has; c and b alone may trade against each other."""
+    found = {
+        "moving mass (kg)": values[_MASS],
+        "suspension stiffness (N/m)": values[_STIFFNESS],
+        "damping of suspension and back-EMF (N s/m)": values[_DAMPING] + values[_BACK_EMF],
+    }
+    for name, value in found.items():
+        if value <= 0.0:
+            raise IdentificationError(
+                f"{name}: {value:.3g} fits best, must be above zero; widen the band, from below to above the resonance of "
+                "the suspension, and check the polarity of force and drive channel"
+            )
+
+
+def beside_resonance(values: Float, lowest_hz: float, highest_hz: float) -> tuple[str, ...]:
+    """A note where the band does not enclose the resonance of mass and suspension."""
+    resonance_hz = np.sqrt(values[_STIFFNESS] / values[_MASS]) / (2.0 * np.pi)
+    if lowest_hz < resonance_hz < highest_hz:
+        return ()
+    return (
+        f"the band does not enclose the resonance of the suspension, {resonance_hz:.3g} Hz: use the model inside the band "
+        "alone, its errors do not say what is off outside",
     )
 
 

@@ -81,6 +81,8 @@ def frequency_response(
     )
     one = OneMode(properties, _fundamental(mode, level, force))
     paths, notes = _branches(one, level)
+    if not paths:
+        raise IdentificationError(f"force_n: is {level:g} N, too small for a response that can be told from rest")
     if force == "rms":
         notes.append(
             "the force's harmonics per fundamental are those recorded at phase resonance, off resonance as well"

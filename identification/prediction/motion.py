@@ -7,6 +7,7 @@ from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.properties import FLAGGED_BEYOND, REFUSED_BEYOND, ModalProperties
 from identification.prediction.steady_states import modal_stiffness
+from identification.validation import one_specimen
 
 __all__ = ["fundamental_motion", "range_notes"]
 
@@ -40,6 +41,7 @@ def fundamental_motion(
     drive = properties.drive_shape(q) * q * np.exp(-1j * lag)
     if modes is None:
         return ("drive",), drive[:, None]
+    one_specimen(mode=mode.specimen, modes=modes.specimen)
     frequency = omega / (2.0 * np.pi)
     tested = modes.nearest(float(mode.modal_frequency_hz[int(np.argmin(mode.amplitude_m))]))
     order = [modes.drive_row, *(row for row in range(len(modes.channels)) if row != modes.drive_row)]

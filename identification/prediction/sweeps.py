@@ -42,6 +42,7 @@ from identification.prediction.sweep_inputs import SweepInput, VoltageSweep, for
 from identification.prediction.sweep_prediction import SweepPrediction
 from identification.signals.half_periods import HalfPeriods
 from identification.signals.transients import Transient
+from identification.validation import one_specimen
 
 __all__ = ["predict_sweep"]
 
@@ -103,6 +104,7 @@ def predict_sweep(
     """
     properties = mode
     if isinstance(mode, NonlinearMode):
+        one_specimen(mode=mode.specimen, modes="" if modes is None else modes.specimen)
         properties = ModalProperties.of(mode, damping=damping, allow_extrapolation=allow_extrapolation)
     assert isinstance(properties, ModalProperties)
     if exciter is None:

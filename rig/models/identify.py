@@ -22,6 +22,7 @@ from identification import (
     stabilisation,
     stepped_sine_mode,
 )
+from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import Estimator, backbone, bench_of_recording, spectra
 from rig.models.files import KINDS, load, load_as
@@ -41,6 +42,9 @@ def identify_model(paths: Sequence[Path], request: Request) -> Any:
     Raises `RecordingError` for files that hold something else, `identification.IdentificationError` where the data does not
     allow it.
     """
+    for index, path in enumerate(paths):
+        if any(path.exists() and other.exists() and path.samefile(other) for other in paths[:index]):
+            raise ConfigurationError(f"{path}: is given twice; each file once")
     return _MODELS[request.kind](paths, request)
 
 
@@ -90,6 +94,7 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
             for shown, fitted in pairs
         ]
     pairs.sort(key=lambda pair: pair[0].input_rms or (0.0,))
+    one_specimen(**{f"{shown.input_rms[0]:.3g} N RMS": shown.specimen for shown, _ in pairs if shown.input_rms})
     lowest, fitted = pairs[0]
     diagram = stabilisation(fitted)
     found = [linear_modes(fitted, modes=request.count, diagram=diagram)]

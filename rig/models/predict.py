@@ -22,6 +22,7 @@ from identification import (
 )
 from identification.prediction.comparison import Over
 from identification.prediction.frequency_response import HeldForce
+from identification.prediction.properties import FLAGGED_BEYOND
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import frequency_responses
 from rig.models.exciter import EXCITER
@@ -117,8 +118,16 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
         sweep_references=tuple(item.recorded for item in swept),
         sweep_errors=tuple(item.error for item in swept),
         specimen=mode.specimen,
-        notes=tuple(dict.fromkeys(note for item in swept for note in item.notes)),
+        notes=tuple(dict.fromkeys([*_strangers(mode, steady), *(note for item in swept for note in item.notes)])),
     )
+
+
+def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:
+    """References of another specimen."""
+    others = {item[1].specimen for item in steady if item[1] is not None} - {"", mode.specimen}
+    return [
+        f"the model is of {mode.specimen}, a reference of {other}: not the same specimen" for other in sorted(others)
+    ]
 
 
 def _alone(mode: NonlinearMode, force_n: float, modes: LinearModes | None, request: PredictionRequest) -> _Compared:
@@ -136,6 +145,8 @@ def _band(mode: NonlinearMode, force_n: float, request: PredictionRequest) -> Re
     """What the model's standard errors make of a response; None where they are unknown, or a draw leaves the range."""
     held = cast(HeldForce, request.held)
     try:
+        if _steady(mode, force_n, None, request).range_use.max() > FLAGGED_BEYOND:
+            return None  # what the extrapolation may be off by is not in the errors
         return response_band(mode, force_n, force=held, draws=_DRAWS, allow_extrapolation=request.allow_extrapolation)
     except IdentificationError:
         return None

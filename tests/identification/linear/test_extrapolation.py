@@ -62,3 +62,10 @@ def test_a_mode_is_like_itself_and_the_matrix_needs_common_channels() -> None:
     other = replace(modes, channels=tuple(replace(c, name=f"{c.name} 2") for c in modes.channels))
     with pytest.raises(IdentificationError, match="share none"):
         mac_matrix(modes, other)
+
+
+def test_levels_of_two_specimens_are_refused() -> None:
+    with pytest.raises(IdentificationError, match=r"specimen: level 1 N of 'plate', level 2 N of 'beam'"):
+        extrapolated_to_zero(
+            replace(at_level(1.0, 1.0), specimen="plate"), replace(at_level(2.0, 1.0), specimen="beam")
+        )

@@ -159,3 +159,8 @@ def test_two_forces_make_one_diagram() -> None:
         assert np.min(np.abs(found / frequency - 1)) < 1e-3
     with pytest.raises(IdentificationError, match=r"inputs: are force \(force\), second \(force\)"):
         linear_modes(responses)
+
+
+def test_a_mode_that_is_there_is_not_left_out_of_the_fit_because_fewer_were_asked_for() -> None:
+    with pytest.raises(IdentificationError, match=r"modes: 2 wanted, but left out: pole at .* raises the misfit"):
+        linear_modes(measured(3, 0.5), modes=2)

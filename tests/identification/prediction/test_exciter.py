@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from identification import Channel, IdentificationError, PeriodicSpectra
 from identification.prediction.exciter import PARAMETERS, Exciter, VoltagePath
-from identification.prediction.exciter_fit import identify_exciter
+from identification.prediction.exciter_fit import beside_resonance, identify_exciter
 
 TRUE = Exciter(
     force_per_volt_n_v=5.3 / 1.5,
@@ -141,3 +141,15 @@ def test_bad_input_is_named() -> None:
         replace(TRUE, force_per_volt_n_v=0.0)
     with pytest.raises(IdentificationError, match="sample_rate_hz"):
         VoltagePath(0.0)
+
+
+def test_an_exciter_that_cannot_be_is_refused_and_a_band_beside_its_resonance_noted() -> None:
+    right = multisine_spectra(1e-4)
+    reversed_ = right.spectra.copy()
+    reversed_[:, :, 1] *= -1.0
+    with pytest.raises(IdentificationError, match=r"must be above zero; widen the band.*polarity"):
+        identify_exciter(replace(right, spectra=reversed_), sample_rate_hz=5000.0)
+    with pytest.raises(IdentificationError, match=r"moving mass \(kg\): -.* fits best"):  # a band above the resonance
+        identify_exciter(right, sample_rate_hz=5000.0, lowest_hz=30.0)
+    assert beside_resonance(TRUE.values, 8.0, 200.0) == ()
+    assert "29.1 Hz" in beside_resonance(TRUE.values, 60.0, 500.0)[0]

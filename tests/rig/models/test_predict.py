@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from identification import predict_sweep
 from rig.measurements import sweeps
-from rig.models.files import load
+from rig.models.files import load, save
 from rig.models.identify import modes_in
 from rig.recording.reader import Recording
 from simulators.analysis import constant_force_response
@@ -160,6 +161,7 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
         ("NM.h5 --frequency-response 0", "force_n: is 0 N"),
         ("NM.h5 --frequency-response nan", "force_n: is nan N"),
         ("NM.h5 --frequency-response -0.1", "force_n: is -0.1 N"),
+        ("NM.h5 --frequency-response 1e-12", "force_n: is 1e-12 N, too small"),
         (
             "NM.h5 --frequency-response 2",
             "measure higher levels, or allow extrapolation (allow_extrapolation, --allow-",
@@ -219,3 +221,30 @@ def test_of_an_incomplete_recording_what_was_accepted_is_predicted(at_shelf, she
     summary = json.loads(done.out)
     assert len(summary["sweeps"]) == 1
     assert "cut.h5: is not complete; sweeps accepted, and predicted: 1" in summary["notes"][0]
+
+
+def test_modes_of_another_specimen_are_refused(at_shelf, shelf, tmp_path):
+    analysis = load(shelf / "LIN.h5")
+    save(replace(analysis, modes=replace(analysis.modes, specimen="plate")), tmp_path / "other.h5")
+    for line in (
+        f"predict NM.h5 --frequency-response 0.1 --modes {tmp_path}/other.h5",
+        f"predict NM.h5 --sweep sweep.h5 --exciter EX.h5 --modes {tmp_path}/other.h5",
+        f"identify backbone.h5 --modes {tmp_path}/other.h5",
+    ):
+        done = at_shelf(line)
+        assert done.status == 1
+        assert "'plate'" in done.err
+        assert "they must belong to one specimen" in done.err
+
+
+def test_a_file_that_is_given_twice_is_refused(at_shelf):
+    done = at_shelf("identify backbone.h5 backbone.h5")
+    assert done.status == 1
+    assert "backbone.h5: is given twice" in done.err
+
+
+def test_a_response_far_beyond_the_range_has_no_band(at_shelf):
+    done = at_shelf("predict NM.h5 --frequency-response 1 --allow-extrapolation --json")
+    response = json.loads(done.out)["frequency_responses"][0]
+    assert response["range_use"] > 1.25
+    assert not any(isinstance(value, float) for key, value in response.items() if "bound" in key or "std" in key)
