@@ -146,7 +146,8 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
             at = [np.interp(a, seen_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)]
             hit.append((low <= at) & (at <= high))
     for quantity, hit in hits.items():
-        assert 0.88 <= np.mean(hit) <= 0.998, (quantity, np.mean(hit))
+        # 50 seeds cover 0.905 (magnet, frequency) to 0.992; the mean over so few runs scatters by 0.02
+        assert 0.84 <= np.mean(hit) <= 0.998, (quantity, np.mean(hit))
 
 
 def test_scatter_of_the_specimen_from_run_to_run_is_recovered() -> None:

@@ -80,7 +80,8 @@ def test_failing_variant_is_named(n_jobs: int) -> None:
 
 
 SLEEPER = """
-import time
+import signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job begins with it ignored
 from simulators.ensemble import ensemble
 
 def slow(value):
