@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.channels import MOTION_ORDER, Channel, find_name
+from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.nonlinear.mode_shapes import ModeShapes
@@ -105,7 +105,7 @@ class LinearModes:
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
         object.__setattr__(self, "notes", tuple(self.notes))
-        self.drive_row  # noqa: B018 (refuses channels without a drive point)
+        find_role(self.channels, "drive")
         modes, rows = np.size(self.frequency_hz), len(self.channels)
         parameters = modes * (2 + rows)
         for names, shape, dtype in (
@@ -132,10 +132,7 @@ class LinearModes:
     @property
     def drive_row(self) -> int:
         """Row of the drive point."""
-        rows = [row for row, channel in enumerate(self.channels) if channel.role == "drive"]
-        if len(rows) != 1:
-            raise IdentificationError(f"channels: {len(rows)} have the role drive, needs exactly one")
-        return rows[0]
+        return find_role(self.channels, "drive")
 
     @property
     def drive_shape(self) -> Float:
