@@ -37,6 +37,7 @@ LOOP = np.dtype(
         ("log_integral", "c16"),
         ("log_reference", "f8"),
         ("reference_turn", "f8"),
+        ("response_error", "c16"),
         ("error", "f8"),
         ("mean_error", "f8"),
         ("sum_error", "f8"),

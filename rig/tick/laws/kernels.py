@@ -110,6 +110,7 @@ def take_over(t: TickArrays, segment: Record) -> None:
     loop.log_reference = math.log(max(loop.displacement, SMALLEST_M))
     drive = t.watches[loop.drive_channel].estimate
     loop.reference_turn = math.atan2(drive.imag, drive.real)
+    loop.response_error = 0.0
 
 
 @kernel
@@ -121,6 +122,8 @@ def hold_response(t: TickArrays, displacement: float) -> None:
         drive = t.watches[loop.drive_channel].estimate
         turned = wrap(loop.reference_turn - math.atan2(drive.imag, drive.real))
     error = complex(log_ratio(displacement, loop.displacement), turned)
+    loop.response_error += law.demodulator_gain * (error - loop.response_error)
+    error = loop.response_error
     loop.demanded_v, angle, loop.log_integral = log_proportional_integral(
         error,
         loop.log_integral,
