@@ -1,11 +1,12 @@
 """The backbone campaign: step through levels at phase resonance, settle, record whole periods at each."""
 
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from controller import AmplitudeLaw, PhaseLockedLoop
+from controller import PhaseLockedLoop
 from rig.bench import Bench
+from rig.campaigns.levels import Levels
 from rig.campaigns.plan import Plan, Target
 from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
@@ -14,22 +15,18 @@ from rig.sequencer.segments import Segment, SettleRule
 __all__ = ["BackbonePlan"]
 
 
-class BackbonePlan(Plan):
+class BackbonePlan(Levels, Plan):
     """Phase-resonant vibrations at a series of levels.
 
-    The levels are either amplitudes of the output voltage (``levels_v``, the paper's way) or of the fundamental force
-    (``levels_n``, held by the force loop K3, K4). Every point is approached by a half-cosine ramp, settled by the
+    The levels are amplitudes of the output voltage (``levels_v``, the paper's way), or of force or response, held by the
+    controller's loops. Every point is approached by a half-cosine ramp, settled by the
     rule in ``settle``, and recorded over whole periods.
     """
 
     kind: Literal["backbone"] = "backbone"
     """Kind of campaign."""
     controller: PhaseLockedLoop
-    """The phase-locked loop; the force loop where levels are in newtons."""
-    levels_v: tuple[float, ...] | None = None
-    """Levels as output amplitude, V peak."""
-    levels_n: tuple[float, ...] | None = None
-    """Levels as amplitude of the fundamental force, N peak."""
+    """The phase-locked loop, and the loops that hold levels in newtons or metres."""
     direction: Literal["up", "down", "up-down"] = "up"
     """Order of the levels."""
     repeats: int = Field(1, ge=1, le=1000)
@@ -54,36 +51,6 @@ class BackbonePlan(Plan):
     """What follows when a point does not settle, is disturbed or is out of reach: the next point, or a ramp-down."""
     on_lost_lock: Literal["skip", "stop"] = "stop"
     """What follows when a lock is lost at a held level: ``stop`` trips, ``skip`` seeks it again at the next level."""
-
-    @model_validator(mode="after")
-    def _levels_make_sense(self) -> Self:
-        if (self.levels_v is None) == (self.levels_n is None):
-            raise ValueError("levels_v, levels_n: exactly one of the two is to be given")
-        name = "levels_v" if self.levels_v is not None else "levels_n"
-        levels = self.levels
-        if not levels:
-            raise ValueError(f"{name} = []: at least one level is needed")
-        for index, level in enumerate(levels):
-            if level <= 0.0:
-                raise ValueError(f"{name}[{index}] = {level:g}: allowed is above 0")
-        if len(set(levels)) != len(levels):
-            raise ValueError(f"{name}: a level is given twice; use repeats to measure levels again")
-        return self
-
-    @property
-    def levels(self) -> tuple[float, ...]:
-        """The levels, in V or N."""
-        return self.levels_v if self.levels_v is not None else self.levels_n or ()
-
-    @property
-    def amplitude_law(self) -> AmplitudeLaw:
-        """What the levels are."""
-        return AmplitudeLaw.VOLTAGE if self.levels_v is not None else AmplitudeLaw.FORCE
-
-    @property
-    def level_unit(self) -> str:
-        """``V`` or ``N``."""
-        return "V" if self.amplitude_law is AmplitudeLaw.VOLTAGE else "N"
 
     @property
     def law(self) -> PhaseLockedLoop:
@@ -121,7 +88,7 @@ class BackbonePlan(Plan):
         """
         failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
         targets = self.targets()
-        out: list[Segment] = []
+        out = self.start_segments()
         at: float | None = None
         for target in targets:
             if target.number in done:
@@ -139,13 +106,7 @@ class BackbonePlan(Plan):
 
     def check(self, bench: Bench) -> None:
         """Refuse, before anything moves, what the bench cannot do."""
-        name, unit = ("levels_v", "V") if self.levels_v is not None else ("levels_n", "N")
-        largest = bench.limits.voltage_v if self.levels_v is not None else bench.limits.force_n
-        for index, level in enumerate(self.levels):
-            if level > largest:
-                raise ConfigurationError(
-                    f"{name}[{index}] = {level:g} {unit}: the bench {bench.name} allows up to {largest:g} {unit}"
-                )
+        self.check_levels(bench)
         window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
         linear = bench.specimen.linear_frequency_hz
         if not window[0] < linear < window[1]:

@@ -33,6 +33,7 @@ WHY = {
     Outcome.DISTURBED: "the settle rule was broken while recording",
     Outcome.LOST_LOCK: "phase lock lost",
     Outcome.UNREACHABLE: "out of reach: the output stood at its voltage limit",
+    Outcome.OUTSIDE_WINDOW: "the frequency stood at an end of its window: another mode, or a resonance outside",
     Outcome.INTERRUPTED: "interrupted",
 }
 
@@ -51,6 +52,8 @@ def head(plan: Plan, target: Target) -> dict[str, Any]:
     }
     if target.frequency_hz is not None:
         point["asked_frequency_hz"] = target.frequency_hz
+    if target.phase_lag_deg is not None:
+        point["asked_phase_lag_deg"] = target.phase_lag_deg
     if target.realisation is not None:
         point["realisation"] = target.realisation
     return point

@@ -28,8 +28,15 @@ from rig.tick.tick import Tick
 
 __all__ = ["Execution", "Progress", "Silent"]
 
-EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP}
-OVER = {Outcome.DONE, Outcome.NOT_SETTLED, Outcome.DISTURBED, Outcome.LOST_LOCK, Outcome.UNREACHABLE}
+EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
+OVER = {
+    Outcome.DONE,
+    Outcome.NOT_SETTLED,
+    Outcome.DISTURBED,
+    Outcome.LOST_LOCK,
+    Outcome.UNREACHABLE,
+    Outcome.OUTSIDE_WINDOW,
+}
 
 
 class Progress(Protocol):

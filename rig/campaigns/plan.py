@@ -4,10 +4,11 @@ from abc import abstractmethod
 from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
+from pydantic import AliasChoices, Field
 
 from controller import AmplitudeLaw, Law, OpenLoop
 from rig.bench import Bench
+from rig.campaigns.levels import Levels
 from rig.configuration import Configured
 from rig.errors import ConfigurationError
 from rig.sequencer.segments import Segment, SettleRule
@@ -21,13 +22,15 @@ class Target(Configured):
     number: int
     """From 0, in the order of measurement."""
     level: float
-    """Level in V or N, after the plan's amplitude law."""
+    """Level in the plan's unit: V, N or m."""
     direction: Literal["up", "down"] = "up"
     """Whether the level or frequency before was lower or higher; matters where the specimen remembers."""
     repeat: int = 1
     """Number of the pass, from 1."""
     frequency_hz: float | None = None
     """Frequency, where the plan gives it."""
+    phase_lag_deg: float | None = None
+    """Wanted lag of the drive-point acceleration behind the force, where the plan gives it, deg."""
     realisation: int | None = None
     """Number of a multisine's realisation, from 0."""
 
@@ -94,15 +97,15 @@ class Plan(Configured):
 
 
 class OpenLoopPlan(Plan):
-    """Base of the plans without feedback: voltage and frequency are the plan's."""
+    """Base of the plans without feedback of the phase: the frequency is the plan's."""
 
-    demodulation: OpenLoop = OpenLoop()
-    """How force and response are demodulated beside the excitation, to see them settle."""
+    controller: OpenLoop = Field(OpenLoop(), validation_alias=AliasChoices("controller", "demodulation"))
+    """How force and response are demodulated beside the excitation, and the loops that hold levels in newtons or metres."""
 
     @property
     def law(self) -> Law:
-        """No feedback."""
-        return self.demodulation
+        """No feedback of the phase."""
+        return self.controller
 
     def check_frequencies(self, bench: Bench, **frequencies_hz: float) -> None:
         """Refuse a frequency outside the bench's limits."""
@@ -114,17 +117,5 @@ class OpenLoopPlan(Plan):
                 )
 
 
-class TonePlan(OpenLoopPlan):
-    """Base of the plans that put out one frequency at a time."""
-
-    levels_v: tuple[float, ...] = Field(min_length=1)
-    """Amplitudes of the output voltage, V peak; every level is gone through in turn."""
-
-    def check_levels(self, bench: Bench) -> None:
-        """Refuse a level that is not positive or beyond the bench's limit."""
-        for index, level in enumerate(self.levels_v):
-            if not 0.0 < level <= bench.limits.voltage_v:
-                raise ConfigurationError(
-                    f"levels_v[{index}] = {level:g} V: the bench {bench.name} allows above 0 and up to "
-                    f"{bench.limits.voltage_v:g} V"
-                )
+class TonePlan(Levels, OpenLoopPlan):
+    """Base of the plans that put out one frequency at a time; every level is gone through in turn."""

@@ -56,8 +56,6 @@ class SteppedSinePlan(TonePlan):
         for index, frequency_hz in enumerate(self.frequencies_hz or ()):
             if not frequency_hz > 0.0:
                 raise ValueError(f"frequencies_hz[{index}] = {frequency_hz:g}: allowed is above 0")
-        if len(set(self.levels_v)) != len(self.levels_v):
-            raise ValueError("levels_v: a level is given twice")
         if not self.frequencies_at_each_level:
             raise ValueError("frequencies_hz = []: at least one frequency is needed")
         return self
@@ -81,7 +79,7 @@ class SteppedSinePlan(TonePlan):
         up = len(frequencies) < 2 or frequencies[1] >= frequencies[0]
         return tuple(
             Target(number=number, level=level, direction="up" if up else "down", frequency_hz=frequency_hz)
-            for number, (level, frequency_hz) in enumerate((v, f) for v in self.levels_v for f in frequencies)
+            for number, (level, frequency_hz) in enumerate((v, f) for v in self.levels for f in frequencies)
         )
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:

@@ -87,7 +87,7 @@ class SweepPlan(TonePlan):
         up = self.stop_hz > self.start_hz
         return tuple(
             Target(number=number, level=level, direction="up" if up else "down")
-            for number, level in enumerate(self.levels_v)
+            for number, level in enumerate(self.levels)
         )
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:

@@ -97,7 +97,7 @@ def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
             f"{plan_source}: rate_octaves_per_min: a logarithmic sweep cannot be predicted; give rate_hz_per_s"
         )
     notes = _strangers(bench_of(plan, plan_source), models, plan_source)
-    for level_v in plan.levels_v:
+    for level_v in plan.levels:
         predicted = models.predict(VoltageSweep(plan.start_hz, plan.stop_hz, plan.rate_hz_per_s, level_v))
         yield Swept(predicted, None, None, notes)
 

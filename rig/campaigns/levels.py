@@ -1,0 +1,112 @@
+"""Levels of a plan: volts, newtons or metres, and how a loop is brought in before it holds them."""
+
+from dataclasses import replace
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from controller import AmplitudeLaw
+from rig.bench import Bench
+from rig.configuration import Configured
+from rig.errors import ConfigurationError
+from rig.sequencer.layout import SegmentKind
+from rig.sequencer.segments import Excitation, Segment
+
+__all__ = ["LEVELS", "Levels"]
+
+START_RAMP_PERIODS = 10.0
+
+LEVELS = {
+    "levels_v": (AmplitudeLaw.VOLTAGE, "V"),
+    "levels_n": (AmplitudeLaw.FORCE, "N"),
+    "levels_rms_n": (AmplitudeLaw.FORCE_RMS, "N RMS"),
+    "levels_m": (AmplitudeLaw.RESPONSE, "m"),
+}
+"""What each key's levels are, and their unit."""
+
+
+class Levels(Configured):
+    """Levels in exactly one of four quantities; those that a loop holds may begin with a voltage, ``start_v``."""
+
+    levels_v: tuple[float, ...] | None = None
+    """Levels as amplitude of the output voltage, V peak."""
+    levels_n: tuple[float, ...] | None = None
+    """Levels as amplitude of the fundamental force, N peak."""
+    levels_rms_n: tuple[float, ...] | None = None
+    """Levels as root mean square of the force, all harmonics together, N."""
+    levels_m: tuple[float, ...] | None = None
+    """Levels as amplitude of the drive point's fundamental displacement, m peak."""
+    start_v: float | None = Field(None, gt=0)
+    """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""
+    start_periods: float = Field(40.0, ge=1, le=1e5)
+    """Time at ``start_v``, for the lock to be gained, periods."""
+
+    @model_validator(mode="after")
+    def _levels_make_sense(self) -> Self:
+        given = [name for name in LEVELS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"{', '.join(LEVELS)}: exactly one of them is to be given")
+        if not self.levels:
+            raise ValueError(f"{given[0]} = []: at least one level is needed")
+        for index, level in enumerate(self.levels):
+            if not level > 0.0:
+                raise ValueError(f"{given[0]}[{index}] = {level:g}: allowed is above 0")
+        if len(set(self.levels)) != len(self.levels):
+            raise ValueError(f"{given[0]}: a level is given twice; use repeats to measure levels again")
+        return self
+
+    @property
+    def levels_key(self) -> str:
+        """Name of the key that the levels were given by."""
+        return next(name for name in LEVELS if getattr(self, name) is not None)
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """The levels, in V, N or m."""
+        return tuple(getattr(self, self.levels_key))
+
+    @property
+    def amplitude_law(self) -> AmplitudeLaw:
+        """What the levels are."""
+        return LEVELS[self.levels_key][0]
+
+    @property
+    def level_unit(self) -> str:
+        """``V``, ``N``, ``N RMS`` or ``m``."""
+        return LEVELS[self.levels_key][1]
+
+    def start_segments(self, lag_deg: float | None = None, excitation: Excitation | None = None) -> list[Segment]:
+        """Set the rig in motion at ``start_v``; nothing where there is none or the levels are volts."""
+        if self.start_v is None or self.amplitude_law is AmplitudeLaw.VOLTAGE:
+            return []
+        ramp = Segment(
+            SegmentKind.RAMP,
+            -1,
+            self.start_v,
+            START_RAMP_PERIODS,
+            excitation=excitation,
+            amplitude_law=AmplitudeLaw.VOLTAGE,
+            lag_deg=lag_deg,
+        )
+        return [ramp, replace(ramp, kind=SegmentKind.HOLD, periods=self.start_periods)]
+
+    def check_levels(self, bench: Bench) -> None:
+        """Refuse a level beyond the bench's limit, and levels of a logarithmic loop without a voltage to begin with."""
+        limits = bench.limits
+        largest = {"V": limits.voltage_v, "N": limits.force_n, "N RMS": limits.force_n, "m": limits.displacement_m}
+        for index, level in enumerate(self.levels):
+            if level > largest[self.level_unit]:
+                raise ConfigurationError(
+                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: the bench {bench.name} allows up to "
+                    f"{largest[self.level_unit]:g} {self.level_unit}"
+                )
+        if self.start_v is not None and self.start_v > limits.voltage_v:
+            raise ConfigurationError(
+                f"start_v = {self.start_v:g} V: the bench {bench.name} allows up to {limits.voltage_v:g} V"
+            )
+        loops = getattr(self, "controller", None)
+        linear = self.amplitude_law is AmplitudeLaw.VOLTAGE or (
+            self.amplitude_law is not AmplitudeLaw.RESPONSE and getattr(loops, "force_loop", "linear") == "linear"
+        )
+        if self.start_v is None and not linear:
+            raise ConfigurationError(f"start_v: levels by {self.levels_key} of this loop need a voltage to begin with")
