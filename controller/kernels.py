@@ -1,4 +1,4 @@
-"""Compiled primitives of the control law, one sample a call.
+"""Compiled primitives of every law, one sample a call: oscillator, low-pass, PI law with clamp.
 
 Conventions: ``theta`` is the oscillator's phase in rad; a signal is ``y(t) = Re sum_h Y_h exp(i h theta)`` with peak
 amplitudes; the phase lag of a response Y behind a force F is ``arg F_1 - arg Y_1``; the phase error is the wanted
@@ -7,10 +7,10 @@ lag minus the measured one, wrapped, positive below resonance, so that a positiv
 
 import math
 
-from controller.layout import ACQUIRING, LOCKED, LOST, SEARCHING
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import kernel
 
 TWO_PI = 2.0 * math.pi
+LARGEST_FREQUENCY_ERROR = 0.05  # of the frequency
 
 
 @kernel
@@ -35,40 +35,9 @@ def track(mean: float, value: float, gain: float) -> float:
 
 
 @kernel
-def demodulate(estimate: complex, value: float, cos_theta: float, sin_theta: float, gain: float) -> complex:
-    """Two-phase (synchronous) demodulation: low-passed ``2 y exp(-i theta)``, which settles on Y_1.
-
-    Passes a ripple at 2 Omega of relative size a/(2 Omega), and harmonics h of y likewise at (h +- 1) Omega.
-    """
-    return complex(
-        estimate.real + gain * (2.0 * value * cos_theta - estimate.real),
-        estimate.imag + gain * (-2.0 * value * sin_theta - estimate.imag),
-    )
-
-
-@kernel
 def size(value: complex) -> float:
     """Modulus of a complex amplitude; a plain root: the library's overflow-proof one costs a tenth of the sample."""
     return math.sqrt(value.real * value.real + value.imag * value.imag)
-
-
-@kernel
-def sign_product(force: float, acceleration: float) -> float:
-    """Sign detector: sign(force) sign(displacement-like signal), the acceleration's sign reversed standing for displacement.
-
-    For two sines its mean is ``(2/pi) e`` with the phase error e to phase resonance. Harmonics of either signal move
-    the zero crossings and bias it.
-    """
-    if force == 0.0 or acceleration == 0.0:
-        return 0.0
-    return -1.0 if (force > 0.0) == (acceleration > 0.0) else 1.0
-
-
-@kernel
-def phase_lag(force: complex, response: complex) -> float:
-    """Phase lag ``arg F_1 - arg Y_1`` in rad, in [-pi, pi)."""
-    product = force * complex(response.real, -response.imag)
-    return math.atan2(product.imag, product.real)
 
 
 @kernel
@@ -89,41 +58,13 @@ def proportional_integral(
 
 
 @kernel
-def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool, error: float) -> None:
-    """Advance the lock state by one oscillator period, from the period's mean phase error (rad).
+def frequency_error(phase_error: float, compliance: float, omega: float, wanted_lag: float) -> float:
+    """Distance (rad/s) of the oscillator from where a mode has the wanted lag: ``(Omega/2)(phi_d^2 |F|/|A|) sin e/|sin phi*|``.
 
-    ``present``: force and response stand above the smallest amplitudes that a phase can be read from.
-    ``held``: the level is not being ramped; only then is a large error counted towards a lost lock.
+    ``compliance`` is ``phi_d^2 |F_1|/|A_1|``, ``phase_error`` e the wanted lag phi* less the measured one. With
+    ``phi_d^2 F/A = 1 - (w/Omega)^2 - 2 i zeta w/Omega`` and phi* = -90 deg it is ``w - Omega`` to first order: the slope of the
+    phase over the frequency, which goes with the damping, is divided out. Bounded by a part of Omega.
     """
-    size = abs(error)
-    if not present:
-        lock.close_periods = 0
-        if lock.state == LOCKED:
-            lock.far_periods += 1
-            if lock.far_periods >= thresholds.lost_periods:
-                lock.state = LOST
-        elif lock.state != LOST:
-            lock.state = SEARCHING
-        return
-    if lock.state == SEARCHING:
-        lock.state = ACQUIRING
-    lock.close_periods = lock.close_periods + 1 if size < thresholds.locked_rad else 0
-    if size > thresholds.lost_rad and held:
-        lock.far_periods += 1
-    elif size > thresholds.lost_rad and lock.state == LOCKED:
-        lock.state = ACQUIRING
-    else:
-        lock.far_periods = 0
-    if lock.close_periods >= thresholds.locked_periods:
-        lock.state = LOCKED
-        lock.far_periods = 0
-    elif lock.state == LOCKED and lock.far_periods >= thresholds.lost_periods:
-        lock.state = LOST
-
-
-@kernel
-def reacquire(lock: Record) -> None:
-    """A new level is being approached: a lost lock may be sought again."""
-    lock.far_periods = 0
-    lock.close_periods = 0
-    lock.state = ACQUIRING
+    bound = LARGEST_FREQUENCY_ERROR * omega
+    error = 0.5 * omega * compliance * math.sin(phase_error) / abs(math.sin(wanted_lag))
+    return float(min(max(error, -bound), bound))

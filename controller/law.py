@@ -1,13 +1,13 @@
-"""What the tick asks of a control law, and the law of open-loop excitation."""
+"""What the tick asks of a control law, and the law of a tone whose frequency the plan gives."""
 
-import math
 from typing import Protocol
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
+from controller.amplitude.loops import AmplitudeLoops
+from controller.demodulation.settings import Demodulation
 from controller.layout import LAW, AmplitudeLaw
-from controller.pll import LockRule
+from controller.lock.rule import LockRule
 
 __all__ = ["Law", "OpenLoop"]
 
@@ -19,34 +19,37 @@ class Law(Protocol):
     def lock(self) -> LockRule:
         """When a lock counts as gained and as lost."""
 
-    def build(self, sample_rate_hz: float, amplitude_law: AmplitudeLaw, largest_v: float) -> np.ndarray:
-        """One record of `controller.layout.LAW`; ValueError where the law does not fit."""
+    def build(
+        self,
+        sample_rate_hz: float,
+        amplitude_law: AmplitudeLaw,
+        largest_v: float,
+        drive_mode_shape: float | None = None,
+    ) -> np.ndarray:
+        """One record of `controller.layout.LAW`; ValueError where the law does not fit.
+
+        ``amplitude_law`` is what the plan's levels are, ``largest_v`` the largest output amplitude (V), beyond which no loop
+        integrates, ``drive_mode_shape`` the tested mode's mass-normalised shape at the drive point (kg^-1/2), where known.
+        """
 
 
-class OpenLoop(BaseModel):
-    """No feedback: the plan gives frequency and voltage. Force and response are demodulated, to see them settle."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    low_pass_rad_s: float = Field(2.0 * math.pi, gt=0, le=1e4)
-    """Corner of the first-order low-pass behind the demodulation, rad/s."""
-    mean_corner_hz: float = Field(0.3, gt=0, le=100)
-    """Corner of the high-pass that takes the mean out of every input before it is demodulated, Hz."""
+class OpenLoop(Demodulation, AmplitudeLoops):
+    """No feedback of the phase: the plan gives the frequency, and the level is volts or is held by one of the loops."""
 
     @property
     def lock(self) -> LockRule:
         """Rules of a lock that is never sought; they name the smallest amplitudes a phase can be read from."""
         return LockRule()
 
-    def build(self, sample_rate_hz: float, amplitude_law: AmplitudeLaw, largest_v: float) -> np.ndarray:
-        """Coefficients for a sample rate; ValueError for levels in newtons, which nothing would hold."""
-        if amplitude_law is not AmplitudeLaw.VOLTAGE:
-            raise ValueError("amplitude_law: levels in newtons need a force loop, allowed in open loop is volts")
-        dt = 1.0 / sample_rate_hz
+    def build(
+        self,
+        sample_rate_hz: float,
+        amplitude_law: AmplitudeLaw,
+        largest_v: float,
+        drive_mode_shape: float | None = None,
+    ) -> np.ndarray:
+        """Coefficients for a sample rate: one record of `controller.layout.LAW`."""
         out = np.zeros(1, LAW)
-        out["dt_s"] = dt
-        out["demodulator_gain"] = -math.expm1(-self.low_pass_rad_s * dt)
-        out["mean_gain"] = -math.expm1(-2.0 * math.pi * self.mean_corner_hz * dt)
-        out["amplitude_law"] = amplitude_law
-        out["largest_v"] = largest_v
+        self.fill_demodulation(out, sample_rate_hz)
+        self.fill_amplitude(out, amplitude_law, largest_v)
         return out

@@ -4,11 +4,21 @@ import math
 
 import numpy as np
 
-from controller.kernels import reacquire
-from controller.layout import LOST
+from controller.layout import LOST, VOLTAGE
+from controller.lock.kernels import reacquire
 from rig.safety.kernels import shut_down
 from rig.safety.layout import ARMED, EndReason
-from rig.sequencer.layout import LONGEST_AVERAGE, LOOP_DRIVE, RAMP, RECORD, SETTLE, SWEEP, OnFailure, Outcome
+from rig.sequencer.layout import (
+    LEVEL_SWEEP,
+    LONGEST_AVERAGE,
+    LOOP_DRIVE,
+    RAMP,
+    RECORD,
+    SETTLE,
+    SWEEP,
+    OnFailure,
+    Outcome,
+)
 from vibrolock.compiled import Record, kernel
 
 COMPLETED = int(EndReason.COMPLETED)
@@ -24,9 +34,11 @@ LOST_LOCK = int(Outcome.LOST_LOCK)
 UNREACHABLE = int(Outcome.UNREACHABLE)
 SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
+OUTSIDE_WINDOW = int(Outcome.OUTSIDE_WINDOW)
 STOP = int(OnFailure.STOP)
 
 SATURATED_PERIODS = 20
+CLAMPED_PERIODS = 20
 ARRIVED = 1e-3  # the output within this part of the larger of a ramp's levels is at its end
 LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
 
@@ -48,22 +60,25 @@ def judge_period(
     error: float,
     response: float,
     force: float,
-    wanted_force: float,
+    wanted: float,
+    controlled: float,
     saturated: bool,
-    open_loop: bool,
+    clamped: bool,
+    watch_force: bool,
 ) -> None:
     """Take in one period's means and apply the settle rule.
 
     Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the
     averaged response amplitude within ``amplitude`` (relative) of what it was that many periods before, for
-    ``settled_periods`` in a row. With a force level, the averaged force must be within ``amplitude`` of it too; in open
-    loop it must keep still as the response does.
+    ``settled_periods`` in a row. Where a loop holds the level, what it controls must on average be within ``amplitude`` of
+    what is ``wanted`` (0: there is no loop). With ``watch_force`` (open loop, held response) the force must keep still too.
     """
     n = rule.average_periods
     slot = settling.count % (2 * LONGEST_AVERAGE)
     settling.errors[slot] = error
     settling.responses[slot] = response
     settling.forces[slot] = force
+    settling.controlled[slot] = controlled
     last = settling.count
     settling.count += 1
     if settling.count < 2 * n:
@@ -71,10 +86,10 @@ def judge_period(
     settling.mean_error_rad = mean_of(settling.errors, last, n)
     new, old = mean_of(settling.responses, last, n), mean_of(settling.responses, last - n, n)
     drift = (new - old) / new if new > 0.0 else math.inf
-    if wanted_force > 0.0:
-        miss = mean_of(settling.forces, last, n) / wanted_force - 1.0
+    if wanted > 0.0:
+        miss = mean_of(settling.controlled, last, n) / wanted - 1.0
         drift = miss if abs(miss) > abs(drift) else drift
-    if open_loop:
+    if watch_force:
         new = mean_of(settling.forces, last, n)
         moved = (new - mean_of(settling.forces, last - n, n)) / new if new > 0.0 else math.inf
         drift = moved if abs(moved) > abs(drift) else drift
@@ -86,6 +101,7 @@ def judge_period(
     settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
     unreached = saturated and abs(drift) > 2.0 * rule.amplitude
     settling.saturated_periods = settling.saturated_periods + 1 if unreached else 0
+    settling.clamped_periods = settling.clamped_periods + 1 if clamped else 0
 
 
 @kernel
@@ -95,6 +111,7 @@ def forget_periods(settling: Record) -> None:
     settling.good_periods = 0
     settling.bad_periods = 0
     settling.saturated_periods = 0
+    settling.clamped_periods = 0
     settling.mean_error_rad = math.nan
     settling.drift = math.nan
 
@@ -106,6 +123,8 @@ def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed:
         return LOST_LOCK
     if settling.saturated_periods >= SATURATED_PERIODS:
         return UNREACHABLE
+    if settling.clamped_periods >= CLAMPED_PERIODS:
+        return OUTSIDE_WINDOW
     if kind == RECORD and settling.bad_periods >= rule.average_periods:
         return DISTURBED
     if kind == SETTLE and elapsed >= periods:
@@ -141,6 +160,33 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, sam
 
 
 @kernel
+def give_up(
+    progress: Record,
+    segments: np.ndarray,
+    outcomes: np.ndarray,
+    settling: Record,
+    guard: Record,
+    failure: int,
+    cycle: float,
+    sample: int,
+) -> None:
+    """The present segment has failed: on to the next point, or end the run, as its plan wants it."""
+    segment = segments[progress.segment]
+    close_segment(progress, outcomes, settling, failure, cycle, sample)
+    if (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
+        progress.finished = 1
+        shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
+    else:
+        skip_point(progress, segments, outcomes, sample)
+
+
+@kernel
+def is_ramp(kind: int) -> bool:
+    """Whether a segment changes the level."""
+    return kind in (RAMP, LEVEL_SWEEP)
+
+
+@kernel
 def swept(segment: Record, start_omega: float, samples: int) -> float:
     """Frequency (rad/s) of a sweep in the middle of a sampling interval: held over it, a linear one has its exact phase."""
     way = segment.rate * (samples + 0.5)
@@ -155,10 +201,18 @@ def between(start: float, end: float, rise: float) -> float:
 
 
 @kernel
+def ramped(start: float, end: float, rise: float, geometric: bool) -> float:
+    """Level at ``rise`` (0 to 1) of a ramp, by its value or its logarithm."""
+    if geometric and start > 0.0 and end > 0.0:
+        return float(min(max(start * (end / start) ** rise, min(start, end)), max(start, end)))
+    return between(start, end, rise)
+
+
+@kernel
 def has_arrived(segment: Record, start_level: float, amplitude_v: float) -> bool:
     """Whether the output (V) is where a ramp of tone or waveform ends: the slew limit may have held it back."""
-    if segment.drive == LOOP_DRIVE:
-        return True  # its level may be a force, and its settle rule waits for the output
+    if segment.drive == LOOP_DRIVE or segment.amplitude_law != VOLTAGE:
+        return True  # its settle rule waits for the output
     return bool(abs(amplitude_v - segment.level) <= ARRIVED * max(start_level, segment.level))
 
 
@@ -173,10 +227,12 @@ def advance(
     guard: Record,
     cycle: float,
     sample: int,
+    unreached: bool,
 ) -> None:
-    """One sample of the sequencer: sets level and frequency, moves on when a segment is over, ends the run after the last.
+    """One sample of the sequencer: sets level, lag and frequency, moves on when a segment is over, ends the run after the last.
 
-    ``cycle`` is the number of oscillator periods seen by the inputs so far, with its fraction.
+    ``cycle`` is the number of oscillator periods seen by the inputs so far, with its fraction. ``unreached``: the output stands
+    at its limit and the level of the moment is not reached; a ramp waits then.
     """
     if progress.finished:
         return
@@ -198,20 +254,29 @@ def advance(
         progress.start_sample = sample
         progress.start_level = progress.level
         progress.start_omega = progress.omega
+        progress.start_lag = progress.lag
+        progress.last_cycle = cycle
+        progress.frozen_cycles = 0.0
         outcomes[progress.segment].outcome = RUNNING
         outcomes[progress.segment].first_sample = sample
-        if segment.kind == RAMP and lock.state == LOST:
+        if is_ramp(segment.kind) and lock.state == LOST:
             reacquire(lock)
         if segment.kind == SETTLE:
             forget_periods(settling)
+    if unreached and is_ramp(segment.kind):
+        progress.frozen_cycles += cycle - progress.last_cycle
+    progress.last_cycle = cycle
     elapsed = cycle - progress.start_cycle
-    if segment.kind == RAMP:
-        done = min(elapsed / segment.periods, 1.0)
+    if is_ramp(segment.kind):
+        done = min((elapsed - progress.frozen_cycles) / segment.periods, 1.0)
         rise = 0.5 * (1.0 - math.cos(math.pi * done))
-        progress.level = between(progress.start_level, segment.level, rise)
+        progress.level = ramped(progress.start_level, segment.level, rise, segment.geometric == 1)
+        progress.lag = between(progress.start_lag, segment.lag_rad, rise)
         progress.omega = between(progress.start_omega, segment.omega, rise)
         if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        elif progress.frozen_cycles >= SATURATED_PERIODS:
+            give_up(progress, segments, outcomes, settling, guard, UNREACHABLE, cycle, sample)
         return
     progress.level = segment.level
     if segment.kind == SWEEP:
@@ -220,18 +285,14 @@ def advance(
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
         return
     progress.omega = segment.omega
+    progress.lag = segment.lag_rad
     if segment.kind == SETTLE and settling.good_periods >= rule.settled_periods:
         close_segment(progress, outcomes, settling, DONE, cycle, sample)
         return
     if segment.kind == SETTLE or segment.kind == RECORD:
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
         if failure != RUNNING:
-            close_segment(progress, outcomes, settling, failure, cycle, sample)
-            if (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
-                progress.finished = 1
-                shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
-            else:
-                skip_point(progress, segments, outcomes, sample)
+            give_up(progress, segments, outcomes, settling, guard, failure, cycle, sample)
             return
     if segment.kind != SETTLE and elapsed >= segment.periods:
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end

@@ -23,6 +23,8 @@ class SegmentKind(IntEnum):
     """Hold for ``periods``, watched by nobody."""
     SWEEP = 4
     """Hold the level and sweep the frequency of a tone to ``omega``; these rows are evaluated."""
+    LEVEL_SWEEP = 5
+    """A ramp of the level whose rows are evaluated."""
 
 
 class Drive(IntEnum):
@@ -51,6 +53,8 @@ class Outcome(IntEnum):
     """The output stood at its voltage limit and the level was not reached."""
     SKIPPED = 7
     INTERRUPTED = 8
+    OUTSIDE_WINDOW = 9
+    """The loop's frequency stood at an end of its window."""
 
 
 class OnFailure(IntEnum):
@@ -60,7 +64,7 @@ class OnFailure(IntEnum):
     STOP = 1
 
 
-RAMP, SETTLE, RECORD, HOLD, SWEEP = (int(kind) for kind in SegmentKind)
+RAMP, SETTLE, RECORD, HOLD, SWEEP, LEVEL_SWEEP = (int(kind) for kind in SegmentKind)
 LOOP_DRIVE, TONE, WAVEFORM = (int(drive) for drive in Drive)
 
 SEGMENT = np.dtype(
@@ -68,6 +72,9 @@ SEGMENT = np.dtype(
         ("kind", "i8"),
         ("point", "i8"),
         ("level", "f8"),
+        ("amplitude_law", "i8"),
+        ("geometric", "i8"),
+        ("lag_rad", "f8"),
         ("periods", "f8"),
         ("on_failure", "i8"),
         ("on_lost_lock", "i8"),
@@ -78,8 +85,9 @@ SEGMENT = np.dtype(
         ("waveform", "i8"),
     ]
 )
-"""One segment of a plan; ``level`` in V or N after the plan's amplitude law, ``omega`` (rad/s) that a tone ends with, ``rate``
-of a sweep in rad/s per sample, of a logarithmic one in 1 per sample, ``waveform`` the number of the one that is played."""
+"""One segment of a plan; ``level`` in the unit of its amplitude law (V, N, m), where ``geometric`` ramped by its logarithm,
+``lag_rad`` the wanted phase lag, ``omega`` (rad/s) that a tone ends with, ``rate`` of a sweep in rad/s per sample, of a
+logarithmic one in 1 per sample, ``waveform`` the number of the one that is played."""
 
 OUTCOME = np.dtype(
     [
@@ -103,10 +111,12 @@ SETTLING = np.dtype(
         ("errors", "f8", (2 * LONGEST_AVERAGE,)),
         ("responses", "f8", (2 * LONGEST_AVERAGE,)),
         ("forces", "f8", (2 * LONGEST_AVERAGE,)),
+        ("controlled", "f8", (2 * LONGEST_AVERAGE,)),
         ("count", "i8"),
         ("good_periods", "i8"),
         ("bad_periods", "i8"),
         ("saturated_periods", "i8"),
+        ("clamped_periods", "i8"),
         ("mean_error_rad", "f8"),
         ("drift", "f8"),
     ]
@@ -118,13 +128,17 @@ PROGRESS = np.dtype(
         ("segment", "i8"),
         ("segments", "i8"),
         ("start_cycle", "f8"),
+        ("last_cycle", "f8"),
+        ("frozen_cycles", "f8"),
         ("start_sample", "i8"),
         ("start_level", "f8"),
         ("level", "f8"),
+        ("start_lag", "f8"),
+        ("lag", "f8"),
         ("start_omega", "f8"),
         ("omega", "f8"),
         ("finished", "i8"),
         ("entered", "i8"),
     ]
 )
-"""Where in the plan the run stands (one record)."""
+"""Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow."""

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from controller import AmplitudeLaw
 from rig.configuration import Configured
 from rig.sequencer.layout import LONGEST_AVERAGE, OUTCOME, SEGMENT, SETTLE_RULE, Drive, OnFailure, SegmentKind
 
@@ -69,10 +70,12 @@ class Excitation:
 
 @dataclass(frozen=True)
 class Segment:
-    """One step of a plan: its kind, the point it belongs to (-1: none), the level (V or N) and its length in periods.
+    """One step of a plan: its kind, the point it belongs to (-1: none), the level (V, N or m) and its length in periods.
 
-    Without an ``excitation`` the phase-locked loop chooses the frequency. A sweep is over at its last frequency, whatever its
-    ``periods``.
+    Without an ``excitation`` the phase-locked loop chooses the frequency, for the lag ``lag_deg`` (if not given, the law's).
+    ``amplitude_law`` says what the level is (if not given, the plan's); where it changes, the level begins at what is
+    measured, without a bump. A ``geometric`` ramp goes by the level's logarithm. A sweep is over at its last frequency,
+    whatever its ``periods``.
     """
 
     kind: SegmentKind
@@ -82,14 +85,28 @@ class Segment:
     on_failure: OnFailure = OnFailure.SKIP
     on_lost_lock: OnFailure = OnFailure.STOP
     excitation: Excitation | None = None
+    amplitude_law: AmplitudeLaw | None = None
+    lag_deg: float | None = None
+    geometric: bool = False
 
 
-def segment_table(segments: Sequence[Segment], sample_rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
-    """The table of segments, and the table of outcomes that goes with it, all pending."""
+def segment_table(
+    segments: Sequence[Segment],
+    sample_rate_hz: float,
+    amplitude_law: AmplitudeLaw = AmplitudeLaw.VOLTAGE,
+    lag_rad: float = -0.5 * math.pi,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The table of segments, and the table of outcomes that goes with it, all pending.
+
+    ``amplitude_law`` and ``lag_rad`` are those of segments that name none.
+    """
     table = np.zeros(len(segments), SEGMENT)
     for row, segment in zip(table, segments, strict=True):
         row["kind"], row["point"], row["level"] = segment.kind, segment.point, segment.level
         row["periods"] = segment.periods
+        row["amplitude_law"] = amplitude_law if segment.amplitude_law is None else segment.amplitude_law
+        row["lag_rad"] = lag_rad if segment.lag_deg is None else math.radians(segment.lag_deg)
+        row["geometric"] = segment.geometric
         row["on_failure"], row["on_lost_lock"] = segment.on_failure, segment.on_lost_lock
         if segment.excitation is not None:
             _fill_in(row, segment.excitation, sample_rate_hz)

@@ -8,19 +8,9 @@ import math
 
 import numpy as np
 
-from controller.kernels import (
-    TWO_PI,
-    advance_phase,
-    demodulate,
-    next_lock_state,
-    phase_lag,
-    proportional_integral,
-    sign_product,
-    size,
-    track,
-    wrap,
-)
-from controller.layout import FORCE, LOCKED, SIGN
+from controller.demodulation.kernels import adapt, demodulate, sign_product, turn_phasors
+from controller.kernels import TWO_PI, advance_phase, size, track
+from controller.layout import ADAPTIVE, SIGN
 from rig.safety.kernels import (
     NON_FINITE_OUTPUT,
     SENSOR_OVERLOAD,
@@ -31,12 +21,22 @@ from rig.safety.kernels import (
     watch_motion,
 )
 from rig.safety.layout import ARMED
-from rig.sequencer.kernels import advance, judge_period
-from rig.sequencer.layout import LOOP_DRIVE, RAMP, TONE, WAVEFORM
+from rig.sequencer.kernels import advance, is_ramp
+from rig.sequencer.layout import LOOP_DRIVE, WAVEFORM
+from rig.tick.laws.kernels import (
+    add_to_period,
+    choose_frequency,
+    close_period,
+    controlled_size,
+    demanded_amplitude,
+    phase_error,
+    take_over,
+)
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
 from vibrolock.compiled import Record, kernel
 
 STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
+UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
 HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
 
 
@@ -68,13 +68,13 @@ def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tupl
 
 
 @kernel
-def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
-    """Check, convert and demodulate every input channel; returns the telemetry flags of the inputs."""
+def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
+    """Check and convert every input channel; returns the telemetry flags of the inputs."""
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
     armed = guard.mode == ARMED
     driven = armed and loop.held == 1
     # At first the mean of all samples so far: noise or ambient vibration in a single one would be integrated as travel.
-    mean_gain, gain = max(law.mean_gain, 1.0 / (loop.sample + 1.0)), law.demodulator_gain
+    mean_gain = max(law.mean_gain, 1.0 / (loop.sample + 1.0))
     flags = 0
     force = 0.0
     drive = 0.0
@@ -96,101 +96,42 @@ def estimate_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray, cos_
         mean = track(watch.mean, value, mean_gain)
         watch.mean = mean
         value -= mean
-        watch.estimate = demodulate(watch.estimate, value, cos_theta, sin_theta, gain)
         if index == loop.force_channel:
             force = value
         if index == loop.drive_channel:
             drive = value
         if channel.watch_displacement == 1 and moves:
             watch_motion(guard, limits, watch, value, index, loop.sample)
-    if law.detector == SIGN:
-        loop.sign_mean = track(loop.sign_mean, sign_product(force, drive), gain)
+    loop.force, loop.drive_motion = force, drive
     return flags
 
 
 @kernel
-def phase_error(t: TickArrays, force: complex, drive: complex) -> float:
-    """Wanted minus measured phase lag in rad, by the detector of the plan, with the channels' skew taken out."""
-    law, loop = t.law[0], t.loop[0]
-    skew = t.inputs[loop.force_channel].skew_samples - t.inputs[loop.drive_channel].skew_samples
-    lag_of_skew = loop.omega * skew * law.dt_s
-    if law.detector == SIGN:
-        return float(0.5 * math.pi * loop.sign_mean - lag_of_skew)
-    return wrap(law.target_lag_rad - phase_lag(force, drive) - lag_of_skew)
-
-
-@kernel
-def close_period(t: TickArrays, present: bool) -> None:
-    """An oscillator period has ended at the inputs: lock state and settle rule take its means."""
-    law, loop = t.law[0], t.loop[0]
-    n = loop.sum_samples
-    if n > 0:
-        loop.mean_error = loop.sum_error / n
-    if n > 0 and loop.drive != WAVEFORM:
-        error = loop.sum_error / n if present else math.nan
-        open_loop = loop.drive == TONE
-        if not open_loop:
-            next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
-        wanted = t.progress[0].level if law.amplitude_law == FORCE else 0.0
-        locked = (open_loop or t.lock[0].state == LOCKED) and loop.held_back == 0
-        judge_period(
-            t.settling[0],
-            t.rule[0],
-            locked,
-            error,
-            loop.sum_response / n,
-            loop.sum_force / n,
-            wanted,
-            loop.saturated == 1,
-            open_loop,
-        )
-    loop.sum_error = 0.0
-    loop.sum_response = 0.0
-    loop.sum_force = 0.0
-    loop.sum_samples = 0
-
-
-@kernel
-def demanded_amplitude(t: TickArrays, force_amplitude: float) -> float:
-    """Amplitude law: the output amplitude (V) for the level of the moment."""
-    law, loop, level = t.law[0], t.loop[0], t.progress[0].level
-    if law.amplitude_law == FORCE:
-        demanded, loop.amplitude_integral = proportional_integral(
-            level - force_amplitude, loop.amplitude_integral, law.k3, law.k4, law.dt_s, 0.0, 0.0, law.largest_v
-        )
+def demodulate_inputs(t: TickArrays, cos_theta: float, sin_theta: float) -> None:
+    """Force and drive-point motion of this sample into their complex amplitudes and sizes."""
+    law, loop, gain = t.law[0], t.loop[0], t.law[0].demodulator_gain
+    force, drive = t.watches[loop.force_channel], t.watches[loop.drive_channel]
+    if law.detector == ADAPTIVE:
+        turn_phasors(t.phasors, cos_theta, sin_theta)
+        adapt(t.filters[0], t.phasors, loop.force, gain)
+        adapt(t.filters[1], t.phasors, loop.drive_motion, gain)
+        force.estimate, drive.estimate = t.filters[0, 1], t.filters[1, 1]
     else:
-        demanded = level
-    loop.saturated = 1 if demanded >= law.largest_v else 0
-    return float(demanded)
-
-
-@kernel
-def choose_frequency(t: TickArrays, present: bool) -> int:
-    """Frequency law: that of the loop, or the plan's; returns the telemetry flag of a loop at its window."""
-    law, loop = t.law[0], t.loop[0]
-    if loop.drive == WAVEFORM:
-        loop.omega = TWO_PI / (t.waveforms.shape[1] * law.dt_s)
-    elif loop.drive == TONE:
-        loop.omega = t.progress[0].omega
-    elif present:
-        loop.omega, loop.phase_integral = proportional_integral(
-            loop.mean_error if law.period_mean == 1 else loop.error,
-            loop.phase_integral,
-            law.kp,
-            law.ki,
-            law.dt_s,
-            law.centre_rad_s,
-            law.lowest_rad_s,
-            law.highest_rad_s,
-        )
-        if loop.omega == law.lowest_rad_s or loop.omega == law.highest_rad_s:
-            return FREQUENCY_CLAMPED
-    return 0
+        force.estimate = demodulate(force.estimate, loop.force, cos_theta, sin_theta, gain)
+        drive.estimate = demodulate(drive.estimate, loop.drive_motion, cos_theta, sin_theta, gain)
+        loop.force_square = track(loop.force_square, loop.force * loop.force, gain)
+        if law.detector == SIGN:
+            loop.sign_mean = track(loop.sign_mean, sign_product(loop.force, loop.drive_motion), gain)
+    loop.force_size, loop.response_size = size(force.estimate), size(drive.estimate)
+    loop.displacement = loop.response_size / (loop.omega * loop.omega)
 
 
 @kernel
 def oscillate(t: TickArrays, amplitude: float) -> float:
-    """The output (V) of this sample, and the oscillator one sample on; a waveform is played by its number of the sample."""
+    """The output (V) of this sample, ``Re(U exp(i theta))``, and the oscillator one sample on.
+
+    A waveform is played by its number of the sample.
+    """
     loop = t.loop[0]
     if loop.drive == WAVEFORM:
         period = t.waveforms.shape[1]
@@ -198,7 +139,7 @@ def oscillate(t: TickArrays, amplitude: float) -> float:
         loop.play = loop.play + 1 if loop.play + 1 < period else 0
         theta = TWO_PI * loop.play / period
     else:
-        output = amplitude * math.cos(loop.theta)
+        output = amplitude * math.cos(loop.theta + loop.turn)
         theta = advance_phase(loop.theta, loop.omega, t.law[0].dt_s)
     if not math.isfinite(output):
         shut_down(t.guard[0], NON_FINITE_OUTPUT, -1, output, loop.sample, True)
@@ -207,6 +148,7 @@ def oscillate(t: TickArrays, amplitude: float) -> float:
     sent.theta = loop.theta
     sent.omega = loop.omega
     sent.amplitude_v = amplitude
+    sent.turn = loop.turn
     sent.output_v = output
     loop.theta = theta
     loop.sample += 1
@@ -225,41 +167,45 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
     row.theta_rad = theta_in
     row.frequency_hz = seen.omega / TWO_PI
     row.output_v = seen.output_v
-    row.command_v = seen.amplitude_v
+    row.command_v = (
+        complex(seen.amplitude_v * math.cos(seen.turn), seen.amplitude_v * math.sin(seen.turn))
+        if seen.turn != 0.0
+        else complex(seen.amplitude_v, 0.0)
+    )
 
-    flags = estimate_inputs(t, volts, readings, math.cos(theta_in), math.sin(theta_in))
-    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
-    size_f, size_a = size(force), size(drive)
-    present = size_f >= t.thresholds[0].smallest_force_n and size_a >= t.thresholds[0].smallest_response
+    flags = take_in(t, volts, readings)
+    demodulate_inputs(t, math.cos(theta_in), math.sin(theta_in))
+    thresholds = t.thresholds[0]
+    present = loop.force_size >= thresholds.smallest_force_n and loop.response_size >= thresholds.smallest_response
     closed = present and loop.drive == LOOP_DRIVE
-    loop.error = phase_error(t, force, drive) if closed else 0.0
+    loop.error = phase_error(t) if closed else 0.0
 
     if theta_in < loop.theta_in:
         loop.cycles += 1
         close_period(t, present)
     loop.theta_in = theta_in
-    loop.sum_error += loop.error
-    loop.sum_response += size_a
-    loop.sum_force += size_f
-    loop.sum_samples += 1
+    add_to_period(t)
 
+    if progress.entered == 0 and progress.finished == 0 and progress.segment < progress.segments:
+        take_over(t, t.segments[progress.segment])
     cycle = loop.cycles + theta_in / TWO_PI
-    advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.lock[0], guard, cycle, now)
+    unreached = loop.saturated == 1 and controlled_size(t) < UNREACHED * progress.level
+    advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.lock[0], guard, cycle, now, unreached)
     running = guard.mode == ARMED and progress.finished == 0
     loop.held = 0
     if running and progress.entered == 1:
         segment = t.segments[progress.segment]
-        loop.held = 1 if segment.kind != RAMP else 0
-        loop.drive = segment.drive
+        loop.held = 0 if is_ramp(segment.kind) else 1
         loop.waveform = segment.waveform
     flags |= HELD if loop.held == 1 else 0
 
     demanded = 0.0
     if running:
-        flags |= choose_frequency(t, present)
+        choose_frequency(t, present)
+        flags |= FREQUENCY_CLAMPED if loop.clamped == 1 else 0
         if loop.drive != WAVEFORM:
             watch_frequency(guard, t.limits[0], loop.omega, now)
-        demanded = demanded_amplitude(t, size_f)
+        demanded = demanded_amplitude(t, present)
         flags |= SATURATED if loop.saturated == 1 else 0
     amplitude = permitted_amplitude(guard, t.limits[0], demanded, now)
     loop.held_back = 1 if abs(amplitude - demanded) > HELD_BACK * abs(demanded) else 0

@@ -22,24 +22,41 @@ LOOP = np.dtype(
         ("cycles", "i8"),
         ("held", "i8"),
         ("phase_integral", "f8"),
-        ("amplitude_integral", "f8"),
+        ("taking_over", "i8"),
+        ("force", "f8"),
+        ("drive_motion", "f8"),
         ("sign_mean", "f8"),
+        ("force_square", "f8"),
+        ("force_size", "f8"),
+        ("response_size", "f8"),
+        ("displacement", "f8"),
+        ("amplitude_law", "i8"),
+        ("demanded_v", "f8"),
+        ("turn", "f8"),
+        ("force_integral", "f8"),
+        ("log_integral", "c16"),
+        ("log_reference", "f8"),
+        ("reference_turn", "f8"),
+        ("response_error", "c16"),
         ("error", "f8"),
         ("mean_error", "f8"),
         ("sum_error", "f8"),
         ("sum_force", "f8"),
         ("sum_response", "f8"),
+        ("sum_controlled", "f8"),
         ("sum_samples", "i8"),
         ("saturated", "i8"),
+        ("clamped", "i8"),
         ("held_back", "i8"),
         ("drive", "i8"),
         ("waveform", "i8"),
         ("play", "i8"),
     ]
 )
-"""State of oscillator and laws (one record)."""
+"""State of oscillator and laws (one record). ``turn``: angle of the complex command U; ``displacement``: amplitude of the
+drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at."""
 
-HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("output_v", "f8")])
+HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """What the tick has sent out and the inputs have not yet seen; a ring."""
 
 ROW = np.dtype(
@@ -95,7 +112,8 @@ def recorded_row(n_channels: int) -> np.dtype[Any]:
 class TickArrays(NamedTuple):
     """Everything the tick reads and writes. The first seven are constants of the run, the rest is its state.
 
-    ``waveforms`` [n, period]: periodic waveforms of unit peak that segments may play; [1, 1] without any.
+    ``waveforms`` [n, period]: periodic waveforms of unit peak that segments may play; [1, 1] without any. ``phasors``
+    complex [H+1] and ``filters`` complex [2, H+1] belong to the adaptive filters of force and drive.
     """
 
     law: np.ndarray
@@ -113,3 +131,5 @@ class TickArrays(NamedTuple):
     progress: np.ndarray
     outcomes: np.ndarray
     history: np.ndarray
+    phasors: np.ndarray
+    filters: np.ndarray

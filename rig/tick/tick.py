@@ -43,14 +43,17 @@ class Tick:
         armed: bool = True,
     ) -> None:
         try:
-            law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v)
+            law_record = law.build(
+                bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, bench.specimen.drive_mode_shape
+            )
         except ValueError as error:
             raise ConfigurationError(f"controller.{error}") from None
         if lead_samples < 1.0:
             raise ConfigurationError(
                 f"lead_samples = {lead_samples:g}: an output shows at the next sample at the earliest"
             )
-        table, outcomes = segment_table(segments, bench.sample_rate_hz)
+        lag_rad = float(law_record["target_lag_rad"][0])
+        table, outcomes = segment_table(segments, bench.sample_rate_hz, amplitude_law, lag_rad)
         force, drive = bench.index_of("force"), bench.index_of("drive")
         smallest = [SMALLEST_BITS * c.resolution_v / abs(c.sensitivity_v_per_unit) for c in bench.channels]
         loop = np.zeros(1, LOOP)
@@ -61,7 +64,10 @@ class Tick:
         loop["omega"] = law_record["centre_rad_s"] if first is None else 2.0 * math.pi * first.frequency_hz
         progress = np.zeros(1, PROGRESS)
         progress["omega"] = loop["omega"]
+        progress["lag"] = table["lag_rad"][:1] if len(segments) else lag_rad
         loop["drive"] = table["drive"][:1]
+        loop["log_integral"] = math.log(float(law_record["smallest_v"][0]))
+        harmonics = int(law_record["harmonics"][0])
         progress["segments"] = len(segments)
         self.bench = bench
         self.arrays = TickArrays(
@@ -80,6 +86,8 @@ class Tick:
             progress=progress,
             outcomes=outcomes,
             history=_history(loop, 1.0 / bench.sample_rate_hz),
+            phasors=np.zeros(harmonics + 1, complex),
+            filters=np.zeros((2, harmonics + 1), complex),
         )
 
     @property

@@ -8,17 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from controller.kernels import (
-    advance_phase,
-    demodulate,
-    next_lock_state,
-    phase_lag,
-    proportional_integral,
-    sign_product,
-    track,
-    wrap,
-)
+from controller.demodulation.kernels import demodulate, phase_lag, sign_product
+from controller.kernels import advance_phase, proportional_integral, track, wrap
 from controller.layout import LOCK, THRESHOLDS, LockState
+from controller.lock.kernels import next_lock_state
 
 FS = 5000.0
 

@@ -9,7 +9,8 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from controller import OpenLoop
-from controller.pll import LockRule, PhaseLockedLoop
+from controller.lock.rule import LockRule
+from controller.pll import PhaseLockedLoop
 from rig.bench import Bench, DriverChoice, Limits, SpecimenFacts
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.kinds import KINDS

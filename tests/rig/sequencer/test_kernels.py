@@ -22,7 +22,17 @@ def _judge(periods, locked=True, wanted_force=0.0, saturated=False, open_loop=Fa
     rule = RULE.build()
     for error_deg, response, force in periods:
         judge_period(
-            settling[0], rule[0], locked, math.radians(error_deg), response, force, wanted_force, saturated, open_loop
+            settling[0],
+            rule[0],
+            locked,
+            math.radians(error_deg),
+            response,
+            force,
+            wanted_force,
+            force,
+            saturated,
+            False,
+            open_loop,
         )
     return settling[0]
 
@@ -78,7 +88,7 @@ class Walk:
         for _ in range(int(periods * per_period)):
             advance(
                 self.progress[0], self.table, self.outcomes, self.settling[0], RULE.build()[0], self.lock[0],
-                self.guard[0], self.cycle, self.sample,
+                self.guard[0], self.cycle, self.sample, False,
             )  # fmt: skip
             self.levels.append(float(self.progress["level"][0]))
             self.cycle += 1.0 / per_period

@@ -1,0 +1,1 @@
+"""The amplitude laws: loops that hold a force or a response."""

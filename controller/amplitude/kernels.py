@@ -1,0 +1,39 @@
+"""Compiled amplitude laws on logarithms: alike at every level, and the voltage stays positive."""
+
+import math
+
+from vibrolock.compiled import kernel
+
+LARGEST_ERROR = 1.0  # of a logarithm: a factor of e; beyond, the law hurries no further
+
+
+@kernel
+def log_ratio(wanted: float, measured: float) -> float:
+    """``ln(wanted / measured)``, bounded; a level of nothing, or nothing measured, gives the bound."""
+    if not measured > 0.0:
+        return LARGEST_ERROR
+    if not wanted > 0.0:
+        return -LARGEST_ERROR
+    return min(max(math.log(wanted / measured), -LARGEST_ERROR), LARGEST_ERROR)
+
+
+@kernel
+def log_proportional_integral(
+    error: complex, integral: complex, kp: complex, ki: float, dt: float, lowest: float, highest: float, hold: bool
+) -> tuple[float, float, complex]:
+    """``ln U = kp E + ki int E`` with complex E, U and kp: returns (|U|, arg U, integral).
+
+    |U| stays within ``lowest`` to ``highest``; while it stands at one, or with ``hold``, the integral of the amplitude may
+    only move away from there. The angle is never held.
+    """
+    step = error * (ki * dt)
+    proposed = integral + step
+    size = proposed.real + kp.real * error.real - kp.imag * error.imag
+    angle = proposed.imag + kp.real * error.imag + kp.imag * error.real
+    least, most = math.log(lowest), math.log(highest)
+    grown = proposed.real
+    if size > most or hold:
+        grown = min(grown, integral.real)
+    if size < least:
+        grown = max(grown, integral.real)
+    return math.exp(min(max(size, least), most)), angle, complex(grown, proposed.imag)

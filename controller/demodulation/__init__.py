@@ -1,0 +1,1 @@
+"""Demodulation: synchronous, by adaptive filter, by signs."""

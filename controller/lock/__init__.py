@@ -1,0 +1,1 @@
+"""The lock: when it counts as gained and as lost."""
