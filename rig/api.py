@@ -102,6 +102,25 @@ def run(
     return Run(recording, folder)
 
 
-def resume(output: str | Path, *, realtime: bool = False, progress: Progress | None = None) -> Run:
-    """Finish an interrupted run: points that were accepted stay, the others are measured in a further part."""
-    return Run(take_up(Path(output), realtime=realtime, progress=progress))
+def resume(
+    output: str | Path,
+    *,
+    plan: Plan | str | Path | None = None,
+    seed: int | None = None,
+    realtime: bool = False,
+    progress: Progress | None = None,
+) -> Run:
+    """Go on with a recording: points that were accepted stay, the others are measured in a further part.
+
+    A changed ``plan`` of the same kind and bench takes the place of the one in force. Points that it asks for and that were
+    accepted by any plan before are not measured again; those that it does not ask for stay in the file and count no more.
+    ``seed`` draws the noise of the further part; without it, one that no part had.
+
+    Raises `rig.errors.ConfigurationError` for a plan that cannot follow, `rig.errors.RecordingError` for a file that cannot
+    be read or written.
+    """
+    if seed is not None and not 0 <= seed < 2**63:
+        raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
+    source = "" if plan is None or isinstance(plan, Plan) else plan
+    change = plan if plan is None or isinstance(plan, Plan) else load_plan(plan)
+    return Run(take_up(Path(output), change=change, source=source, seed=seed, realtime=realtime, progress=progress))

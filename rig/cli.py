@@ -70,16 +70,18 @@ def run(
 @app.command()
 def resume(
     output: Annotated[Path, typer.Argument(help="Recording of the interrupted run.")],
+    plan: Annotated[str | None, typer.Option(help="Changed plan to go on with: a name or TOML file.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)] = None,
     realtime: Realtime = False,
     json: Json = False,
 ) -> None:
-    """Finish a run that was interrupted; points that were accepted stay."""
+    """Finish a run that was interrupted, by its plan or a changed one; points that were accepted stay."""
     import rig
     from rig.recording.reader import Recording
 
     with Recording(output) as recording:
         kind = recording.kind
-    _carry(json, kind, lambda progress: rig.resume(output, realtime=realtime, progress=progress))
+    _carry(json, kind, lambda progress: rig.resume(output, plan=plan, seed=seed, realtime=realtime, progress=progress))
 
 
 def _carry(json: bool, kind: str, start: Any) -> None:
@@ -95,11 +97,11 @@ def _carry(json: bool, kind: str, start: Any) -> None:
         progress.close()
     with result:
         summary = summarise_recording(result.recording)
-        complete = result.complete
+        complete, path = result.complete, result.recording.path
     if json:
         print_json(summary)
     else:
-        say_how_it_ended(summary)
+        say_how_it_ended(summary, path)
     if not complete:
         raise typer.Exit(1)
 

@@ -40,7 +40,7 @@ __all__ = [
 
 
 def backbone(recording: Recording) -> Backbone:
-    """The accepted points of a backbone recording, in the order of the plan.
+    """The accepted points of a backbone recording that its plan asks for, in the order of the plan.
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
@@ -48,7 +48,7 @@ def backbone(recording: Recording) -> Backbone:
     bench = bench_of_recording(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
     return backbone_of(
-        _by_number(recording).values(),
+        recording.latest.values(),
         recording.channels,
         bench.specimen.name,
         bench.specimen.drive_mode_shape,
@@ -63,7 +63,7 @@ def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
     """
     _expect(recording, "stepped-sine")
     return frequency_responses_of(
-        _by_number(recording).values(), recording.channels, bench_of_recording(recording).specimen.name
+        recording.latest.values(), recording.channels, bench_of_recording(recording).specimen.name
     )
 
 
@@ -86,9 +86,15 @@ def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
     bench = bench_of_recording(recording)
     plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
     levels: dict[float, dict[int, np.ndarray]] = {}
+    periods: dict[float, int] = {}
     for number, point in _accepted(recording).items():
-        levels.setdefault(point["level"], {})[point["realisation"]] = point_rows(recording, number)
-    return {level: spectra_of(bench, plan, records) for level, records in levels.items()}
+        level = point["level"]
+        levels.setdefault(level, {})[point["realisation"]] = point_rows(recording, number)
+        periods[level] = min(periods.get(level, point["periods"]), point["periods"])  # a change of plan may change them
+    return {
+        level: spectra_of(bench, plan.model_copy(update={"periods": periods[level]}), records)
+        for level, records in levels.items()
+    }
 
 
 def response_matrices(
@@ -114,9 +120,8 @@ def point_rows(recording: Recording, number: int) -> np.ndarray:
         for point in part.points:
             if point["number"] == number and "end_sample" in point:
                 return part.read(point["first_sample"], point["end_sample"])
-    raise RecordingError(
-        f"point {number}: nothing was recorded of it; points {sorted(_by_number(recording))} are known"
-    )
+    known = {**recording.latest, **recording.former}
+    raise RecordingError(f"point {number}: nothing was recorded of it; points {sorted(known)} are known")
 
 
 def load_backbone(path: Path) -> Backbone:
@@ -135,14 +140,9 @@ def bench_of_recording(recording: Recording) -> Bench:
     return validated(Bench, recording.configuration["bench"], "bench of the recording")
 
 
-def _by_number(recording: Recording) -> dict[int, dict[str, Any]]:
-    """The last result of each point."""
-    latest = {point["number"]: point for point in recording.points}
-    return {number: latest[number] for number in sorted(latest)}
-
-
 def _accepted(recording: Recording) -> dict[int, dict[str, Any]]:
-    accepted = {number: point for number, point in _by_number(recording).items() if point["accepted"]}
+    """The accepted points that the plan in force asks for, by number, in its order."""
+    accepted = {number: point for number, point in recording.latest.items() if point["accepted"]}
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
     return accepted

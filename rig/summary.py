@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from rig.campaigns.continuation import changed_keys
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
 from rig.models.files import KINDS, load
@@ -30,14 +31,15 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
     """Points with their quality, statistics of the loop, how each part ended."""
     bench = recording.configuration["bench"]
     plan = plan_from(recording.configuration["plan"], "plan of the recording")
-    latest = {point["number"]: point for point in recording.points}
+    changed = _changes(recording)
     parts = [
         {
             "rows": part.n_rows,
             "ended": None if part.end is None else part.end["text"],
             "tripped": part.end is not None and part.end["tripped"],
+            "changed": changed.get(number, []),
         }
-        for part in recording.parts
+        for number, part in enumerate(recording.parts)
     ]
     ends = [part.end for part in recording.parts if part.end is not None]
     return {
@@ -49,7 +51,8 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "seed": recording.seed,
         "complete": recording.complete,
         "points_planned": len(plan.targets()),
-        "points": [_shown(latest[number], plan.kind) for number in sorted(latest)],
+        "points": [_shown(point, plan.kind) for point in recording.latest.values()],
+        "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {
             name: sum(end["counters"].get(name, 0) for end in ends)
@@ -57,6 +60,13 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         },
         "parts": parts,
     }
+
+
+def _changes(recording: Recording) -> dict[int, list[str]]:
+    """Keys in which the plan was changed, by the number of the part."""
+    plans = [plan_from(dict(said.plan), "plan of the recording").model_dump() for said in recording.plans]
+    pairs = zip(recording.plans[1:], plans, plans[1:], strict=False)
+    return {said.part: changed_keys(before, after) for said, before, after in pairs}
 
 
 def _shown(point: dict[str, Any], kind: str) -> dict[str, Any]:

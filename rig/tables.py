@@ -1,5 +1,7 @@
 """Summaries as a person reads them: one line on how a run ended, tables of recordings, models and measurements."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
@@ -9,7 +11,7 @@ from rig.models.files import KINDS
 __all__ = ["print_summary", "say_how_it_ended"]
 
 
-def say_how_it_ended(summary: dict[str, Any]) -> None:
+def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     """How a run ended, what it made, how fast it was, and what was counted on the way."""
     loop = summary["loop"]
     accepted = sum(point["accepted"] for point in summary["points"])
@@ -18,7 +20,9 @@ def say_how_it_ended(summary: dict[str, Any]) -> None:
     ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
     print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
     if not summary["complete"]:
-        print("what was accepted is kept; `rig resume` measures the rest")
+        print(
+            f"what was accepted is kept; `rig resume {path}` measures the rest, with --plan PLAN.toml by a changed plan"
+        )
     for name, count in summary["counters"].items():
         if count:
             print(f"warning: {name.replace('_', ' ')}: {count} samples")
@@ -34,7 +38,22 @@ def print_summary(summary: dict[str, Any]) -> None:
         return
     loop = summary["loop"]
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
-    columns = CAMPAIGNS[summary["kind"]].columns
+    _print_points(summary["kind"], summary["points"])
+    if summary["former_points"]:
+        print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
+        _print_points(summary["kind"], summary["former_points"])
+    line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
+    if loop["realtime_factor"] is not None:
+        factor = f"{loop['realtime_factor']:.0f} times real time"
+        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {factor}"
+    print(line)
+    for index, part in enumerate(summary["parts"]):
+        changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
+        print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
+
+
+def _print_points(kind: str, points: Sequence[dict[str, Any]]) -> None:
+    columns = CAMPAIGNS[kind].columns
     print_table(
         ("level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality"),
         [
@@ -45,16 +64,9 @@ def print_summary(summary: dict[str, Any]) -> None:
                 {True: "yes", False: "no", None: "-"}[p["settled"]],
                 "ok" if p["accepted"] else p["reason"],
             )
-            for p in summary["points"]
+            for p in points
         ],
     )
-    for p in summary["points"]:
+    for p in points:
         for warning in p["warnings"] or ():
             print(f"warning: point {p['number']}: {warning}")
-    line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
-    if loop["realtime_factor"] is not None:
-        factor = f"{loop['realtime_factor']:.0f} times real time"
-        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {factor}"
-    print(line)
-    for index, part in enumerate(summary["parts"]):
-        print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}")

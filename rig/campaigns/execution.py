@@ -3,7 +3,7 @@
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from types import FrameType
@@ -18,7 +18,7 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
 from rig.daq import DAQ
 from rig.errors import RecordingError
-from rig.loop import Loop
+from rig.loop import Loop, LoopStatistics
 from rig.recording.journal import JournalWriter
 from rig.safety.layout import EndReason, GuardMode
 from rig.safety.limits import describe_end
@@ -26,7 +26,7 @@ from rig.sequencer.layout import Outcome, SegmentKind
 from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.tick import Tick
 
-__all__ = ["Execution", "Progress", "Silent"]
+__all__ = ["Execution", "Progress", "Silent", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 OVER = {
@@ -78,12 +78,14 @@ class Execution:
         realtime: bool,
         progress: Progress,
         done: frozenset[int] = frozenset(),
+        numbers: Sequence[int] | None = None,
     ) -> None:
         self.plan, self.bench, self.daq, self.tick = plan, bench, daq, tick
         self.journal, self.progress = journal, progress
         self.loop = Loop(daq, tick, paced=realtime)
         self.measure = KINDS[plan.kind].measure
         self.targets = plan.targets()
+        self.numbers = range(len(self.targets)) if numbers is None else numbers
         self.finished = len(done)
         self.accepted = len(done)
         self.next_segment = 0
@@ -92,10 +94,13 @@ class Execution:
         self.write_error: RecordingError | None = None
         self.failure: Exception | None = None
 
-    def go(self, first_sample: int) -> None:
-        """Run to the end of the plan or of what can be done of it; raises only what could not be recorded."""
-        information = {"first_sample": first_sample, "points_done": self.finished, "device_flags": [*self.daq.counters]}
-        self._write(self.journal.part, information)
+    def go(self, information: Mapping[str, Any]) -> None:
+        """Run to the end of the plan or of what can be done of it; raises only what could not be recorded.
+
+        ``information`` is what is said of the part before its first row.
+        """
+        flags = {"points_done": self.finished, "device_flags": [*self.daq.counters]}
+        self._write(self.journal.part, {**information, **flags})
         for remark in self.daq.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
@@ -201,6 +206,8 @@ class Execution:
             self.kept.popleft()
 
     def _report(self, point: dict[str, Any]) -> None:
+        """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
+        point = {**point, "number": self.numbers[point["number"]]}
         self._write(self.journal.point, point)
         self.finished += 1
         self.accepted += 1 if point["accepted"] else 0
@@ -219,20 +226,31 @@ class Execution:
             text = str(self.loop.failure)
         elif self.failure is not None:
             text = f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
-        statistics = self.loop.statistics
         return {
             "completed": reason is EndReason.COMPLETED and self.accepted == len(self.targets) and self.failure is None,
             "reason": reason.name.lower(),
             "text": text,
             "tripped": reason.is_trip,
-            "loop": {
-                **asdict(statistics),
-                "periods": int(self.tick.arrays.loop["cycles"][0]),
-                "realtime_factor": statistics.realtime_factor,
-                "end_to_end_factor": statistics.end_to_end_factor,
-            },
+            "loop": _loop_report(self.loop.statistics, int(self.tick.arrays.loop["cycles"][0])),
             "counters": self.daq.counters,
         }
+
+
+def nothing_left(bench: Bench) -> dict[str, Any]:
+    """The end of a part in which nothing moved, for all that the plan asks for had been measured before."""
+    return {
+        "completed": True,
+        "reason": EndReason.COMPLETED.name.lower(),
+        "text": "nothing was left to measure",
+        "tripped": False,
+        "loop": _loop_report(LoopStatistics(bench.sample_rate_hz), 0),
+        "counters": {},
+    }
+
+
+def _loop_report(statistics: LoopStatistics, periods: int) -> dict[str, Any]:
+    factors = {name: getattr(statistics, name) for name in ("realtime_factor", "end_to_end_factor")}
+    return {**asdict(statistics), "periods": periods, **factors}
 
 
 @contextmanager

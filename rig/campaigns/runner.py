@@ -5,11 +5,10 @@ from pathlib import Path
 
 import vibrolock
 from rig.bench import Bench
-from rig.campaigns.execution import Execution, Progress, Silent
+from rig.campaigns.continuation import what_is_left
+from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
 from rig.campaigns.output import make_way, set_aside
 from rig.campaigns.plan import Plan
-from rig.campaigns.plans import plan_from
-from rig.configuration import validated
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
@@ -56,7 +55,9 @@ def carry_out(
             seed=seed,
         )
         with set_aside(output), JournalWriter.create(journal_path(output), header) as journal:
-            Execution(plan, bench, daq, tick, journal, realtime, progress or Silent()).go(first_sample=0)
+            Execution(plan, bench, daq, tick, journal, realtime, progress or Silent()).go(
+                {"first_sample": 0, "seed": seed}
+            )
     finalise(journal_path(output), output)
     return Recording(output)
 
@@ -64,32 +65,42 @@ def carry_out(
 def take_up(
     output: Path,
     *,
+    change: Plan | None = None,
+    source: str | Path = "",
+    seed: int | None = None,
     realtime: bool = False,
     progress: Progress | None = None,
 ) -> Recording:
     """Finish a run that was interrupted: finished points stay, the others are measured in a further part of the file.
 
-    Points that had failed are tried again. A recording that is complete is returned as it is.
+    Points that had failed are tried again. A ``change`` of the plan, read from ``source``, takes the place of the one in
+    force with that part: what it asks for and was accepted before is not measured again. ``seed`` draws the noise of the
+    part. A recording that is complete and asked for nothing new is returned as it is.
+
+    Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before.
     """
     with Recording(output) as recording:
-        plan = plan_from(recording.configuration["plan"], f"{output}: plan")
-        bench = validated(Bench, recording.configuration["bench"], f"{output}: bench")
-        done = frozenset(int(point["number"]) for point in recording.points if point["accepted"])
-        first_sample = recording.n_rows
-        seed = recording.seed or 0
-        parts = len(recording.parts)
-    segments = plan.segments(bench.sample_rate_hz, done)
-    if not segments:
-        if journal_path(output).exists():
-            finalise(journal_path(output), output)
-        return Recording(output)
-    # A further part draws its own noise: the same seed again would repeat the first part's.
-    with _armable(bench, seed + parts) as daq:
-        daq.start(bench.block)
-        tick = _tick(plan, bench, daq, segments)
+        left = what_is_left(recording, change, source)
+        # A further part draws its own noise: the same seed again would repeat the first part's.
+        drawn = (recording.seed or 0) + len(recording.parts) if seed is None else seed
+        information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
+        finished = recording.complete and not left.changed
+    plan, bench = left.plan, left.bench
+    segments = plan.segments(bench.sample_rate_hz, left.done)
+    if segments:
+        with _armable(bench, drawn) as daq:
+            daq.start(bench.block)
+            tick = _tick(plan, bench, daq, segments)
+            columns = [Column(**column) for column in ROW_COLUMNS]
+            with continue_recording(output, row_dtype=tick.row_dtype, columns=columns) as journal:
+                executed = (plan, bench, daq, tick, journal, realtime, progress or Silent())
+                Execution(*executed, left.done, left.numbers).go(information)
+    elif not finished:
         with continue_recording(output) as journal:
-            Execution(plan, bench, daq, tick, journal, realtime, progress or Silent(), done).go(first_sample)
-    finalise(journal_path(output), output)
+            journal.part({**information, "points_done": len(left.done), "device_flags": []})
+            journal.end(nothing_left(bench))
+    if journal_path(output).exists():
+        finalise(journal_path(output), output)
     return Recording(output)
 
 

@@ -64,7 +64,7 @@ def _draw_backbone(page: "Figure", recording: Recording) -> None:
         for axis in axes[0]:
             say_why_empty(axis, "no accepted point")
     _draw_history(axes[1, 0], axes[1, 1], recording)
-    points = {point["number"]: point for point in recording.points}.values()
+    points = recording.latest.values()
     left_out = sum(not point["accepted"] for point in points)
     text = f"{_specimen(recording)}: {recording.kind} test, {len(points)} point{'' if len(points) == 1 else 's'}"
     title(page, text + (f", {left_out} not accepted" if left_out else ""))
@@ -78,7 +78,7 @@ def _draw_sweep(page: "Figure", recording: Recording) -> None:
     """The last sweep of a recording: its rows are read, and no others."""
     number, sweep = list(sweeps(recording).items())[-1]
     rows = point_rows(recording, number)
-    point = next(point for point in reversed(recording.points) if point["number"] == number)
+    point = recording.latest[number]
     draw_sweep(
         page,
         sweep,

@@ -15,8 +15,9 @@ def points_left_out(recording: Recording) -> tuple[str, ...]:
     """One note with how many points of the plan were not accepted, at which levels, and the first reason; none if all were."""
     plan = plan_from(recording.configuration["plan"], "plan of the recording")
     targets = plan.targets()
-    latest = {point["number"]: point for point in recording.points}
-    results = {target.number: latest.get(target.number, _NOT_REACHED) for target in targets}
+    latest, numbers = recording.latest, recording.plans[-1].numbers
+    found = zip(targets, range(len(targets)) if numbers is None else numbers, strict=True)
+    results = {target.number: latest.get(number, _NOT_REACHED) for target, number in found}
     out = {number: point for number, point in results.items() if not point["accepted"]}
     if not out:
         return ()

@@ -77,7 +77,7 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
         notes = _strangers(bench_of_recording(recording), models, str(path))
         recorded = sweeps(recording)
-        rejected = {point["number"] for point in recording.points} - set(recorded)
+        rejected = set(recording.latest) - set(recorded)
         if rejected or not recording.complete:
             notes += (f"{path}: is not complete; sweeps accepted, and predicted: {len(recorded)}",)
         for number, sweep in recorded.items():

@@ -16,7 +16,7 @@ __all__ = ["FORMAT", "SCHEMA", "Column", "Header", "check_schema", "packed"]
 FORMAT = "vibrolock"
 """Value of the attribute ``format`` of every file."""
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the layout of journals and HDF5 files that this version writes; it reads all up to this one."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
@@ -93,6 +93,8 @@ class Header:
     """Number of parts that the HDF5 file beside the journal held when the journal was begun."""
     identity: str = field(default_factory=lambda: os.urandom(8).hex())
     """Random name that tells this recording from any other one of the same path."""
+    schema: int = field(default_factory=lambda: SCHEMA)
+    """Schema of the journal that it was read from; a new one is always of the present schema."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "row_dtype", packed(np.dtype(self.row_dtype)))
@@ -116,7 +118,7 @@ class Header:
         fields = [row.fields[name][0] for name in row.names] if row.names and row.fields else []
         value = {
             "format": FORMAT,
-            "schema": SCHEMA,
+            "schema": self.schema,
             "kind": self.kind,
             "software_version": self.software_version,
             "started": self.started,
@@ -149,7 +151,7 @@ class Header:
                     name: value[name]
                     for name in (
                         *("kind", "configuration", "channels", "software_version", "started"),
-                        *("seed", "first_part", "identity"),
+                        *("seed", "first_part", "identity", "schema"),
                     )
                 },
             )

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from rig.errors import RecordingError
 from rig.recording.contents import JournalContents
@@ -15,7 +15,18 @@ from rig.recording.parts import Part
 from rig.recording.store import check_continuation
 from rig.recording.stored import read_recording
 
-__all__ = ["Part", "Recording"]
+__all__ = ["Part", "RecordedPlan", "Recording"]
+
+
+class RecordedPlan(NamedTuple):
+    """A plan of a recording, from the part on with which it came into force."""
+
+    part: int
+    """Number of that part."""
+    plan: Mapping[str, Any]
+    """The plan as it was."""
+    numbers: Sequence[int] | None
+    """Numbers in this recording of the points that it asks for, in its order; ``None``: 0, 1, 2 and so on."""
 
 
 class Recording:
@@ -53,8 +64,16 @@ class Recording:
 
     @property
     def configuration(self) -> Mapping[str, Any]:
-        """The whole configuration as it was."""
-        return self._header.configuration
+        """The whole configuration as it was; its ``plan`` is the one in force, which the last change brought."""
+        changes = self.plans[1:]
+        return {**self._header.configuration, "plan": changes[-1].plan} if changes else self._header.configuration
+
+    @property
+    def plans(self) -> list[RecordedPlan]:
+        """The plan that the recording was begun with, and those that took its place."""
+        first = RecordedPlan(0, self._header.configuration.get("plan", {}), None)
+        told = ((number, part.information) for number, part in enumerate(self.parts))
+        return [first, *(RecordedPlan(n, said["plan"], said["numbers"]) for n, said in told if "plan" in said)]
 
     @property
     def channels(self) -> Sequence[Mapping[str, Any]]:
@@ -88,8 +107,22 @@ class Recording:
 
     @property
     def points(self) -> list[dict[str, Any]]:
-        """Results of all points of all parts, in the order in which they were completed."""
-        return [point for part in self.parts for point in part.points]
+        """Results of all points, in the order in which they were completed, each with the number of its ``part``."""
+        return [{**point, "part": number} for number, part in enumerate(self.parts) for point in part.points]
+
+    @property
+    def latest(self) -> dict[int, dict[str, Any]]:
+        """The last result of each point that the plan in force asks for, by number, in the order of the plan."""
+        results = {int(point["number"]): point for point in self.points}
+        numbers = self.plans[-1].numbers
+        return {n: results[n] for n in (sorted(results) if numbers is None else numbers) if n in results}
+
+    @property
+    def former(self) -> dict[int, dict[str, Any]]:
+        """The last result of each point that an earlier plan asked for and the plan in force does not, by number."""
+        asked = self.latest
+        results = {int(point["number"]): point for point in self.points}
+        return {n: results[n] for n in sorted(results) if n not in asked}
 
     @property
     def complete(self) -> bool:

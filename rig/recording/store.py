@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording.contents import JournalContents
-from rig.recording.header import Column, Header, packed
+from rig.recording.header import SCHEMA, Column, Header, packed
 from rig.recording.journal import JournalWriter, journal_path, set_aside
 from rig.recording.layout import new_file, open_file
 from rig.recording.locking import exclusive
@@ -60,8 +60,8 @@ def continue_recording(
 ) -> JournalWriter:
     """Open the journal of ``output`` for further parts: an interrupted run's, or a new one behind a finished file.
 
-    ``row_dtype`` and ``columns`` together say what the rows to come hold, if that differs from those recorded; an
-    interrupted run with other rows is then turned into its HDF5 file first.
+    ``row_dtype`` and ``columns`` together say what the rows to come hold, if that differs from those recorded. The journal
+    of an interrupted run with other rows, or of an earlier schema, is turned into its HDF5 file first.
 
     Raises:
         RecordingError: there is neither file nor journal, the two do not belong together, or one cannot be read.
@@ -75,7 +75,8 @@ def continue_recording(
         except RecordingError:
             writer.close()
             raise
-        if row_dtype is None or packed(row_dtype) == writer.header.row_dtype:
+        same_rows = row_dtype is None or packed(row_dtype) == writer.header.row_dtype
+        if same_rows and writer.header.schema == SCHEMA:
             return writer
         writer.close()
         finalise(journal, output)

@@ -52,7 +52,9 @@ def fill(writer: JournalWriter, first: int, n: int, *, block: int = 100, complet
     writer.event({"what": "armed", "sample": first})
     for start in range(first, first + n, block):
         writer.rows(rows(start, min(start + block, first + n)))
-    writer.point({"force_n": 0.1 * first, "settled": True, "periods": 20, "harmonics": [1.0, 0.5]})
+    writer.point(
+        {"number": writer.n_points, "force_n": 0.1 * first, "settled": True, "periods": 20, "harmonics": [1.0, 0.5]}
+    )
     if completed is not None:
         writer.end({"completed": completed, "overruns": 0})
 

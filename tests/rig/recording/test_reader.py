@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
-from rig.recording.journal import journal_path
+from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.recording.store import continue_recording, finalise
-from tests.rig.recording.samples import journal, rows
+from tests.rig.recording.samples import header, journal, rows
 
 
 @pytest.fixture
@@ -77,7 +77,7 @@ def test_an_hdf5_file_of_another_program_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("schema", "message"),
-    [(2, "written by schema 2, this version reads up to 1; update"), ("x", "damaged: schema 'x'")],
+    [(3, "written by schema 3, this version reads up to 2; update"), ("x", "damaged: schema 'x'")],
 )
 def test_a_later_or_impossible_schema_is_refused(output, schema, message):
     with h5py.File(output, "r+") as file:
@@ -182,7 +182,7 @@ def test_arrays_and_attributes_come_back_as_they_were(tmp_path):
         np.testing.assert_array_equal(found[name], values)
         assert found[name].shape == values.shape
     with h5py.File(path) as file:
-        assert (file.attrs["format"], file.attrs["schema"]) == ("vibrolock", 1)
+        assert (file.attrs["format"], file.attrs["schema"]) == ("vibrolock", 2)
         assert file["arrays/force_n"][-1] == 0.56
 
 
@@ -219,3 +219,28 @@ def test_a_model_is_no_recording_and_a_recording_no_model(tmp_path, output):
 def test_a_folder_that_does_not_exist_is_told(tmp_path):
     with pytest.raises(RecordingError, match=r"cannot be written \(No such file or directory\)"):
         write_arrays(tmp_path / "missing" / "MODEL.h5", "nonlinear-mode", {}, {})
+
+
+def test_points_that_count_follow_the_plan_in_force_and_earlier_results_give_way_to_later_ones(tmp_path):
+    path = tmp_path / "OUT.h5"
+    with JournalWriter.create(journal_path(path), header()) as writer:
+        writer.part({"first_sample": 0})
+        for number in (0, 1, 2):
+            writer.point({"number": number, "told": "first"})
+        writer.part({"first_sample": 0, "plan": {"levels_n": [0.56, 0.1]}, "numbers": [3, 1]})
+        writer.point({"number": 3, "told": "second"})
+        writer.part({"first_sample": 0})
+        writer.point({"number": 1, "told": "third"})
+    with Recording(path) as before:
+        told = [(number, point["told"], point["part"]) for number, point in before.latest.items()]
+        assert told == [(3, "second", 1), (1, "third", 2)]
+        assert list(before.former) == [0, 2]
+        assert before.configuration["plan"] == {"levels_n": [0.56, 0.1]}
+        assert before.configuration["bench"] == header().configuration["bench"]
+        assert [plan.part for plan in before.plans] == [0, 1]
+        points = before.points
+    finalise(journal_path(path), path)
+    with Recording(path) as after:
+        assert after.points == points
+        assert after.latest == {3: points[3], 1: points[4]}
+        assert [plan.plan for plan in after.plans] == [header().configuration["plan"], {"levels_n": [0.56, 0.1]}]
