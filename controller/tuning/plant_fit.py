@@ -44,7 +44,13 @@ def fitted(
         error = np.concatenate([(model_f - h_f) * weight_f, (model_a - h_a) * weight_a])
         return np.concatenate([error.real, error.imag])
 
-    x = least_squares(residuals, start, method="lm", x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))), max_nfev=4000).x
+    x = least_squares(
+        residuals,
+        start,
+        method="lm",
+        x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
+        max_nfev=4000,
+    ).x
     model_f, model_a = _model(x, s, centre)
     return {
         "frequency_rad_s": centre * math.exp(x[0]),
@@ -64,11 +70,15 @@ def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike)
     h_f, h_a = np.asarray(force, np.complex128), np.asarray(acceleration, np.complex128)
     if frequency.ndim != 1 or h_f.shape != frequency.shape or h_a.shape != frequency.shape:
         shapes = f"{frequency.shape}, {h_f.shape} and {h_a.shape}"
-        raise ValueError(f"frequency_hz, force_per_v, acceleration_per_v: shapes {shapes}, allowed are three equal rows")
+        raise ValueError(
+            f"frequency_hz, force_per_v, acceleration_per_v: shapes {shapes}, allowed are three equal rows"
+        )
     if frequency.size < 20:
         raise ValueError(f"frequency_hz: {frequency.size} lines, allowed are at least 20 around the mode")
     if not (np.all(np.isfinite(h_f)) and np.all(np.isfinite(h_a)) and np.all(frequency > 0.0)):
-        raise ValueError("frequency_hz, force_per_v, acceleration_per_v: allowed are finite numbers, frequencies above 0")
+        raise ValueError(
+            "frequency_hz, force_per_v, acceleration_per_v: allowed are finite numbers, frequencies above 0"
+        )
     return frequency, h_f, h_a
 
 
@@ -106,9 +116,7 @@ def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
             "force_per_v, acceleration_per_v: the resonance pulls instead of pushing (phi_d^2 < 0); "
             "check the polarity of force and acceleration"
         )
-    columns = np.stack(
-        [*(h_f * z**power for power in range(4)), *(h_a * z**power for power in range(-2, 2))], axis=1
-    )
+    columns = np.stack([*(h_f * z**power for power in range(4)), *(h_a * z**power for power in range(-2, 2))], axis=1)
     exciter = _real_least_squares(columns, np.ones_like(z))
     mode = [0.5 * math.log(k), math.log(0.5 * c / math.sqrt(k)), math.log(shape_squared), lower, upper]
     return centre, np.concatenate([mode, exciter])

@@ -80,15 +80,28 @@ def closed_loop_poles(loop: ControlLoop) -> Complex:
     reach = 0.5 * omega
     grid = np.concatenate([-np.geomspace(1e-3, 1.0, 14) * reach, np.geomspace(1e-2, 1.0, 5) * reach])
     height = np.concatenate([[0.01], np.linspace(0.05, 1.0, 14)]) * reach
-    s = (grid[:, None] + 1j * height).ravel()
-    step = 1e-6 * omega
-    for _ in range(40):
-        slope = (function(s + step) - function(s - step)) / (2.0 * step)
-        change = function(s) / np.where(slope == 0.0, np.inf, slope)
-        s = s - change * np.minimum(1.0, 0.2 * reach / np.maximum(np.abs(change), 1e-300))
-    size = np.abs(function(s + 10.0 * step)) + 1e-300
-    good = np.isfinite(s) & (np.abs(s) < reach) & (np.abs(change) < 1e-4 * omega) & (np.abs(function(s)) < size)
-    return _distinct(s[good], known, 1e-3 * omega)
+    start = (grid[:, None] + 1j * height).ravel()
+    s, _ = _newton(function, start, 40, 0.1 * reach, 1e-6 * omega)
+    # A factor that the determinant does not have as a pole is no zero of it: from there its own steps grow.
+    final, first = _newton(loop.determinant, s, 1, 0.1 * reach, 1e-6 * omega)
+    final, last = _newton(loop.determinant, final, 4, 0.1 * reach, 1e-6 * omega)
+    closing = np.abs(last) < np.maximum(0.7 * np.abs(first), 1e-8 * omega)
+    good = np.isfinite(final) & (np.abs(final) < reach) & closing & (np.abs(final - s) < 1e-3 * omega)
+    return _distinct(final[good], known, 1e-3 * omega)
+
+
+def _newton(
+    function: Callable[[Complex], Complex], s: Complex, steps: int, longest: float, width: float
+) -> tuple[Complex, Complex]:
+    """Zeros approached from s [n], and the last steps taken; the derivative by differences over ``width``."""
+    change = np.zeros_like(s)
+    with np.errstate(all="ignore"):
+        for _ in range(steps):
+            slope = (function(s + width) - function(s - width)) / (2.0 * width)
+            change = function(s) / slope
+            change = change * np.minimum(1.0, longest / np.abs(change))
+            s = np.where(np.isfinite(change), s - change, s)
+    return s, change
 
 
 def _distinct(found: Complex, known: Complex, apart: float) -> Complex:
@@ -105,7 +118,9 @@ def margins(omega: Real, loop_gain: Complex) -> Margins:
     """Margins of a stable loop from L(i omega) [n] on rising frequencies (of both signs where L is complex)."""
     sensitivity = 1.0 / np.abs(1.0 + loop_gain)
     size, angle = np.abs(loop_gain), np.angle(-loop_gain)
-    across = np.flatnonzero((np.diff(np.sign(angle)) != 0) & (np.abs(np.diff(angle)) < math.pi) & (omega[1:] * omega[:-1] > 0.0))
+    across = np.flatnonzero(
+        (np.diff(np.sign(angle)) != 0) & (np.abs(np.diff(angle)) < math.pi) & (omega[1:] * omega[:-1] > 0.0)
+    )
     share = angle[across] / (angle[across] - angle[across + 1])
     sizes = size[across] + share * (size[across + 1] - size[across])
     gains = 1.0 / sizes[sizes < 1.0]
