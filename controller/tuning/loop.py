@@ -36,7 +36,8 @@ def lag_per_frequency(plant: PlantModel, s: ArrayLike, lag_deg: float = -90.0) -
     """T(s) in s: change of the lag (rad) per change of the oscillator's frequency (rad/s), no low-pass, no delay."""
     s = np.atleast_1d(np.asarray(s, np.complex128))
     omega = plant.lock_frequency_rad_s(lag_deg)
-    return (envelope(plant.force_per_v, s, omega)[0] - envelope(plant.acceleration_per_v, s, omega)[0]) / s
+    difference = envelope(plant.force_per_v, s, omega)[0] - envelope(plant.acceleration_per_v, s, omega)[0]
+    return np.asarray(difference / s, np.complex128)
 
 
 @dataclass(frozen=True)

@@ -72,9 +72,11 @@ class PlantModel:
         return np.asarray(self.drive_shape**2 * s**2 / pole + constant + rising * (s / self.centre_rad_s) ** 2)
 
     def exciter(self, s: ArrayLike) -> tuple[Complex, Complex]:
-        """alpha (V/N) and beta (V s^2/m) of ``u = alpha F + beta A`` at complex s."""
+        """Exciter: alpha (V/N) and beta (V s^2/m) of ``u = alpha F + beta A`` at complex s."""
         z = np.asarray(s, dtype=np.complex128) / self.centre_rad_s
-        return np.polyval(self.force_v_n[::-1], z), np.polyval(self.acceleration_v_s2_m[::-1], z) / z**2
+        alpha = np.polyval(np.array(self.force_v_n[::-1], np.complex128), z)
+        beta = np.polyval(np.array(self.acceleration_v_s2_m[::-1], np.complex128), z) / z**2
+        return np.asarray(alpha, np.complex128), np.asarray(beta, np.complex128)
 
     def force_per_v(self, s: ArrayLike) -> Complex:
         """H_F (N/V) at complex s, without the common delay."""
@@ -94,7 +96,8 @@ class PlantModel:
             [self.drive_shape**2, 0.0, 0.0], np.polymul(mode, [self.residual_per_kg[1], 0.0, self.residual_per_kg[0]])
         )
         force = np.polymul(np.polymul(self.force_v_n[::-1], [1.0, 0.0, 0.0]), mode)
-        return c * np.roots(np.polyadd(force, np.polymul(self.acceleration_v_s2_m[::-1], accelerance)))
+        roots = np.roots(np.polyadd(force, np.polymul(self.acceleration_v_s2_m[::-1], accelerance)))
+        return np.asarray(c * roots, np.complex128)
 
     @property
     def coupled_pole_rad_s(self) -> complex:
@@ -144,7 +147,7 @@ class PlantModel:
 
     @property
     def mass_ratio(self) -> float:
-        """mu = phi_d^2 m_ex: by how much the exciter's mass loads the mode."""
+        """Mass ratio mu = phi_d^2 m_ex: by how much the exciter's mass loads the mode."""
         return self.drive_shape**2 * self.exciter_mass_kg.real
 
     def at(self, frequency_rad_s: float | None = None, damping_ratio: float | None = None) -> Self:

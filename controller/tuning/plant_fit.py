@@ -34,7 +34,7 @@ def fitted(
     from scipy.optimize import least_squares
 
     frequency, h_f, h_a = _checked(frequency_hz, force_per_v, acceleration_per_v)
-    s = 2j * np.pi * frequency
+    s: Complex = 2j * np.pi * frequency.astype(np.complex128)
     weight_f = 1.0 / np.broadcast_to(_rms(h_f) if force_std is None else np.asarray(force_std, float), h_f.shape)
     weight_a = 1.0 / np.broadcast_to(_rms(h_a) if acceleration_std is None else np.asarray(acceleration_std), h_a.shape)
     centre, start = _start(s, h_f, h_a)

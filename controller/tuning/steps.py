@@ -15,15 +15,17 @@ Complex = NDArray[np.complex128]
 def step_response(transfer: Callable[[Complex], Complex], end_s: float, n: int = 2048) -> tuple[Real, Real]:
     """Times [n] up to ``end_s`` and the response of a stable transfer function to a unit step.
 
-    Inversion of the Laplace transform along a vertical line, as a Fourier series of period ``2 end_s`` (Dubner and Abate,
-    1968), eight times finer than the output; exact to about 1e-4 of the final value where the response has no jump.
+    Inversion of the Laplace transform along a vertical line, as a Fourier series of period ``4 end_s`` (Dubner and Abate,
+    1968), eight times finer than the output. Lanczos's factors smooth what is cut off; a jump is smeared over a few of the
+    fine steps.
     """
-    period, fine = 2.0 * end_s, 16 * n
+    period, fine = 4.0 * end_s, 32 * n
     shift = math.log(1e6) / period
-    s = shift + 2j * np.pi / period * np.arange(fine // 2 + 1)
-    time = period / fine * np.arange(fine)
-    response = np.fft.irfft(transfer(s) / s, fine) * fine / period * np.exp(shift * time)
-    return time[: fine // 2 : 8], response[: fine // 2 : 8]
+    order = np.arange(fine // 2 + 1)
+    s = np.asarray(shift + 2j * np.pi / period * order, np.complex128)
+    damped = np.fft.irfft(transfer(s) / s * np.sinc(2.0 * order / fine), fine)[: fine // 4 : 8]
+    time = np.asarray(np.arange(n) * (end_s / n), np.float64)
+    return time, np.asarray(damped * (fine / period) * np.exp(shift * time), np.float64)
 
 
 def settling_s(time_s: Real, error: Real, within: float) -> float:
