@@ -46,7 +46,7 @@ def low_pass_from_densities(
     per_w = 0.5 * (force_density / force_amplitude**2 + acceleration_density / acceleration_amplitude**2)
     wanted = math.radians(lag_std_deg) ** 2 / per_w if per_w > 0.0 else math.inf
     chosen = min(max(wanted, LOWEST * omega_rad_s), HIGHEST * omega_rad_s)
-    return LowPassChoice(chosen, math.degrees(math.sqrt(per_w * chosen)), wanted >= chosen)
+    return LowPassChoice(float(chosen), math.degrees(math.sqrt(per_w * chosen)), bool(wanted >= chosen))
 
 
 def low_pass_from_noise(

@@ -20,17 +20,20 @@ def shipped(name):
     return VirtualRig.shipped(name)
 
 
-def responses(name, band=0.2, n=201):
+def responses(name, band=0.2, n=201, held=False):
+    """Frequencies, H_F, H_A; ``held``: with the images of the held voltage in them, its delay taken out."""
     rig, centre = shipped(name), LINEAR_HZ[name]
     frequency = np.linspace((1 - band) * centre, (1 + band) * centre, n)
-    found = frequency_response(rig, frequency)
-    return frequency, found.force_n_per_v, found.sensor_per_v["drive"]
+    found = frequency_response(rig, frequency, held=held)
+    early = np.exp(2j * np.pi * frequency * (HOLD if held else 0.0) / rig.converter.sample_rate_hz)
+    return frequency, early * found.force_n_per_v, early * found.sensor_per_v["drive"]
 
 
 @cache
-def plant_of(name, latency_samples=HOLD):
+def plant_of(name, held=False):
     rate = shipped(name).converter.sample_rate_hz
-    return PlantModel.from_frequency_responses(*responses(name), sample_rate_hz=rate, latency_samples=latency_samples)
+    measured = responses(name, band=0.08 if held else 0.2, held=held)
+    return PlantModel.from_frequency_responses(*measured, sample_rate_hz=rate, latency_samples=HOLD)
 
 
 @cache
@@ -61,7 +64,7 @@ def closed_loop(name, low_pass, law, amplitude_law=None, *, periods, offset_rad_
     resonance. The demodulator is an adaptive filter. ``factor`` multiplies the gains of the frequency law; the wanted lag
     is resonance and ``target_step_rad``.
     """
-    plant, (transition, column, rows) = plant_of(name), sampled(name)
+    plant, (transition, column, rows) = plant_of(name, held=True), sampled(name)
     dt = 1.0 / shipped(name).converter.sample_rate_hz
     resonance = plant.lock_frequency_rad_s()
     omega = resonance + offset_rad_s

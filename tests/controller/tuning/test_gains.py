@@ -1,13 +1,14 @@
 """Designed gains: pole placement, bounds, and what the documents say of the two rigs."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from controller.tuning import (
-    ComplexResponseLaw,
     ControlLoop,
+    ForceLaw,
     FrequencyErrorLaw,
     PhaseLaw,
     PlantModel,
@@ -141,8 +142,6 @@ def test_the_frequency_error_loop_bears_a_mode_shape_wrong_by_half_but_not_by_tw
 
 
 def test_the_papers_force_loop_is_lost_on_the_friction_beam_above_resonance_lag_only():
-    from controller.tuning import ForceLaw
-
     plant = plant_of("friction-beam")
     counts = {
         lag: unstable_poles(ControlLoop(plant, 2 * math.pi, PhaseLaw(1, 10 * math.pi), ForceLaw(5, 1), lag))
@@ -181,18 +180,5 @@ def test_the_design_takes_the_closed_form_where_it_holds_and_the_exact_map_elsew
 
 
 def test_a_plant_that_misses_its_measurement_makes_a_rig_unsuited():
-    from dataclasses import replace
-
     plant = replace(plant_of("magnet-beam"), fit_error=0.3)
     assert "30 %" in assess(ControlLoop(plant, 10.0, PhaseLaw(0.1, 1.0))).reasons[0]
-
-
-def test_the_pole_of_complex_gain_is_taken_with_its_imaginary_part():
-    plant = plant_of("friction-beam")
-    low_pass = plant.frequency_rad_s / 5
-    law = complex_response_law(plant, low_pass)
-    real_only = ComplexResponseLaw(law.proportional.real, law.integral_per_s)
-    loop = ControlLoop(plant, low_pass, FrequencyErrorLaw(low_pass / 12), law)
-    other = ControlLoop(plant, low_pass, FrequencyErrorLaw(low_pass / 12), real_only)
-    assert assess(loop).stable
-    assert assess(other).amplitude_margins.sensitivity_peak > 1.5 * assess(loop).amplitude_margins.sensitivity_peak

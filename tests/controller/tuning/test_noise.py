@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from controller.tuning import low_pass_from_densities, low_pass_from_noise
 
@@ -20,15 +21,12 @@ def record(force_std, acceleration_std, seconds=4.0, seed=1):
 
 
 def test_the_low_pass_follows_the_noise_beside_the_harmonics():
-    std = 0.01
+    std = 0.008
     choice = low_pass_from_noise(*record(std, 0.0), RATE)
     density = 2 * std**2 / RATE  # one-sided
-    assert choice.low_pass_rad_s == pytest.approx(math.radians(0.5) ** 2 * 2 * 0.1**2 / density, rel=0.1) or (
-        choice.low_pass_rad_s in (OMEGA / 20, OMEGA / 5)
-    )
-    assert choice.lag_std_deg == pytest.approx(
-        math.degrees(math.sqrt(density * choice.low_pass_rad_s / 2) / 0.1), rel=0.06
-    )
+    assert choice.low_pass_rad_s == pytest.approx(math.radians(0.5) ** 2 * 2 * 0.1**2 / density, rel=0.1)
+    assert choice.lag_std_deg == pytest.approx(0.5, rel=1e-6)
+    assert choice.quiet
 
 
 def test_the_fluctuation_is_that_of_a_filtered_lag():
@@ -36,8 +34,6 @@ def test_the_fluctuation_is_that_of_a_filtered_lag():
     choice = low_pass_from_noise(theta, force, acceleration, RATE, lag_std_deg=3.0)
     gain = 1 - math.exp(-choice.low_pass_rad_s / RATE)
     turned = 2 * np.exp(-1j * theta)
-    from scipy.signal import lfilter
-
     # white noise alone, or else the ripple at twice the frequency would be counted
     clean_force, clean_acceleration = record(0.0, 0.0, seconds=40.0)[1:]
     noise_f, noise_a = (

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from controller.tuning import (
+    ComplexResponseLaw,
     ControlLoop,
     PhaseLaw,
     assess,
@@ -21,7 +22,7 @@ from tests.controller.tuning.rigs import closed_loop, fluctuation, periodic_stat
 
 def modulated_lag(name, slow_rad_s, deviation_rad_s):
     """Complex amplitude of the lag (rad) under ``Omega = deviation cos(slow t)``, from a simulation of the linear rig."""
-    plant, (transition, column, rows) = plant_of(name), sampled(name)
+    plant, (transition, column, rows) = plant_of(name, held=True), sampled(name)
     dt = 1 / shipped(name).converter.sample_rate_hz
     omega = plant.lock_frequency_rad_s()
     n = round(6 * 2 * math.pi / slow_rad_s / dt)
@@ -47,13 +48,13 @@ def modulated_lag(name, slow_rad_s, deviation_rad_s):
 @pytest.mark.parametrize(("name", "slow"), [("magnet-beam", (4.0, 12.0)), ("friction-beam", (8.0, 25.0, 70.0))])
 def test_the_map_from_frequency_to_lag_is_that_of_a_small_modulation(name, slow):
     for slow_rad_s in slow:
-        predicted = lag_per_frequency(plant_of(name), 1j * slow_rad_s)[0]
+        predicted = lag_per_frequency(plant_of(name, held=True), 1j * slow_rad_s)[0]
         predicted *= np.exp(-0.5j * slow_rad_s / 5000.0)  # the hold
-        assert modulated_lag(name, slow_rad_s, 0.02) == pytest.approx(predicted, rel=0.02)
+        assert modulated_lag(name, slow_rad_s, 0.02) == pytest.approx(predicted, rel=0.01)
 
 
 def loops():
-    friction, magnet = plant_of("friction-beam"), plant_of("magnet-beam")
+    friction, magnet = plant_of("friction-beam", held=True), plant_of("magnet-beam", held=True)
     fast, slow = friction.frequency_rad_s / 5, magnet.frequency_rad_s / 5
     return {
         "the paper's, friction beam": ("friction-beam", 2 * math.pi, PhaseLaw(1, 10 * math.pi), None),
@@ -75,7 +76,7 @@ def loops():
 @pytest.mark.parametrize("name", loops())
 def test_the_loop_is_stable_below_its_gain_margin_and_unstable_above(name):
     rig, low_pass, law, amplitude_law = loops()[name]
-    plant = plant_of(rig)
+    plant = plant_of(rig, held=True)
     margin = assess(ControlLoop(plant, low_pass, law, amplitude_law)).frequency_margins.gain_margin
     start = 0.1 * plant.damping_ratio * plant.frequency_rad_s
     for share, dies in ((0.8, True), (1.25, False)):
@@ -86,14 +87,14 @@ def test_the_loop_is_stable_below_its_gain_margin_and_unstable_above(name):
 
 
 def test_the_closed_form_keeps_the_friction_beam_swinging():
-    plant = plant_of("friction-beam")
+    plant = plant_of("friction-beam", held=True)
     low_pass = plant.frequency_rad_s / 10
     lags, _ = closed_loop("friction-beam", low_pass, hippold_gains(plant, low_pass).law, periods=300, offset_rad_s=0.1)
     assert math.degrees(fluctuation(lags, 0.5)) > 10.0
 
 
 def test_the_growth_of_an_unstable_loop_is_that_of_its_pole():
-    plant, law = plant_of("friction-beam"), PhaseLaw(1.8, 18 * math.pi)
+    plant, law = plant_of("friction-beam", held=True), PhaseLaw(1.8, 18 * math.pi)
     poles = assess(ControlLoop(plant, 2 * math.pi, law)).poles_rad_s
     fastest = poles[np.argmax(poles.real)]
     lags, _ = closed_loop("friction-beam", 2 * math.pi, law, periods=220, offset_rad_s=0.002)
@@ -104,7 +105,7 @@ def test_the_growth_of_an_unstable_loop_is_that_of_its_pole():
 
 @pytest.mark.parametrize("name", ["magnet-beam", "friction-beam"])
 def test_the_lag_after_a_step_of_the_wanted_lag_is_the_simulated_one(name):
-    plant = plant_of(name)
+    plant = plant_of(name, held=True)
     low_pass = plant.frequency_rad_s / 10
     law = exact_phase_law([plant], low_pass)
     loop = ControlLoop(plant, low_pass, law)
@@ -112,7 +113,7 @@ def test_the_lag_after_a_step_of_the_wanted_lag_is_the_simulated_one(name):
     lags, _ = closed_loop(name, low_pass, law, periods=periods, target_step_rad=step_rad)
     time, predicted = step_response(loop.lag_after_target, periods * 2 * math.pi / plant.frequency_rad_s)
     measured = np.interp(time, np.arange(lags.size) / 5000.0, (lags + math.pi / 2) / step_rad)
-    np.testing.assert_allclose(measured[:-10], predicted[:-10], atol=0.06)
+    np.testing.assert_allclose(measured[:-10], predicted[:-10], atol=0.1)
     assert np.sqrt(np.mean((measured - predicted)[:-10] ** 2)) < 0.02
 
 
@@ -121,3 +122,14 @@ def test_a_step_response_is_that_of_the_closed_form():
     late = np.maximum(time - 0.02, 0.0)
     exact = 1.0 - (50.0 * np.exp(-late) - np.exp(-50.0 * late)) / 49.0
     np.testing.assert_allclose(response, exact, atol=1e-4)
+
+
+def test_complex_response_control_with_a_real_gain_swings_on_the_friction_beam():
+    plant = plant_of("friction-beam", held=True)
+    low_pass = plant.frequency_rad_s / 5
+    law, right = frequency_error_law(low_pass), complex_response_law(plant, low_pass)
+    wrong = ComplexResponseLaw(right.proportional.real, right.integral_per_s)
+    for amplitude_law, dies in ((right, True), (wrong, False)):
+        assert assess(ControlLoop(plant, low_pass, law, amplitude_law)).stable == dies
+        lags, _ = closed_loop("friction-beam", low_pass, law, amplitude_law, periods=300, offset_rad_s=0.1)
+        assert (fluctuation(lags, 0.25) < math.radians(0.1)) == dies
