@@ -12,6 +12,7 @@ from simulators.analysis import frequency_response
 from simulators.virtual_rig import VirtualRig
 
 LINEAR_HZ = {"magnet-beam": 24.37, "friction-beam": 149.0}
+RATE_HZ = 5000.0
 HOLD = 0.5  # samples: what holding the voltage alone delays
 
 
@@ -25,36 +26,35 @@ def responses(name, band=0.2, n=201, held=False):
     rig, centre = shipped(name), LINEAR_HZ[name]
     frequency = np.linspace((1 - band) * centre, (1 + band) * centre, n)
     found = frequency_response(rig, frequency, held=held)
-    early = np.exp(2j * np.pi * frequency * (HOLD if held else 0.0) / rig.converter.sample_rate_hz)
+    early = np.exp(2j * np.pi * frequency * (HOLD if held else 0.0) / RATE_HZ)
     return frequency, early * found.force_n_per_v, early * found.sensor_per_v["drive"]
 
 
 @cache
 def plant_of(name, held=False):
-    rate = shipped(name).converter.sample_rate_hz
-    measured = responses(name, band=0.08 if held else 0.2, held=held)
-    return PlantModel.from_frequency_responses(*measured, sample_rate_hz=rate, latency_samples=HOLD)
+    measured = responses(name, held=held)
+    return PlantModel.from_frequency_responses(*measured, sample_rate_hz=RATE_HZ, latency_samples=HOLD)
 
 
 @cache
-def sampled(name):
+def sampled(name, rate_hz=RATE_HZ):
     """Transition matrix, input column, and the rows of force and drive-point acceleration, the voltage held."""
     rig = shipped(name)
     a, b = rig.plant.dynamics, rig.plant.voltage_column
     n = b.size
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n] = a, b
-    step = expm(block / rig.converter.sample_rate_hz)
+    step = expm(block / rate_hz)
     drive = next(sensor for sensor in rig.sensors if sensor.name == "drive")
     rows = np.array([rig.plant.force_row()[:n], rig.output_row(drive)[:n]])
     return step[:n, :n], step[:n, n], rows
 
 
-def periodic_state(name, omega, volts=1.0):
-    """State at phase 0 of the steady vibration under ``volts cos(theta)``."""
-    transition, column, _ = sampled(name)
-    z = cmath.exp(1j * omega / shipped(name).converter.sample_rate_hz)
-    return (np.linalg.solve(z * np.eye(column.size) - transition, column) * volts).real
+def periodic_state(name, omega, rate_hz=RATE_HZ):
+    """State at phase 0 of the steady vibration under a volt, ``cos(theta)``."""
+    transition, column, _ = sampled(name, rate_hz)
+    z = cmath.exp(1j * omega / rate_hz)
+    return (np.linalg.solve(z * np.eye(column.size) - transition, column)).real
 
 
 def closed_loop(name, low_pass, law, amplitude_law=None, *, periods, offset_rad_s=0.0, factor=1.0, target_step_rad=0.0):
@@ -65,11 +65,10 @@ def closed_loop(name, low_pass, law, amplitude_law=None, *, periods, offset_rad_
     is resonance and ``target_step_rad``.
     """
     plant, (transition, column, rows) = plant_of(name, held=True), sampled(name)
-    dt = 1.0 / shipped(name).converter.sample_rate_hz
+    dt = 1.0 / RATE_HZ
     resonance = plant.lock_frequency_rad_s()
     omega = resonance + offset_rad_s
     s = 1j * omega
-    volts = 1.0
     force, response = complex(plant.force_per_v(s)), complex(plant.acceleration_per_v(s))
     wanted, phase_0 = (
         abs(plant.acceleration_per_v(1j * resonance)),
@@ -94,7 +93,7 @@ def closed_loop(name, low_pass, law, amplitude_law=None, *, periods, offset_rad_
             e = 0.5 * plant.drive_shape**2 * omega * abs(force / response) * math.sin(error)
         integral += factor * ki * e * dt
         omega = resonance + factor * kp * e + integral
-        u = complex(volts)
+        u = 1.0 + 0.0j
         if isinstance(amplitude_law, ComplexResponseLaw):
             miss = math.log(wanted / abs(response)) + 1j * math.remainder(phase_0 - cmath.phase(response), 2 * math.pi)
             log_integral += amplitude_law.integral_per_s * miss * dt
