@@ -1,7 +1,7 @@
 """Designed gains with everything that speaks for and against them, as numbers and as arrays to plot."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -159,11 +159,16 @@ def design_phase_law(plants: Sequence[PlantModel], low_pass_rad_s: float, *, sen
 
 def _steps(loop: ControlLoop, end_s: float) -> Steps:
     half_bandwidth = loop.plant.damping_ratio * loop.plant.frequency_rad_s
-    time, target = step_response(loop.lag_after_target, end_s)
-    _, shifted = step_response(loop.lag_after_frequency, end_s)
-    _, response = step_response(lambda s: loop.response_after_level(s)[0], end_s)
-    _, lag = step_response(lambda s: loop.response_after_level(s)[1], end_s)
+    time, target = _step(loop, loop.lag_after_target, end_s)
+    _, shifted = _step(loop, loop.lag_after_frequency, end_s)
+    _, response = _step(loop, lambda s: loop.response_after_level(s)[0], end_s)
+    _, lag = _step(loop, lambda s: loop.response_after_level(s)[1], end_s)
     return Steps(time, target, half_bandwidth * shifted, response, lag)
+
+
+def _step(loop: ControlLoop, transfer: Callable[[Complex], Complex], end_s: float) -> tuple[Real, Real]:
+    """Step response without what is faster than half the frequency, where the plant is the fit's and not the rig's."""
+    return step_response(transfer, end_s, highest_rad_s=0.5 * loop.omega_rad_s)
 
 
 def _settling(steps: Steps | None, period_s: float) -> Settling:
