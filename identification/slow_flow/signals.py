@@ -8,13 +8,13 @@ an acceleration, and the window of the demodulation. Both run over the whole rec
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["WINDOW_PERIODS", "amplitudes", "blackman_overlap", "derivatives"]
+__all__ = ["WINDOW_PERIODS", "amplitudes", "derivatives", "window_correlations"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 WINDOW_PERIODS = 3.0
-"""Length of the Blackman window: its zeros then lie on all whole multiples of the fundamental's frequency, the mean included."""
+"""Length of the Blackman window: its zeros lie on all other multiples of the fundamental's frequency, the mean included."""
 
 _STOP, _PASS = 0.25, 0.6  # edges of the high-pass over the fundamental frequency
 _END_FIT_PERIODS = 3.0
@@ -74,7 +74,7 @@ def amplitudes(theta: Float, data: Float, at: Float, harmonics: int) -> Complex:
         part = slice(int(first[number]), int(end[number]))
         window = _blackman((theta[part] - centre) / half) * weight[part]
         out[:, number] = (data[:, part] * (window / window.sum())) @ rotations[:, part].T
-    return out * factor
+    return np.asarray(out * factor)
 
 
 def _blackman(place: Float) -> Float:
@@ -82,10 +82,19 @@ def _blackman(place: Float) -> Float:
     return np.asarray(0.42 + 0.5 * np.cos(np.pi * place) + 0.08 * np.cos(2.0 * np.pi * place))
 
 
-def blackman_overlap(distance_periods: Float) -> Float:
-    """Correlation of the noise in two windows so many periods apart: autocorrelation of the window, 0 without overlap."""
+def window_correlations(distance_periods: Float) -> tuple[Float, Float]:
+    """Correlations of the noise at instants so many periods apart: of white noise seen through the window, and of its rate.
+
+    The autocorrelation r of the window, and r'' / r''(0); both vanish where windows do not overlap.
+    """
     grid = np.linspace(-1.0, 1.0, 601)
     window = _blackman(grid)
-    full = np.correlate(window, window, mode="full") / np.sum(window**2)
-    lags = np.linspace(-2.0, 2.0, full.size) * 0.5 * WINDOW_PERIODS
-    return np.asarray(np.interp(np.abs(distance_periods), lags, full, right=0.0))
+    lags = np.linspace(-2.0, 2.0, 1201) * 0.5 * WINDOW_PERIODS
+    plain = np.correlate(window, window, mode="full")
+    slope = np.gradient(window)
+    rate = np.correlate(slope, slope, mode="full")
+    apart = np.abs(distance_periods)
+    return (
+        np.asarray(np.interp(apart, lags, plain / plain.max(), right=0.0)),
+        np.asarray(np.interp(apart, lags, rate / rate.max(), right=0.0)),
+    )

@@ -7,14 +7,15 @@ growing vibration stores is in A_1 and V_1.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
-from identification.slow_flow.fits import LocalFit, local_fit
+from identification.slow_flow.fits import LocalFit, local_fit, noise_variances
 from identification.slow_flow.signals import WINDOW_PERIODS, amplitudes, derivatives
 from identification.validation import finite_array, positive
 
@@ -48,7 +49,8 @@ class SlowFlow:
     stiffness_std, damping_std_1_s
         float[n], their standard errors from what the fits leave over, overlapping windows accounted for.
     noise
-        float[n], standard error of real and imaginary part of ``g X``, m/s^2 times phi_d^2 N.
+        float[n, 2], variances of real and imaginary part of ``g X``, (m/s^2)^2: the part that averages out as white noise
+        of the force does, and the part that averages out faster (`identification.slow_flow.fits`).
     drive_mode_shape
         phi_d, kg^-1/2.
     fit_periods
@@ -73,6 +75,21 @@ class SlowFlow:
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
         return find_name(self.channels, name)
+
+    def between(self, start_s: float, stop_s: float) -> "SlowFlow":
+        """The instants from ``start_s`` to ``stop_s``."""
+        inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
+        if not inside.any():
+            raise IdentificationError(
+                f"start_s, stop_s: no instant from {start_s:g} to {stop_s:g} s; there are some from {self.time_s[0]:g} to "
+                f"{self.time_s[-1]:g} s"
+            )
+        return self.select(inside)
+
+    def select(self, keep: NDArray[np.bool_]) -> "SlowFlow":
+        """The instants where ``keep`` (bool[n]) is true."""
+        cut: dict[str, Any] = {name: getattr(self, name)[keep] for name in _PER_INSTANT}
+        return replace(self, harmonics=self.harmonics[:, keep], **cut)
 
     @property
     def force(self) -> Complex:
@@ -137,6 +154,12 @@ class SlowFlow:
         return np.asarray(self.harmonics[own, :, 1] / self.harmonics[drive, :, 1] / self.rate_1_s**order)
 
 
+_PER_INSTANT = (
+    *("time_s", "phase_periods", "drive_m", "dynamic_stiffness", "rate_1_s", "stiffness", "damping_1_s"),
+    *("stiffness_std", "damping_std_1_s", "noise"),
+)
+
+
 def slow_flow(
     theta_rad: ArrayLike,
     samples: ArrayLike,
@@ -146,7 +169,7 @@ def slow_flow(
     drive_mode_shape: float,
     harmonics: int = 7,
     fit_periods: float = 6.0,
-    points_per_period: int = 4,
+    points_per_period: int = 2,
     skew_samples: ArrayLike | None = None,
 ) -> SlowFlow:
     """Modal properties at every instant of a record.
@@ -168,7 +191,7 @@ def slow_flow(
     fit_periods
         Periods that the sliding fits take together: more leave less noise, fewer show faster changes.
     points_per_period
-        Instants per period.
+        Instants per period; the window passes too little above one per period for more than two to tell more.
     skew_samples
         float[n_channels], how late each channel is, in samples; none if None.
 
@@ -207,8 +230,10 @@ def slow_flow(
         raise IdentificationError(f"drive_mode_shape: is {shape}, must be finite and not zero")
     stiffness, rate = (shape**2 * found[force, :, 1] - a) / x, v / x
     periods = at / (2.0 * np.pi)
-    fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods)
-    noise = _pooled(fits, periods)
+    fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods, degree=1)
+    # Properties that bend within a fit are no noise: they are let bend where the noise is looked for.
+    noise = _pooled(_sliding(stiffness, rate, np.abs(x), periods, fit_periods, degree=2), periods)
+    errors = np.array([fit.standard_errors(variances) for fit, variances in zip(fits, noise, strict=True)])
     return SlowFlow(
         channels=tuple(channels),
         time_s=np.interp(at, theta, np.arange(theta.size) / rate_hz),
@@ -219,8 +244,8 @@ def slow_flow(
         rate_1_s=rate,
         stiffness=np.array([fit.stiffness for fit in fits]),
         damping_1_s=np.array([fit.damping for fit in fits]),
-        stiffness_std=noise * np.array([fit.stiffness_spread for fit in fits]),
-        damping_std_1_s=noise * np.array([fit.damping_spread for fit in fits]),
+        stiffness_std=errors[:, 0],
+        damping_std_1_s=errors[:, 1],
         noise=noise,
         drive_mode_shape=shape,
         fit_periods=fit_periods,
@@ -264,7 +289,9 @@ def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_perio
     return np.asarray(theta[0] + half + 2.0 * np.pi / points_per_period * np.arange(count + 1))
 
 
-def _sliding(stiffness: Complex, rate: Complex, size: Float, periods: Float, fit_periods: float) -> list[LocalFit]:
+def _sliding(
+    stiffness: Complex, rate: Complex, size: Float, periods: Float, fit_periods: float, degree: int
+) -> list[LocalFit]:
     """One fit around every instant; at the ends over as many instants, further to one side."""
     half = 0.5 * fit_periods + 1e-9
     fits = []
@@ -272,14 +299,13 @@ def _sliding(stiffness: Complex, rate: Complex, size: Float, periods: Float, fit
         middle = min(max(centre, periods[0] + half), periods[-1] - half)
         near = np.abs(periods - middle) <= half
         place = (periods[near] - centre) / half
-        fits.append(local_fit(stiffness[near], rate[near], size[near], periods[near], place, np.ones(place.size)))
+        fits.append(
+            local_fit(stiffness[near], rate[near], size[near], periods[near], place, np.ones(place.size), degree)
+        )
     return fits
 
 
 def _pooled(fits: list[LocalFit], periods: Float) -> Float:
-    """float[n]: noise in ``g X`` around each instant, from the residuals of all fits near it."""
-    residual = np.cumsum([0.0, *(fit.residual for fit in fits)])
-    expected = np.cumsum([0.0, *(fit.expected for fit in fits)])
-    first = np.searchsorted(periods, periods - 0.5 * _POOLED_PERIODS)
-    end = np.searchsorted(periods, periods + 0.5 * _POOLED_PERIODS)
-    return np.asarray(np.sqrt((residual[end] - residual[first]) / (expected[end] - expected[first])))
+    """float[n, 2]: variances of the noise around each instant, from the residuals of the fits near it."""
+    near = [np.flatnonzero(np.abs(periods - centre) <= 0.5 * _POOLED_PERIODS) for centre in periods]
+    return np.array([noise_variances([fits[number] for number in some]) for some in near])
