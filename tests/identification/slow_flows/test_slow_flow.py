@@ -104,7 +104,7 @@ def test_the_residual_of_other_modes_matters_off_resonance_and_is_taken_out() ->
     pure = Ramp(turned, np.array([force.real, motion.real, TIP * motion.real]), record.size_m)
     with_it, without = flow_of(pure, residual_m_n=residual), flow_of(pure)
     some = inner(with_it)
-    np.testing.assert_allclose(with_it.damping_ratio[some], 0.004, rtol=1e-4)
+    np.testing.assert_allclose(with_it.damping_ratio[some], 0.004, rtol=5e-4)
     settled = 1.0 / (1.0 / (0.008j * w**2) + residual / PHI**2)
     np.testing.assert_allclose(with_it.stiffness[some], w**2 + settled.real, rtol=1e-6)
     assert np.abs(without.damping_ratio[some] / 0.004 - 1.0).min() > 3e-3
