@@ -1,0 +1,111 @@
+"""From nothing but a bench to gains, margins, levels, and a plan."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller.tuning import PlantModel
+from rig.bench import Bench, load_bench
+from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.execution import Progress
+from rig.campaigns.plans import plan_from
+from rig.errors import ConfigurationError
+from rig.tuning.design import Chosen, LawName, choose, low_pass
+from rig.tuning.levels import PART, LevelChoice, choose_levels, lowest_force_n, reach_m
+from rig.tuning.linear_test import LinearTest, measure
+from rig.tuning.plan import plan_text
+from rig.tuning.plant import compared_with_bench, plant_of
+
+__all__ = ["Tuning", "tune"]
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning:
+    """What a tuning has found."""
+
+    bench: Bench
+    """The bench."""
+    test: LinearTest
+    """The linear test."""
+    recording: Path
+    """Its recording."""
+    plant: PlantModel
+    """The plant near the mode."""
+    chosen: Chosen
+    """The gains."""
+    levels: LevelChoice
+    """The levels."""
+    notes: tuple[str, ...]
+    """What a user should know, one line each."""
+    plan_toml: str
+    """The plan."""
+
+    @property
+    def plan(self) -> BackbonePlan:
+        """The plan, as read from `plan_toml`."""
+        import tomllib
+
+        read = plan_from(tomllib.loads(self.plan_toml), "tuned plan")
+        if not isinstance(read, BackbonePlan):
+            raise TypeError("tuned plan: allowed is a backbone")
+        return read
+
+
+def tune(
+    bench: Bench | str | Path,
+    recording: str | Path,
+    *,
+    level_rms_v: float | None = None,
+    law: LawName | str = "frequency-error",
+    from_m: float | None = None,
+    to_m: float | None = None,
+    points: int = 8,
+    named: str | None = None,
+    seed: int = 0,
+    realtime: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Tuning:
+    """Measure the plant with a low-level multisine, recorded in ``recording``, and design a backbone test for it.
+
+    ``level_rms_v`` spares the search for a level; ``law`` is ``frequency-error`` (with complex response control, levels in
+    metres) or ``phase`` (levels in volts); ``from_m``, ``to_m`` and ``points`` set the levels; ``named`` is what the plan calls
+    the bench.
+
+    Raises `rig.tuning.errors.TuningError` where the rig is unsuited, with the numbers,
+    `rig.errors.ConfigurationError` for what the bench does not allow, `rig.errors.RecordingError` for a recording that
+    cannot be written.
+    """
+    name = str(bench.name if isinstance(bench, Bench) else bench)
+    bench = bench if isinstance(bench, Bench) else load_bench(bench)
+    if level_rms_v is not None and not level_rms_v > 0.0:
+        raise ConfigurationError(f"--level = {level_rms_v:g} V RMS: allowed is above 0")
+    if points < 1:
+        raise ConfigurationError(f"--points = {points}: allowed is 1 or more")
+    test = measure(
+        bench,
+        name,
+        Path(recording),
+        level_rms_v=level_rms_v,
+        seed=seed,
+        realtime=realtime,
+        overwrite=overwrite,
+        progress=progress,
+        damping_of=lambda responses: plant_of(bench, responses).damping_ratio,
+    )
+    plant = plant_of(bench, test.responses)
+    notes = compared_with_bench(bench, plant)
+    lowest_n = lowest_force_n(bench, plant, PART * reach_m(bench, plant)[0] if to_m is None else to_m)
+    densities = (test.force_density, test.acceleration_density)
+    largest, lowest_n, noise = low_pass(plant, densities, lowest_n)
+    chosen = choose(plant, test.responses, law, largest, noise)
+    levels = choose_levels(bench, plant, lowest_n=lowest_n, from_m=from_m, to_m=to_m, points=points)
+    return Tuning(
+        bench=bench,
+        test=test,
+        recording=Path(recording),
+        plant=plant,
+        chosen=chosen,
+        levels=levels,
+        notes=notes,
+        plan_toml=plan_text(named or name, bench, plant, chosen, levels, Path(recording)),
+    )
