@@ -1,6 +1,7 @@
 """What a plan may know of the plant, and what is refused on that ground before anything moves."""
 
 import math
+from dataclasses import replace
 
 from pydantic import Field
 
@@ -23,6 +24,8 @@ from rig.configuration import Configured
 from rig.errors import ConfigurationError
 
 __all__ = ["KnownPlant", "PlantFacts", "control_loop", "voltage_for"]
+
+MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known one: a joint's rises with the level
 
 
 class PlantFacts(Configured):
@@ -79,20 +82,23 @@ class KnownPlant(Configured):
     def _check_stability(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
         if law.detector == "sign":
             return
+        amplitude: AmplitudeLaw = getattr(self, "amplitude_law")  # noqa: B009
+        shape = bench.specimen.drive_mode_shape
         try:
-            loop = control_loop(plant, law, getattr(self, "amplitude_law"), bench.specimen.drive_mode_shape)  # noqa: B009
-            count = unstable_poles(loop)
+            if unstable_poles(control_loop(plant, law, amplitude, shape)) == 0:
+                return
+            loop = control_loop(plant, law, amplitude, shape)
         except ValueError as error:
             raise ConfigurationError(f"plant: {error}") from None
-        if count == 0:
-            return
-        growing = closed_loop_poles(loop)
-        growth = max((float(pole.real) for pole in growing), default=math.nan)
+        growth = max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0)
+        steadier = (part for part in MORE_DAMPING if unstable_poles(replace(loop, plant=_damped(plant, part))) == 0)
+        enough = next(steadier, None)
         raise ConfigurationError(
             f"controller: these gains are unstable on the known plant ([plant], {loop.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
-            f"{100.0 * plant.damping_ratio:.3g} % damping): {count} poles of the closed loop grow"
-            + (f", at {growth:.3g} 1/s" if growth > 0.0 else "")
-            + "; see rig tune"
+            f"{100.0 * plant.damping_ratio:.3g} % damping)"
+            + (f", growing at {growth:.3g} 1/s" if growth > 0.0 else "")
+            + ("" if enough is None else f"; with {100.0 * enough * plant.damping_ratio:.3g} % they would be stable")
+            + "; rig tune finds gains, without [plant] nothing is checked"
         )
 
     def _check_reach(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
@@ -107,6 +113,10 @@ class KnownPlant(Configured):
                     f"{key}[{index}] = {level:g} {unit}: needs {volts:.3g} V on the known plant ([plant], "
                     f"{100.0 * plant.damping_ratio:.3g} % damping), the bench {bench.name} allows {limit:g} V"
                 )
+
+
+def _damped(plant: PlantModel, part: float) -> PlantModel:
+    return plant.at(damping_ratio=part * plant.damping_ratio)
 
 
 def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> float:

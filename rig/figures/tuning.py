@@ -64,17 +64,17 @@ def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
     models = (plant.force_per_v(s), plant.acceleration_per_v(s))
     for row, (colour, model) in enumerate(zip((MAIN, SECOND), models, strict=True)):
         value, channel = measured.value[:, row, 0], measured.outputs[row]
-        size.semilogy(measured.frequency_hz, np.abs(value), ".", ms=2.0, color=colour)
+        size.semilogy(measured.frequency_hz, np.abs(value), ".", ms=2.5, mew=0.0, alpha=0.4, color=colour)
         size.semilogy(fine, np.abs(model), color=colour, lw=0.9, label=f"{channel.name}, {channel.unit}/V")
-        phase.plot(measured.frequency_hz, np.degrees(np.angle(value)), ".", ms=2.0, color=colour)
-        phase.plot(fine, np.degrees(np.angle(model)), color=colour, lw=0.9)
+        phase.plot(measured.frequency_hz, np.degrees(np.angle(value)), ".", ms=2.5, mew=0.0, alpha=0.4, color=colour)
+        phase.plot(fine, _unbroken(np.degrees(np.angle(model))), color=colour, lw=0.9)
     for axis in (size, phase):
         axis.axvline(plant.frequency_rad_s / 2.0 / np.pi, color=REJECTED, lw=0.8, ls="--")
         axis.axvline(plant.coupled_pole_rad_s.imag / 2.0 / np.pi, color=REJECTED, lw=0.8, ls=":")
         axis.set(xlabel="frequency, Hz")
     size.set(ylabel="response to voltage (points: measured)")
     size.legend(fontsize=8)
-    phase.set(ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+    phase.set(ylabel="phase, deg (grey: structure, with exciter)", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
 
 
 def _draw_bode(size: "Axes", phase: "Axes", designs: tuple[Design, ...]) -> None:
@@ -87,7 +87,7 @@ def _draw_bode(size: "Axes", phase: "Axes", designs: tuple[Design, ...]) -> None
         for number, (gain, colour, name) in enumerate(loops):
             label = name if line == "-" and number < 2 else None
             size.loglog(share, np.abs(gain), line, color=colour, lw=0.9, label=label)
-            phase.semilogx(share, np.degrees(np.angle(gain)), line, color=colour, lw=0.9)
+            phase.semilogx(share, _unbroken(np.degrees(np.angle(gain))), line, color=colour, lw=0.9)
     size.axhline(1.0, color="k", lw=0.6)
     size.set(ylabel="open loop |L|", ylim=(1e-2, 1e2), xlabel="slow frequency / frequency")
     size.legend(fontsize=8)
@@ -129,6 +129,13 @@ def _draw_level_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
     axis.set_ylabel("response after a level 30 % higher, %", color=MAIN)
     lag.set_ylabel("lag after it, deg", color=SECOND)
     lag.spines["right"].set_visible(True)
+
+
+def _unbroken(degrees: np.ndarray) -> np.ndarray:
+    """Angles without the line that a wrapped one would be joined by."""
+    out = degrees.copy()
+    out[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
+    return out
 
 
 def _label(design: Design) -> str:

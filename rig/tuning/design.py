@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -36,9 +36,10 @@ LOW_PASSES = (5.0, 7.0, 10.0, 14.0, 20.0)  # parts of the frequency
 SHARES = (1.0 / 8.0, 1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0)  # of the low-pass: gain of the frequency-error loop
 PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| with which gains are chosen: with the damping measured, and with others
 OUTSIDE = 0.5  # largest gain of the response loop at other modes
+FORCE_SHARES = (1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0, 1.0 / 36.0, 1.0 / 50.0, 1.0 / 100.0)  # of the low-pass
 PHASE_PEAK = 1.6
-LAG_STD_DEG = 1.0  # of the raw lag: the settle rule averages it over ten periods
-RAISED = 2.5
+LAG_STD_DEG = 0.75  # of the raw lag: the settle rule averages it over ten periods
+RAISED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,8 @@ class Chosen:
     """w_LP."""
     share: float
     """Gain of the frequency-error loop over w_LP; 0 for the phase law."""
+    force_share: float
+    """Gain over w_LP with which a force may be held through the response; 0 for the phase law."""
     design: Design
     """On the plant as measured."""
     others: tuple[Design, ...]
@@ -105,8 +108,6 @@ def choose(
 
     Raises `TuningError` with the numbers where none suit.
     """
-    if law not in get_args(LawName):
-        raise TuningError(f"law = {law!r}: allowed is {', '.join(get_args(LawName))}")
     omega = plant.lock_frequency_rad_s()
     allowed = [w for w in (omega / part for part in LOW_PASSES) if w <= 1.001 * largest_low_pass_rad_s]
     if not any(math.isclose(w, largest_low_pass_rad_s, rel_tol=1e-3) for w in allowed):
@@ -129,6 +130,7 @@ def choose(
                 law="frequency-error",
                 low_pass_rad_s=w,
                 share=share,
+                force_share=_force_share(plant, w, share),
                 design=designs[0],
                 others=tuple(designs[1:]),
                 closed_form=hippold_gains(plant, w),
@@ -154,6 +156,7 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
         law="phase",
         low_pass_rad_s=w,
         share=0.0,
+        force_share=0.0,
         design=measured,
         others=tuple(assess(replace(design.loop, plant=other)) for other in plants[1:]),
         closed_form=hippold_gains(plant, w),
@@ -162,9 +165,15 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
     )
 
 
-def _loop(plant: PlantModel, measured: PlantModel, w: float, share: float) -> ControlLoop:
+def _force_share(plant: PlantModel, w: float, share: float) -> float:
+    """Largest of some gains of a force loop around both laws that could be raised by half before it is unstable."""
+    loops = ((part, _loop(plant, plant, w, share, 1.5 * part)) for part in FORCE_SHARES)
+    return next((part for part, loop in loops if unstable_poles(loop) == 0), FORCE_SHARES[-1])
+
+
+def _loop(plant: PlantModel, measured: PlantModel, w: float, share: float, force_share: float = 0.0) -> ControlLoop:
     """Both laws around a plant, with the gains for the one that was measured."""
-    response = complex_response_law(measured, w, smoothing_rad_s=w)
+    response = complex_response_law(measured, w, smoothing_rad_s=w, force_share=force_share)
     return ControlLoop(plant, w, frequency_error_law(w, share=share), response)
 
 
@@ -213,6 +222,6 @@ def gains_of(chosen: Chosen) -> dict[str, float | tuple[float, float]]:
         "frequency_integral_per_s": law.integral_per_s,
         "response_integral_per_s": response.integral_per_s,
         "plant_pole_rad_s": (pole.real, pole.imag),
-        "reference_integral_per_s": loop.low_pass_rad_s / 12.0,
+        "reference_integral_per_s": chosen.force_share * loop.low_pass_rad_s,
         "drive_mode_shape": loop.plant.drive_shape,
     }

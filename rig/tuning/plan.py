@@ -96,7 +96,7 @@ COMMENTS = {
     "frequency_integral_per_s": "Part of the low-pass, see above.",
     "response_integral_per_s": "A quarter of the low-pass.",
     "plant_pole_rad_s": "Coupled pole less i times the resonance, as measured: the response loop cancels it.",
-    "reference_integral_per_s": "A twelfth of the low-pass; for levels in newtons.",
+    "reference_integral_per_s": "For levels in newtons: as quick as the measured damping lets a force be held.",
     "drive_mode_shape": "As measured here, not the bench's.",
 }
 

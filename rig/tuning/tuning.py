@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 from controller.tuning import PlantModel
 from rig.bench import Bench, load_bench
@@ -77,10 +78,7 @@ def tune(
     """
     name = str(bench.name if isinstance(bench, Bench) else bench)
     bench = bench if isinstance(bench, Bench) else load_bench(bench)
-    if level_rms_v is not None and not level_rms_v > 0.0:
-        raise ConfigurationError(f"--level = {level_rms_v:g} V RMS: allowed is above 0")
-    if points < 1:
-        raise ConfigurationError(f"--points = {points}: allowed is 1 or more")
+    _check_request(bench, law, level_rms_v, from_m, to_m, points)
     test = measure(
         bench,
         name,
@@ -109,3 +107,22 @@ def tune(
         notes=notes,
         plan_toml=plan_text(named or name, bench, plant, chosen, levels, Path(recording)),
     )
+
+
+def _check_request(
+    bench: Bench, law: str, level_rms_v: float | None, from_m: float | None, to_m: float | None, points: int
+) -> None:
+    """Refuse, before anything moves, what no measurement could make possible."""
+    if law not in get_args(LawName):
+        raise ConfigurationError(f"--law = {law!r}: allowed is {', '.join(get_args(LawName))}")
+    if level_rms_v is not None and not level_rms_v > 0.0:
+        raise ConfigurationError(f"--level = {level_rms_v:g} V RMS: allowed is above 0")
+    if points < 1:
+        raise ConfigurationError(f"--points = {points}: allowed is 1 or more")
+    for name, level in (("--from-m", from_m), ("--to-m", to_m)):
+        if level is not None and not 0.0 < level <= bench.limits.displacement_m:
+            raise ConfigurationError(
+                f"{name} = {level:g} m: the bench {bench.name} allows above 0 and up to {bench.limits.displacement_m:g} m"
+            )
+    if from_m is not None and to_m is not None and from_m >= to_m:
+        raise ConfigurationError(f"--from-m = {from_m:g} m: allowed is below --to-m = {to_m:g} m")
