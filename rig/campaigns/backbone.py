@@ -7,7 +7,6 @@ from pydantic import Field
 from controller import PhaseLockedLoop
 from rig.bench import Bench
 from rig.campaigns.known_plant import KnownPlant
-from rig.campaigns.levels import Levels
 from rig.campaigns.plan import Plan, Target
 from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
@@ -16,7 +15,7 @@ from rig.sequencer.segments import Segment, SettleRule
 __all__ = ["BackbonePlan"]
 
 
-class BackbonePlan(Levels, KnownPlant, Plan):
+class BackbonePlan(KnownPlant, Plan):
     """Phase-resonant vibrations at a series of levels.
 
     The levels are amplitudes of the output voltage (``levels_v``, the paper's way), or of force or response, held by the
@@ -108,7 +107,7 @@ class BackbonePlan(Levels, KnownPlant, Plan):
     def check(self, bench: Bench) -> None:
         """Refuse, before anything moves, what the bench cannot do."""
         self.check_levels(bench)
-        self.check_plant(bench)
+        self.check_plant(bench, self.controller)
         window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
         linear = bench.specimen.linear_frequency_hz
         if not window[0] < linear < window[1]:

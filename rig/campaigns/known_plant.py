@@ -20,6 +20,7 @@ from controller.tuning import (
 )
 from controller.tuning.laws import AmplitudeLaw as AmplitudeGains
 from rig.bench import Bench
+from rig.campaigns.levels import Levels
 from rig.configuration import Configured
 from rig.errors import ConfigurationError
 
@@ -63,31 +64,29 @@ class PlantFacts(Configured):
         return PlantModel(**self.model_dump())
 
 
-class KnownPlant(Configured):
-    """Part of a plan that may know its plant."""
+class KnownPlant(Levels):
+    """Levels of a plan that may know its plant."""
 
     plant: PlantFacts | None = None
     """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the voltage limit are
     refused."""
 
-    def check_plant(self, bench: Bench) -> None:
+    def check_plant(self, bench: Bench, law: PhaseLockedLoop) -> None:
         """Refuse gains that are unstable on the known plant, and levels that it needs too much voltage for."""
         if self.plant is None:
             return
         plant = self.plant.model
-        law: PhaseLockedLoop = getattr(self, "controller")  # noqa: B009 (of every plan that locks)
         self._check_stability(plant, law, bench)
         self._check_reach(plant, law, bench)
 
     def _check_stability(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
         if law.detector == "sign":
             return
-        amplitude: AmplitudeLaw = getattr(self, "amplitude_law")  # noqa: B009
         shape = bench.specimen.drive_mode_shape
         try:
-            if unstable_poles(control_loop(plant, law, amplitude, shape)) == 0:
+            loop = control_loop(plant, law, self.amplitude_law, shape)
+            if unstable_poles(loop) == 0:
                 return
-            loop = control_loop(plant, law, amplitude, shape)
         except ValueError as error:
             raise ConfigurationError(f"plant: {error}") from None
         growth = max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0)
@@ -102,16 +101,13 @@ class KnownPlant(Configured):
         )
 
     def _check_reach(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
-        key: str = getattr(self, "levels_key")  # noqa: B009
-        unit: str = getattr(self, "level_unit")  # noqa: B009
-        levels: tuple[float, ...] = getattr(self, "levels")  # noqa: B009
         limit = bench.limits.voltage_v
-        for index, level in enumerate(levels):
-            volts = voltage_for(plant, level, unit, law.phase_lag_deg)
+        for index, level in enumerate(self.levels):
+            volts = voltage_for(plant, level, self.level_unit, law.phase_lag_deg)
             if volts > limit:
                 raise ConfigurationError(
-                    f"{key}[{index}] = {level:g} {unit}: needs {volts:.3g} V on the known plant ([plant], "
-                    f"{100.0 * plant.damping_ratio:.3g} % damping), the bench {bench.name} allows {limit:g} V"
+                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: needs {volts:.3g} V on the known plant "
+                    f"([plant], {100.0 * plant.damping_ratio:.3g} % damping), the bench {bench.name} allows {limit:g} V"
                 )
 
 

@@ -83,7 +83,7 @@ def _draw_bode(size: "Axes", phase: "Axes", designs: tuple[Design, ...]) -> None
         share = design.omega_rad_s / design.loop.omega_rad_s
         loops = [(design.frequency_loop_gain, MAIN, "frequency loop")]
         if design.amplitude_margins is not None:
-            loops += [(gain, SECOND, "response loop") for gain in design.amplitude_loop_gain]
+            loops += [(gain, SECOND, "response loop, both sidebands") for gain in design.amplitude_loop_gain]
         for number, (gain, colour, name) in enumerate(loops):
             label = name if line == "-" and number < 2 else None
             size.loglog(share, np.abs(gain), line, color=colour, lw=0.9, label=label)

@@ -11,7 +11,6 @@ from controller.tuning import (
     ControlLoop,
     Design,
     HippoldGains,
-    LowPassChoice,
     PhaseLaw,
     PlantModel,
     assess,
@@ -19,7 +18,6 @@ from controller.tuning import (
     design_phase_law,
     frequency_error_law,
     hippold_gains,
-    low_pass_from_densities,
     margins,
     unstable_poles,
 )
@@ -28,7 +26,7 @@ from identification import FrequencyResponseMatrix
 from rig.tuning.errors import TuningError
 from rig.tuning.plant import largest_outside
 
-__all__ = ["Chosen", "LawName", "choose", "low_pass"]
+__all__ = ["Chosen", "LawName", "choose", "gains_of"]
 
 LawName = Literal["frequency-error", "phase"]
 DAMPINGS = (1.0, 2.0, 4.0)  # what the damping becomes over the levels, times that of the linear test
@@ -38,8 +36,6 @@ PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| with which gains are chosen: with
 OUTSIDE = 0.5  # largest gain of the response loop at other modes
 FORCE_SHARES = (1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0, 1.0 / 36.0, 1.0 / 50.0, 1.0 / 100.0)  # of the low-pass
 PHASE_PEAK = 1.6
-LAG_STD_DEG = 0.75  # of the raw lag: the settle rule averages it over ten periods
-RAISED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,36 +65,6 @@ class Chosen:
     def sensitivity_peak(self) -> float:
         """Largest max |S| of all loops on all dampings."""
         return max(_peak(design) for design in (self.design, *self.others))
-
-
-def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float) -> tuple[float, float, str]:
-    """Largest low-pass (rad/s), the lowest force (N) that the lag can be told at with it, and why.
-
-    The lag fluctuates by `LAG_STD_DEG` at that force. Where that is not more than `RAISED` times the force wanted, the
-    force is raised rather than the low-pass lowered: a slow low-pass waits at every level.
-    """
-    omega = plant.lock_frequency_rad_s()
-    accelerance = abs(complex(plant.accelerance(1j * omega)))
-
-    def fluctuation(force_n: float) -> LowPassChoice:
-        amplitudes = (densities[0], force_n, densities[1], force_n * accelerance)
-        return low_pass_from_densities(omega, *amplitudes, lag_std_deg=LAG_STD_DEG)
-
-    quickest = fluctuation(1e6 * lowest_n)  # bounded by the frequency alone
-    needed_n = 1e6 * lowest_n * quickest.lag_std_deg / LAG_STD_DEG
-    if needed_n <= lowest_n:
-        choice = fluctuation(lowest_n)
-        return (
-            choice.low_pass_rad_s,
-            lowest_n,
-            f"the lag then fluctuates by {choice.lag_std_deg:.2g} deg at {lowest_n:.3g} N",
-        )
-    why = f"the lag then fluctuates by {LAG_STD_DEG:g} deg at"
-    if needed_n <= RAISED * lowest_n:
-        return quickest.low_pass_rad_s, needed_n, f"{why} {needed_n:.3g} N, the lowest level, raised for that"
-    choice = fluctuation(lowest_n)
-    force_n = lowest_n * max(1.0, choice.lag_std_deg / LAG_STD_DEG)
-    return choice.low_pass_rad_s, force_n, f"{why} {force_n:.3g} N, the lowest level"
 
 
 def choose(

@@ -7,6 +7,7 @@ import numpy as np
 
 from controller.tuning import PlantModel
 from rig.bench import Bench
+from rig.campaigns.known_plant import voltage_for
 from rig.errors import ConfigurationError
 
 __all__ = ["LevelChoice", "choose_levels", "lowest_force_n", "needed_v", "reach_m"]
@@ -30,10 +31,9 @@ class LevelChoice:
     """What bounds them."""
 
 
-def needed_v(plant: PlantModel, level_m: float, lag_deg: float = -90.0) -> float:
-    """Voltage (V peak) for a displacement (m peak) at a lag on the linear plant."""
-    omega = plant.lock_frequency_rad_s(lag_deg)
-    return float(level_m * omega**2 / abs(complex(plant.acceleration_per_v(1j * omega))))
+def needed_v(plant: PlantModel, level_m: float) -> float:
+    """Voltage (V peak) for a displacement (m peak) at resonance of the linear plant."""
+    return voltage_for(plant, level_m, "m", -90.0)
 
 
 def needed_n(plant: PlantModel, level_m: float) -> float:

@@ -4,14 +4,13 @@ All of it goes through the ordinary runner into one recording, level by level a 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification import FrequencyResponseMatrix, PeriodicSpectra, best_linear_approximation
+from identification import FrequencyResponseMatrix, PeriodicSpectra
 from rig.bench import Bench
 from rig.campaigns.execution import Progress
 from rig.campaigns.multisine import MultisinePlan
@@ -20,13 +19,11 @@ from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
 from rig.tuning.errors import TuningError
+from rig.tuning.spectra import coherence_of, densities, near, voltage_responses
 
-__all__ = ["FIT_BAND", "LinearTest", "coherence_of", "measure"]
-
-Real = NDArray[np.float64]
+__all__ = ["LinearTest", "measure"]
 
 BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could excite lie inside
-FIT_BAND = (0.6, 1.6)  # of the linear frequency: that of the plant's model
 LINES = 400.0  # lines up to the linear frequency while the level is sought
 LINES_A_BANDWIDTH = 4.0
 ENOUGH = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
@@ -66,7 +63,7 @@ def measure(
     realtime: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
-    damping_of: "DampingOf",
+    damping_of: Callable[[FrequencyResponseMatrix], float],
 ) -> LinearTest:
     """Raise the level until the coherence suffices, then measure with lines as close as the damping asks for.
 
@@ -86,29 +83,22 @@ def measure(
             break
         level = _raised(bench, level, seen, run.share_of_limits, len(tried))
     _audible(bench, level, seen)
-    matrix = _voltage_responses(bench, found)
+    matrix = voltage_responses(bench, found)
     resolution = 2.0 * damping_of(matrix) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
     found = run.at(level, _on_samples(bench, min(resolution, _coarse(bench))), 3)
-    matrix = _voltage_responses(bench, found)
-    near = _near(bench, matrix.frequency_hz)
-    nonlinear = np.maximum(matrix.total_std[near, 0, 0] ** 2 - matrix.noise_std[near, 0, 0] ** 2, 0.0)
-    densities = _densities(bench, found)
+    matrix = voltage_responses(bench, found)
+    around = near(bench, matrix.frequency_hz)
+    nonlinear = np.maximum(matrix.total_std[around, 0, 0] ** 2 - matrix.noise_std[around, 0, 0] ** 2, 0.0)
+    noise = densities(bench, found)
     return LinearTest(
         level_rms_v=level,
         responses=matrix,
         coherence=coherence_of(bench, found),
-        distortion=float(np.median(np.sqrt(nonlinear) / np.abs(matrix.value[near, 0, 0]))),
-        force_density=densities[0],
-        acceleration_density=densities[1],
+        distortion=float(np.median(np.sqrt(nonlinear) / np.abs(matrix.value[around, 0, 0]))),
+        force_density=noise[0],
+        acceleration_density=noise[1],
         levels_tried_v=tuple(tried),
     )
-
-
-class DampingOf(Protocol):
-    """Type of what tells a damping ratio from responses."""
-
-    def __call__(self, responses: FrequencyResponseMatrix) -> float:
-        """The damping ratio."""
 
 
 class _Runs:
@@ -209,38 +199,6 @@ def _silent(bench: Bench, level: float, seen: tuple[float, float], when: str) ->
         f"coherence with the voltage {when}, {level:.4g} V RMS: {seen[0]:.4f} of channel {names[0]!r}, {seen[1]:.4f} of "
         f"channel {names[1]!r}, needed is {ENOUGH}: a sensor, its cable or the amplifier is dead, or the test is all noise"
     )
-
-
-def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
-    """Median coherence of force and drive with the voltage around the mode, of one period."""
-    near = _near(bench, measured.frequency_hz) & measured.excited
-    out = []
-    for role in ("force", "drive"):
-        index = measured.index(next(c.name for c in bench.channels if c.role == role))
-        power = np.mean(np.abs(measured.mean[:, index][:, near]) ** 2, axis=0)
-        noise = np.mean(measured.noise_variance[:, index][:, near], axis=0)
-        signal = np.maximum(power - noise / measured.spectra.shape[1], 0.0)
-        out.append(float(np.median(signal)) / max(float(np.median(signal)) + float(np.median(noise)), 1e-300))
-    return out[0], out[1]
-
-
-def _voltage_responses(bench: Bench, measured: PeriodicSpectra) -> FrequencyResponseMatrix:
-    names = [next(c.name for c in bench.channels if c.role == role) for role in ("force", "drive")]
-    return best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
-
-
-def _near(bench: Bench, frequency_hz: Real) -> NDArray[np.bool_]:
-    linear = bench.specimen.linear_frequency_hz
-    return np.asarray((frequency_hz > FIT_BAND[0] * linear) & (frequency_hz < FIT_BAND[1] * linear))
-
-
-def _densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
-    """One-sided noise densities: a line of resolution d carries the power S d, half the square of its peak amplitude."""
-    near = _near(bench, measured.frequency_hz)
-    step = float(np.diff(measured.frequency_hz).mean())
-    rows = [measured.index(next(c.name for c in bench.channels if c.role == role)) for role in ("force", "drive")]
-    variance = [float(np.mean(measured.noise_variance[:, row][:, near])) for row in rows]
-    return 0.5 * variance[0] / step, 0.5 * variance[1] / step
 
 
 def _coarse(bench: Bench) -> float:

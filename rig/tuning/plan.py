@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from controller.tuning import PlantModel
@@ -30,8 +31,10 @@ def plan_text(
         _line("kind", "backbone"),
         _line("description", f"backbone of the {bench.specimen.name}, tuned by rig tune"),
         _line("bench", bench_name),
-        f"# {levels.why[0].upper()}{levels.why[1:]};",
-        f"# the linear plant needs {levels.needed_v[0]:.3g} to {levels.needed_v[-1]:.3g} V; a nonlinear one may need more.",
+        *_comment(
+            f"{levels.why[0].upper()}{levels.why[1:]}; the linear plant needs {levels.needed_v[0]:.3g} to "
+            f"{levels.needed_v[-1]:.3g} V, a nonlinear one may need more."
+        ),
         _line("levels_v", [significant(v) for v in levels.needed_v])
         if volts
         else _line("levels_m", list(levels.levels_m)),
@@ -47,7 +50,7 @@ def plan_text(
     controller = [
         "",
         "[controller]",
-        f"# {chosen.why}",
+        *_comment(f"{chosen.why}."),
         _line("detector", "adaptive"),
         _line("harmonics_followed", HARMONICS),
         _line("low_pass_rad_s", significant(chosen.low_pass_rad_s)),
@@ -110,6 +113,10 @@ def _gains(chosen: Chosen) -> list[str]:
             out.append(f"# {COMMENTS[key]}")
         out.append(_line(key, [significant(v) for v in value] if isinstance(value, tuple) else significant(value)))
     return out
+
+
+def _comment(text: str) -> list[str]:
+    return wrap(text, 118, initial_indent="# ", subsequent_indent="# ")
 
 
 def _line(key: str, value: Any) -> str:

@@ -10,7 +10,7 @@ from identification import FrequencyResponseMatrix
 from rig.bench import Bench
 from rig.drivers import make_daq
 from rig.tuning.errors import TuningError
-from rig.tuning.linear_test import FIT_BAND
+from rig.tuning.spectra import FIT_BAND, near
 
 __all__ = ["ALLOWED_OFFSET", "compared_with_bench", "largest_outside", "lead_samples", "mass_ratios", "plant_of"]
 
@@ -32,12 +32,12 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix) -> PlantModel:
     """
     linear = bench.specimen.linear_frequency_hz
     frequency = responses.frequency_hz
-    near = (frequency > FIT_BAND[0] * linear) & (frequency < FIT_BAND[1] * linear)
+    around = near(bench, frequency)
     try:
         plant = PlantModel.from_frequency_responses(
-            frequency[near],
-            responses.value[near, 0, 0],
-            responses.value[near, 1, 0],
+            frequency[around],
+            responses.value[around, 0, 0],
+            responses.value[around, 1, 0],
             sample_rate_hz=bench.sample_rate_hz,
             latency_samples=lead_samples(bench),
         )

@@ -10,13 +10,17 @@ from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.execution import Progress
 from rig.campaigns.plans import plan_from
 from rig.errors import ConfigurationError
-from rig.tuning.design import Chosen, LawName, choose, low_pass
+from rig.tuning.design import Chosen, LawName, choose
 from rig.tuning.levels import PART, LevelChoice, choose_levels, lowest_force_n, reach_m
 from rig.tuning.linear_test import LinearTest, measure
+from rig.tuning.noise import low_pass
 from rig.tuning.plan import plan_text
 from rig.tuning.plant import compared_with_bench, plant_of
 
 __all__ = ["Tuning", "tune"]
+
+
+NONLINEAR = 0.005  # distortion beside the linear response of the force
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +101,7 @@ def tune(
     largest, lowest_n, noise = low_pass(plant, densities, lowest_n)
     chosen = choose(plant, test.responses, law, largest, noise)
     levels = choose_levels(bench, plant, lowest_n=lowest_n, from_m=from_m, to_m=to_m, points=points)
+    notes += _cautions(bench, test, levels)
     return Tuning(
         bench=bench,
         test=test,
@@ -107,6 +112,23 @@ def tune(
         notes=notes,
         plan_toml=plan_text(named or name, bench, plant, chosen, levels, Path(recording)),
     )
+
+
+def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:
+    """What may go otherwise than the linear plant has it."""
+    out = []
+    if test.distortion > NONLINEAR:
+        out.append(
+            f"the multisine at {test.level_rms_v:.3g} V RMS shows {100.0 * test.distortion:.2g} % of nonlinear distortion: "
+            "frequency and damping are those of that level (--level sets a lower one)"
+        )
+    limit, highest = bench.limits.voltage_v, levels.needed_v[-1]
+    if highest > PART * limit * 1.001:
+        out.append(
+            f"the highest level needs {highest:.3g} of {limit:g} V on the linear plant: it is out of reach where the damping "
+            f"rises beyond {limit / highest:.2g} times that of the multisine"
+        )
+    return tuple(out)
 
 
 def _check_request(

@@ -163,6 +163,18 @@ def test_a_sensor_that_is_mounted_the_other_way_round_is_told(tmp_path):
         tune(Bench.model_validate(table), tmp_path / "test.h5", level_rms_v=0.02)
 
 
+def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_said(tmp_path):
+    bench = bench_with(name="friction-beam", delay_samples=300)
+    with pytest.raises(TuningError, match=r"unsuited .* max \|S\| = [\d.]+, allowed is 3"):
+        tune(bench, tmp_path / "test.h5", level_rms_v=0.02)
+
+
+def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):
+    tuned = tune("magnet-beam", tmp_path / "test.h5", level_rms_v=0.05, to_m=0.005, points=3)
+    assert [note for note in tuned.notes if "out of reach where the damping rises beyond 1.3 times" in note]
+    assert not magnet.notes
+
+
 def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     command = ["rig", "tune", "--bench", "magnet-beam", "-o", "tuned.toml", "--level", "0.02", "--figure", "tuned.png"]
