@@ -12,6 +12,7 @@ from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
 from rig.cli_options import Json, Output, Overwrite, Realtime, show_file
+from rig.cli_tune import tune_
 
 __all__ = ["app", "main"]
 
@@ -36,6 +37,7 @@ app.command()(identify)
 app.command()(predict)
 app.command("import")(import_)
 app.command("export")(export_)
+app.command("tune")(tune_)
 
 
 @app.command()

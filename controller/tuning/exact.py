@@ -1,5 +1,6 @@
 """Gains from the exact map of the measured plant: the strongest integral action that a bound on the sensitivity leaves."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
@@ -53,11 +54,21 @@ def frequency_error_law(low_pass_rad_s: float, *, share: float = 1.0 / 12.0) -> 
 
 
 def complex_response_law(
-    plant: PlantModel, low_pass_rad_s: float, *, force_share: float = 0.0, lag_deg: float = -90.0
+    plant: PlantModel,
+    low_pass_rad_s: float,
+    *,
+    share: float = 0.25,
+    force_share: float = 0.0,
+    smoothing_rad_s: float = math.inf,
+    lag_deg: float = -90.0,
 ) -> ComplexResponseLaw:
-    """Complex response control: K = w_LP/4, kp = K/(-p) cancels the coupled pole p; force loop of gain ``force_share w_LP``."""
-    gain = 0.25 * low_pass_rad_s
-    return ComplexResponseLaw(gain / -plant.pole_offset_rad_s(lag_deg), gain, force_share * low_pass_rad_s)
+    """Complex response control: ``K = share w_LP``, kp = K/(-p) cancels the coupled pole p.
+
+    Force loop of gain ``force_share w_LP``; the error passes a low-pass of the corner ``smoothing_rad_s``.
+    """
+    gain = share * low_pass_rad_s
+    pole = plant.pole_offset_rad_s(lag_deg)
+    return ComplexResponseLaw(gain / -pole, gain, force_share * low_pass_rad_s, smoothing_rad_s)
 
 
 def frequencies_for(plant: PlantModel, n: int = 1500) -> Real:

@@ -142,6 +142,15 @@ class ComplexResponseLaw:
     """K (1/s)."""
     force_per_s: float = 0.0
     """k_F (1/s); 0 where the level is that of the response."""
+    smoothing_rad_s: float = math.inf
+    """Corner of a first-order low-pass that E passes before the gains (rad/s); infinite where there is none."""
+
+    def gain(self, s: Complex) -> Complex:
+        """From E to ln U_c."""
+        return np.asarray((self.proportional + self.integral_per_s / s) * self._smoothing(s))
+
+    def _smoothing(self, s: Complex) -> Complex:
+        return np.asarray(1.0 / (1.0 + s / self.smoothing_rad_s))
 
     def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
         """K's rows of ln|U| and arg U [n, 2, 4]."""
@@ -161,8 +170,9 @@ class ComplexResponseLaw:
 
     def _turn(self, s: Complex, error: Complex) -> Complex:
         """(kp + K/s) E, real and imaginary part apart [n, 2, ...]."""
-        real, imag = self.proportional.real + self.integral_per_s / s, complex(self.proportional).imag
-        real = real[:, None]
+        smoothing = self._smoothing(s)
+        real = ((complex(self.proportional).real + self.integral_per_s / s) * smoothing)[:, None]
+        imag = (complex(self.proportional).imag * smoothing)[:, None]
         return np.stack([real * error[:, 0] - imag * error[:, 1], imag * error[:, 0] + real * error[:, 1]], axis=1)
 
 

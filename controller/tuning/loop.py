@@ -104,7 +104,7 @@ class ControlLoop:
         if isinstance(law, ComplexResponseLaw) and law.force_per_s == 0.0:
             h = self.plant.acceleration_per_v(s + 1j * self.omega_rad_s)
             h = h / self.plant.acceleration_per_v(1j * self.omega_rad_s)
-            return np.asarray((law.proportional + law.integral_per_s / s) * h * self._smoothing(s))
+            return np.asarray(law.gain(s) * h * self._smoothing(s))
         matrix = self.return_difference(s)[:, :2, :2]
         return np.asarray(np.linalg.det(matrix) - 1.0)
 

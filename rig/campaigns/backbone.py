@@ -6,7 +6,7 @@ from pydantic import Field
 
 from controller import PhaseLockedLoop
 from rig.bench import Bench
-from rig.campaigns.levels import Levels
+from rig.campaigns.known_plant import KnownPlant
 from rig.campaigns.plan import Plan, Target
 from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
@@ -15,7 +15,7 @@ from rig.sequencer.segments import Segment, SettleRule
 __all__ = ["BackbonePlan"]
 
 
-class BackbonePlan(Levels, Plan):
+class BackbonePlan(KnownPlant, Plan):
     """Phase-resonant vibrations at a series of levels.
 
     The levels are amplitudes of the output voltage (``levels_v``, the paper's way), or of force or response, held by the
@@ -107,6 +107,7 @@ class BackbonePlan(Levels, Plan):
     def check(self, bench: Bench) -> None:
         """Refuse, before anything moves, what the bench cannot do."""
         self.check_levels(bench)
+        self.check_plant(bench, self.controller)
         window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
         linear = bench.specimen.linear_frequency_hz
         if not window[0] < linear < window[1]:

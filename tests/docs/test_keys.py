@@ -14,6 +14,7 @@ from controller.pll import PhaseLockedLoop
 from rig.bench import Bench, DriverChoice, Limits, SpecimenFacts
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.kinds import KINDS
+from rig.campaigns.known_plant import PlantFacts
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.sweep import SweepPlan
@@ -35,6 +36,7 @@ MODELS = {
     "Keys of `[controller]`": PhaseLockedLoop,
     "Keys of `[controller.lock]`": LockRule,
     "Keys of `[settle]`": SettleRule,
+    "Keys of `[plant]`": PlantFacts,
     "Keys of a bench": Bench,
     "Keys of `[driver]`": DriverChoice,
     "Keys of `[specimen]`": SpecimenFacts,
@@ -46,7 +48,9 @@ MODELS = {
 
 def keys_under(heading: str) -> dict[str, tuple[str, str]]:
     """Default and allowed column of every key in the table below a heading of the guide or of the page of campaigns."""
-    pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("user-guide.md", "campaigns.md")]
+    pages = [
+        (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("user-guide.md", "campaigns.md", "tuning.md")
+    ]
     rows = re.findall(
         r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table_under(heading, "\n".join(pages))["table"], re.MULTILINE
     )

@@ -1,0 +1,157 @@
+"""What a plan may know of the plant, and what is refused on that ground before anything moves."""
+
+import math
+from dataclasses import replace
+
+from pydantic import Field
+
+from controller import AmplitudeLaw, PhaseLockedLoop
+from controller.tuning import (
+    ComplexResponseLaw,
+    ControlLoop,
+    ForceLaw,
+    FrequencyErrorLaw,
+    LogForceLaw,
+    LogResponseLaw,
+    PhaseLaw,
+    PlantModel,
+    closed_loop_poles,
+    unstable_poles,
+)
+from controller.tuning.laws import AmplitudeLaw as AmplitudeGains
+from rig.bench import Bench
+from rig.campaigns.levels import Levels
+from rig.configuration import Configured
+from rig.errors import ConfigurationError
+
+__all__ = ["KnownPlant", "PlantFacts", "control_loop", "voltage_for"]
+
+MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known one: a joint's rises with the level
+
+
+class PlantFacts(Configured):
+    """Exciter and structure near the mode, from voltage to force and acceleration, as ``rig tune`` has measured them.
+
+    See `controller.tuning.PlantModel`: force per volt is ``1/(alpha + beta Y)`` with the structure's accelerance Y.
+    """
+
+    frequency_rad_s: float = Field(gt=0)
+    """Angular frequency of the mode of the structure alone, rad/s."""
+    damping_ratio: float = Field(gt=0, lt=1)
+    """Its damping ratio."""
+    drive_shape: float = Field(gt=0)
+    """Its mass-normalised shape at the drive point, kg^-1/2."""
+    residual_per_kg: tuple[float, float]
+    """Accelerance of the other modes, 1/kg: a constant, and the factor of (s/centre)^2."""
+    force_v_n: tuple[float, float, float, float]
+    """alpha, V/N: coefficients of (s/centre)^0 to ^3."""
+    acceleration_v_s2_m: tuple[float, float, float, float]
+    """beta, V s^2/m: coefficients of (s/centre)^-2 to ^1."""
+    centre_rad_s: float = Field(gt=0)
+    """Angular frequency that s is divided by, rad/s."""
+    band_hz: tuple[float, float]
+    """Band that was fitted, Hz."""
+    fit_error: float = Field(ge=0)
+    """Relative error of the fit, root mean square."""
+    sample_rate_hz: float = Field(gt=0)
+    """Sample rate of the loop, Hz."""
+    latency_samples: float = Field(ge=0)
+    """Samples from an output to the input that shows it."""
+
+    @property
+    def model(self) -> PlantModel:
+        """The plant."""
+        return PlantModel(**self.model_dump())
+
+
+class KnownPlant(Levels):
+    """Levels of a plan that may know its plant."""
+
+    plant: PlantFacts | None = None
+    """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the voltage limit are
+    refused."""
+
+    def check_plant(self, bench: Bench, law: PhaseLockedLoop) -> None:
+        """Refuse gains that are unstable on the known plant, and levels that it needs too much voltage for."""
+        if self.plant is None:
+            return
+        plant = self.plant.model
+        self._check_stability(plant, law, bench)
+        self._check_reach(plant, law, bench)
+
+    def _check_stability(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
+        if law.detector == "sign":
+            return
+        shape = bench.specimen.drive_mode_shape
+        try:
+            loop = control_loop(plant, law, self.amplitude_law, shape)
+            if unstable_poles(loop) == 0:
+                return
+        except ValueError as error:
+            raise ConfigurationError(f"plant: {error}") from None
+        growth = max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0)
+        steadier = (part for part in MORE_DAMPING if unstable_poles(replace(loop, plant=_damped(plant, part))) == 0)
+        enough = next(steadier, None)
+        raise ConfigurationError(
+            f"controller: these gains are unstable on the known plant ([plant], {loop.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
+            f"{100.0 * plant.damping_ratio:.3g} % damping)"
+            + (f", growing at {growth:.3g} 1/s" if growth > 0.0 else "")
+            + ("" if enough is None else f"; with {100.0 * enough * plant.damping_ratio:.3g} % they would be stable")
+            + "; rig tune finds gains, without [plant] nothing is checked"
+        )
+
+    def _check_reach(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
+        limit = bench.limits.voltage_v
+        for index, level in enumerate(self.levels):
+            volts = voltage_for(plant, level, self.level_unit, law.phase_lag_deg)
+            if volts > limit:
+                raise ConfigurationError(
+                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: needs {volts:.3g} V on the known plant "
+                    f"([plant], {100.0 * plant.damping_ratio:.3g} % damping), the bench {bench.name} allows {limit:g} V"
+                )
+
+
+def _damped(plant: PlantModel, part: float) -> PlantModel:
+    return plant.at(damping_ratio=part * plant.damping_ratio)
+
+
+def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> float:
+    """Voltage (V peak) that a level (V, N, N RMS, m) needs on a linear plant."""
+    if unit == "V":
+        return level
+    omega = plant.lock_frequency_rad_s(lag_deg)
+    if unit == "m":
+        return float(level * omega**2 / abs(complex(plant.acceleration_per_v(1j * omega))))
+    return float(level * (math.sqrt(2.0) if unit == "N RMS" else 1.0) * plant.volts_per_newton(lag_deg))
+
+
+def control_loop(
+    plant: PlantModel, law: PhaseLockedLoop, amplitude_law: AmplitudeLaw, bench_shape: float | None
+) -> ControlLoop:
+    """The linearised loop that a configured law makes with a plant, its lag and its gains as they are.
+
+    The frequency-error law takes the mode shape of ``law``, or else that of the bench, whatever the plant's own is.
+    """
+    kp, ki = law.proportional_and_integral()
+    if law.frequency_law == "frequency-error":
+        shape = law.drive_mode_shape or bench_shape or plant.drive_shape
+        frequency: PhaseLaw | FrequencyErrorLaw = FrequencyErrorLaw(ki, kp, (shape / plant.drive_shape) ** 2)
+    else:
+        frequency = PhaseLaw(kp, ki)
+    gains = _amplitude_gains(law, amplitude_law)
+    return ControlLoop(plant, law.low_pass_rad_s, frequency, gains, law.phase_lag_deg)
+
+
+def _amplitude_gains(law: PhaseLockedLoop, amplitude_law: AmplitudeLaw) -> AmplitudeGains | None:
+    if amplitude_law is AmplitudeLaw.VOLTAGE:
+        return None
+    if amplitude_law is not AmplitudeLaw.RESPONSE and law.force_loop == "linear":
+        return ForceLaw(law.k3, law.k4)
+    if amplitude_law is not AmplitudeLaw.RESPONSE and law.force_loop == "logarithmic":
+        return LogForceLaw(law.force_proportional, law.force_integral_per_s)
+    gain = law.response_integral_per_s
+    proportional = gain / -complex(*law.plant_pole_rad_s) if law.plant_pole_rad_s else 0.0 + 0.0j
+    if law.response_loop == "amplitude":
+        return LogResponseLaw(proportional.real, gain)
+    force = 0.0 if amplitude_law is AmplitudeLaw.RESPONSE else law.reference_integral_per_s
+    return ComplexResponseLaw(proportional, gain, force, law.low_pass_rad_s)

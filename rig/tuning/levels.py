@@ -1,0 +1,106 @@
+"""Levels of the backbone that a tuning proposes: from what can be told from noise to a part of the bench's limits."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.tuning import PlantModel
+from rig.bench import Bench
+from rig.campaigns.known_plant import voltage_for
+from rig.errors import ConfigurationError
+
+__all__ = ["LevelChoice", "choose_levels", "lowest_force_n", "needed_v", "reach_m"]
+
+PART = 1.0 / 3.0  # of the limits at the linear plant: room for what the nonlinearity asks for on top
+SPAN = 30.0  # highest level over lowest, where noise allows
+BITS = 2.0  # amplitude of the force, in the converter's least bits, at the lowest level
+
+
+@dataclass(frozen=True)
+class LevelChoice:
+    """Levels of the drive point's displacement, and why these."""
+
+    levels_m: tuple[float, ...]
+    """Levels, m peak."""
+    needed_v: tuple[float, ...]
+    """Voltage of each on the linear plant, V peak."""
+    forces_n: tuple[float, ...]
+    """Force of each on the linear plant, N peak."""
+    why: str
+    """What bounds them."""
+
+
+def needed_v(plant: PlantModel, level_m: float) -> float:
+    """Voltage (V peak) for a displacement (m peak) at resonance of the linear plant."""
+    return voltage_for(plant, level_m, "m", -90.0)
+
+
+def needed_n(plant: PlantModel, level_m: float) -> float:
+    """Force (N peak) for a displacement (m peak) at resonance of the linear plant."""
+    omega = plant.lock_frequency_rad_s()
+    return float(level_m * omega**2 / abs(complex(plant.accelerance(1j * omega))))
+
+
+def reach_m(bench: Bench, plant: PlantModel) -> tuple[float, str]:
+    """Largest displacement (m peak) that the linear plant reaches within the bench's limits, and the limit that ends it."""
+    limits, omega = bench.limits, plant.lock_frequency_rad_s()
+    ends = {
+        "displacement_m": limits.displacement_m,
+        "acceleration_m_s2": limits.acceleration_m_s2 / omega**2,
+        "voltage_v": limits.voltage_v / needed_v(plant, 1.0),
+        "force_n": limits.force_n / needed_n(plant, 1.0),
+    }
+    name = min(ends, key=lambda key: ends[key])
+    return ends[name], f"limits.{name} = {getattr(limits, name):g}"
+
+
+def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
+    """Lowest useful force: a part of the highest one, but some bits of the converter."""
+    force = next(channel for channel in bench.channels if channel.role == "force")
+    bit = force.resolution_v / abs(force.sensitivity_v_per_unit)
+    return max(needed_n(plant, highest_m) / SPAN, BITS * bit)
+
+
+def choose_levels(
+    bench: Bench,
+    plant: PlantModel,
+    *,
+    lowest_n: float,
+    from_m: float | None = None,
+    to_m: float | None = None,
+    points: int = 8,
+) -> LevelChoice:
+    """Levels in equal ratios between the lowest force that can be told and a third of what the limits allow.
+
+    Raises `ConfigurationError` for a level beyond what the bench reaches.
+    """
+    reach, limit = reach_m(bench, plant)
+    highest = PART * reach if to_m is None else to_m
+    lowest = lowest_n / needed_n(plant, 1.0) if from_m is None else from_m
+    if highest > reach:
+        raise ConfigurationError(
+            f"--to-m = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "
+            f"linear plant (it would need {needed_v(plant, highest):.3g} V)"
+        )
+    if not 0.0 < lowest < highest:
+        raise ConfigurationError(
+            f"levels from {lowest:.3g} m to {highest:.3g} m: allowed is a lowest level above 0 and below the highest; the "
+            f"force can be told from {lowest_n / needed_n(plant, 1.0):.3g} m on"
+        )
+    levels = (
+        tuple(float(f"{level:.4g}") for level in np.geomspace(lowest, highest, points)) if points > 1 else (highest,)
+    )
+    why = f"the highest is {highest / reach:.2f} of what {limit} allows on the linear plant"
+    why += f", the lowest has {needed_n(plant, levels[0]):.3g} N of force"
+    return LevelChoice(
+        levels,
+        tuple(needed_v(plant, level) for level in levels),
+        tuple(needed_n(plant, level) for level in levels),
+        why,
+    )
+
+
+def significant(value: float, digits: int = 5) -> float:
+    """A number with some digits, as people write it."""
+    return value if value == 0.0 or not math.isfinite(value) else float(f"{value:.{digits}g}")

@@ -1,0 +1,124 @@
+"""The plan that a tuning writes: TOML that runs as it is, with a comment for the origin of each number."""
+
+import json
+import math
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+from controller.tuning import PlantModel
+from rig.bench import Bench
+from rig.tuning.design import Chosen, gains_of
+from rig.tuning.levels import LevelChoice, significant
+
+__all__ = ["plan_text"]
+
+WINDOW = 0.1  # of the frequency, either way
+HARMONICS = 5
+RAMP_PERIODS = 10
+SHORTEST_TIME_OUT = 600
+
+
+def plan_text(
+    bench_name: str, bench: Bench, plant: PlantModel, chosen: Chosen, levels: LevelChoice, recording: Path
+) -> str:
+    """A backbone plan for a bench, as TOML."""
+    hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
+    volts = chosen.law == "phase"
+    settling = chosen.design.settling.longest
+    time_out = max(SHORTEST_TIME_OUT, 100.0 * math.ceil(0.05 * settling) if math.isfinite(settling) else 0.0)
+    head = [
+        _line("kind", "backbone"),
+        _line("description", f"backbone of the {bench.specimen.name}, tuned by rig tune"),
+        _line("bench", bench_name),
+        *_comment(
+            f"{levels.why[0].upper()}{levels.why[1:]}; the linear plant needs {levels.needed_v[0]:.3g} to "
+            f"{levels.needed_v[-1]:.3g} V, a nonlinear one may need more."
+        ),
+        _line("levels_v", [significant(v) for v in levels.needed_v])
+        if volts
+        else _line("levels_m", list(levels.levels_m)),
+    ]
+    if not volts:
+        head += [
+            "# Voltage of the lowest level on the linear plant.",
+            _line("start_v", significant(levels.needed_v[0], 4)),
+        ]
+    head += [_line("ramp_periods", RAMP_PERIODS)]
+    window = [round((1.0 - WINDOW) * hertz, 4), round((1.0 + WINDOW) * hertz, 4)]
+    lowest, highest = bench.limits.frequency_hz
+    controller = [
+        "",
+        "[controller]",
+        *_comment(f"{chosen.why}."),
+        _line("detector", "adaptive"),
+        _line("harmonics_followed", HARMONICS),
+        _line("low_pass_rad_s", significant(chosen.low_pass_rad_s)),
+        _line("frequency_law", chosen.law),
+        *_gains(chosen),
+        "# Resonance of the structure alone as measured, and 10 % either way.",
+        _line("centre_frequency_hz", significant(hertz, 6)),
+        _line("frequency_window_hz", [max(window[0], lowest), min(window[1], highest)]),
+    ]
+    settle = [
+        "",
+        "[settle]",
+        f"# Predicted for a step of 30 % in level or of half a bandwidth in frequency: {settling:.0f} periods.",
+        _line("longest_periods", time_out),
+    ]
+    facts = [
+        "",
+        f"# The plant as measured ({recording.name}): gains and levels are checked against it before anything moves.",
+    ]
+    facts += ["[plant]", *(_line(key, value) for key, value in plant.to_dict().items())]
+    return (
+        "\n".join([*_summary(plant, chosen), *head, *controller, *(settle if math.isfinite(settling) else []), *facts])
+        + "\n"
+    )
+
+
+def _summary(plant: PlantModel, chosen: Chosen) -> list[str]:
+    design = chosen.design
+    margins = design.frequency_margins
+    text = [
+        f"# Structure: {plant.frequency_rad_s / 2.0 / math.pi:.6g} Hz, {100.0 * plant.damping_ratio:.4g} % damping, phi_d "
+        f"{plant.drive_shape:.5g} kg^-1/2; coupled pole {plant.coupled_pole_rad_s.imag / 2.0 / math.pi:.6g} Hz.",
+        f"# Frequency loop: max |S| {margins.sensitivity_peak:.2f}, gain margin {margins.gain_margin:.3g}, phase margin "
+        f"{margins.phase_margin_deg:.0f} deg.",
+    ]
+    if design.amplitude_margins is not None:
+        text.append(
+            f"# Response loop: max |S| {design.amplitude_margins.sensitivity_peak:.2f}, gain margin "
+            f"{design.amplitude_margins.gain_margin:.3g}, phase margin {design.amplitude_margins.phase_margin_deg:.0f} deg."
+        )
+    return text
+
+
+COMMENTS = {
+    "k1": "Proportional and integral gain of the phase error.",
+    "frequency_integral_per_s": "Part of the low-pass, see above.",
+    "response_integral_per_s": "A quarter of the low-pass.",
+    "plant_pole_rad_s": "Coupled pole less i times the resonance, as measured: the response loop cancels it.",
+    "reference_integral_per_s": "For levels in newtons: as quick as the measured damping lets a force be held.",
+    "drive_mode_shape": "As measured here, not the bench's.",
+}
+
+
+def _gains(chosen: Chosen) -> list[str]:
+    out = []
+    if chosen.law == "frequency-error":
+        out.append(_line("force_loop", "through-response"))
+    for key, value in gains_of(chosen).items():
+        if key in COMMENTS:
+            out.append(f"# {COMMENTS[key]}")
+        out.append(_line(key, [significant(v) for v in value] if isinstance(value, tuple) else significant(value)))
+    return out
+
+
+def _comment(text: str) -> list[str]:
+    return wrap(text, 118, initial_indent="# ", subsequent_indent="# ")
+
+
+def _line(key: str, value: Any) -> str:
+    """A key with a text, a number or a list of numbers."""
+    return f"{key} = {json.dumps(value)}"

@@ -1,0 +1,119 @@
+"""From the responses of the linear test to the plant, and what it says of the bench's facts."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.tuning import PlantModel
+from identification import FrequencyResponseMatrix
+from rig.bench import Bench
+from rig.drivers import make_daq
+from rig.tuning.errors import TuningError
+from rig.tuning.spectra import FIT_BAND, near
+
+__all__ = ["ALLOWED_OFFSET", "compared_with_bench", "largest_outside", "lead_samples", "mass_ratios", "plant_of"]
+
+ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
+WORTH_SAYING_HZ = 0.005
+WORTH_SAYING_SHAPE = 0.05
+TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-error law
+
+
+def lead_samples(bench: Bench) -> float:
+    """Samples from an output to the input that shows it."""
+    return bench.block + make_daq(bench, 0).latency_samples
+
+
+def plant_of(bench: Bench, responses: FrequencyResponseMatrix) -> PlantModel:
+    """The plant fitted to force and drive acceleration per volt around the bench's linear frequency.
+
+    Raises `TuningError` where they show no mode of the structure.
+    """
+    linear = bench.specimen.linear_frequency_hz
+    frequency = responses.frequency_hz
+    around = near(bench, frequency)
+    try:
+        plant = PlantModel.from_frequency_responses(
+            frequency[around],
+            responses.value[around, 0, 0],
+            responses.value[around, 1, 0],
+            sample_rate_hz=bench.sample_rate_hz,
+            latency_samples=lead_samples(bench),
+        )
+        plant.lock_frequency_rad_s()
+    except ValueError as error:
+        raise TuningError(
+            f"no mode near specimen.linear_frequency_hz = {linear:g} Hz, between {FIT_BAND[0] * linear:.4g} and "
+            f"{FIT_BAND[1] * linear:.4g} Hz: {error}"
+        ) from None
+    return plant
+
+
+def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
+    """What of the bench's facts differs from the measurement, one line each.
+
+    Raises `TuningError` where the mode lies so far from the bench's linear frequency that it may be another one.
+    """
+    facts, out = bench.specimen, []
+    measured_hz = plant.frequency_rad_s / (2.0 * math.pi)
+    offset = facts.linear_frequency_hz / measured_hz - 1.0
+    if abs(offset) > ALLOWED_OFFSET:
+        raise TuningError(
+            f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g} Hz: the mode that answers lies at "
+            f"{measured_hz:.4g} Hz, the bench is {100.0 * offset:+.1f} % off, allowed is {100.0 * ALLOWED_OFFSET:g} %; correct "
+            "the bench, or see whether it is another mode"
+        )
+    if abs(offset) > WORTH_SAYING_HZ:
+        out.append(
+            f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g} Hz is {100.0 * offset:+.2f} % off the measured "
+            f"{measured_hz:.5g} Hz"
+        )
+    if facts.drive_mode_shape is None:
+        out.append(
+            f"specimen.drive_mode_shape: the bench has none, measured is {plant.drive_shape:.4g} kg^-1/2; damping from a "
+            "backbone needs it in the bench"
+        )
+        return tuple(out)
+    ratio = abs(facts.drive_mode_shape) / plant.drive_shape
+    if abs(ratio - 1.0) > WORTH_SAYING_SHAPE:
+        text = (
+            f"specimen.drive_mode_shape = {facts.drive_mode_shape:g} kg^-1/2 of the bench is {ratio:.2f} times the measured "
+            f"{plant.drive_shape:.4g}: the plan's controller uses the measured one; damping with the bench's would be "
+            f"read {ratio**2:.2f} times as large"
+        )
+        if max(ratio, 1.0 / ratio) > TOLERATED_SHAPE:
+            text += f"; a frequency-error loop tolerates a factor of {TOLERATED_SHAPE:g}"
+        out.append(text)
+    return tuple(out)
+
+
+def largest_outside(
+    responses: FrequencyResponseMatrix, plant: PlantModel, gains: Sequence[complex] | np.ndarray
+) -> tuple[float, float]:
+    """Largest magnitude of ``gains`` [n lines] outside the band of the plant's model, and its frequency (Hz); 0 if none."""
+    frequency = responses.frequency_hz
+    outside = (frequency < plant.band_hz[0]) | (frequency > plant.band_hz[1])
+    if not outside.any():
+        return 0.0, 0.0
+    size = np.where(outside, np.abs(np.asarray(gains)), 0.0)
+    index = int(np.argmax(size))
+    return float(size[index]), float(frequency[index])
+
+
+def mass_ratios(bench: Bench, responses: FrequencyResponseMatrix, plant: PlantModel) -> tuple[float, float]:
+    """Smallest and largest mass ratio mu that models of this band and of all measured lines find.
+
+    Near one mode the exciter's moving mass is hard to tell from its spring: where the two differ, neither is to be believed.
+    """
+    try:
+        wide = PlantModel.from_frequency_responses(
+            responses.frequency_hz,
+            responses.value[:, 0, 0],
+            responses.value[:, 1, 0],
+            sample_rate_hz=bench.sample_rate_hz,
+            latency_samples=plant.latency_samples,
+        ).mass_ratio
+    except ValueError:
+        wide = plant.mass_ratio
+    return min(wide, plant.mass_ratio), max(wide, plant.mass_ratio)

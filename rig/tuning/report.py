@@ -1,0 +1,132 @@
+"""What a tuning has found, as one dictionary and as lines for the terminal."""
+
+import math
+from typing import Any
+
+from controller.tuning import Design, Margins
+from rig.tuning.design import gains_of
+from rig.tuning.plant import mass_ratios
+from rig.tuning.tuning import Tuning
+
+__all__ = ["lines", "summary"]
+
+
+def summary(tuning: Tuning) -> dict[str, Any]:
+    """Test, plant, gains, margins, levels and notes; for JSON."""
+    plant, chosen, test = tuning.plant, tuning.chosen, tuning.test
+    low, high = mass_ratios(tuning.bench, test.responses, plant)
+    facts = tuning.bench.specimen
+    return {
+        "kind": "tuning",
+        "bench": tuning.bench.name,
+        "specimen": facts.name,
+        "recording": str(tuning.recording),
+        "test": {
+            "level_rms_v": test.level_rms_v,
+            "levels_tried_v": list(test.levels_tried_v),
+            "coherence_force": test.coherence[0],
+            "coherence_drive": test.coherence[1],
+            "distortion": test.distortion,
+        },
+        "plant": {
+            "frequency_hz": plant.frequency_rad_s / (2.0 * math.pi),
+            "bench_frequency_hz": facts.linear_frequency_hz,
+            "damping_ratio": plant.damping_ratio,
+            "drive_mode_shape": plant.drive_shape,
+            "bench_drive_mode_shape": facts.drive_mode_shape,
+            "coupled_pole_hz": plant.coupled_pole_rad_s.imag / (2.0 * math.pi),
+            "coupled_damping_ratio": -plant.coupled_pole_rad_s.real / abs(plant.coupled_pole_rad_s),
+            "pole_offset_rad_s": [plant.pole_offset_rad_s().real, plant.pole_offset_rad_s().imag],
+            "mass_ratio": [low, high],
+            "force_per_v_n": 1.0 / plant.volts_per_newton(),
+            "fit_error": plant.fit_error,
+        },
+        "law": chosen.law,
+        "low_pass_rad_s": chosen.low_pass_rad_s,
+        "gains": {k: list(v) if isinstance(v, tuple) else v for k, v in gains_of(chosen).items()},
+        "why": chosen.why,
+        "closed_form": {
+            "k1": chosen.closed_form.law.proportional_per_s,
+            "k2": chosen.closed_form.law.integral_per_s2,
+            "failed": list(chosen.closed_form.failed),
+        },
+        "designs": [_design(design) for design in (chosen.design, *chosen.others)],
+        "gain_at_other_modes": {"gain": chosen.outside[0], "frequency_hz": chosen.outside[1]},
+        "levels_m": list(tuning.levels.levels_m),
+        "needed_v": list(tuning.levels.needed_v),
+        "levels_why": tuning.levels.why,
+        "notes": list(tuning.notes),
+    }
+
+
+def _design(design: Design) -> dict[str, Any]:
+    settling = design.settling
+    return {
+        "damping_ratio": design.loop.plant.damping_ratio,
+        "stable": design.stable,
+        "frequency_loop": _margins(design.frequency_margins),
+        "response_loop": None if design.amplitude_margins is None else _margins(design.amplitude_margins),
+        "settling_periods": {
+            "frequency_shift": settling.frequency_shift,
+            "level_amplitude": settling.level_amplitude,
+            "level_lag": settling.level_lag,
+        },
+        "reasons": list(design.reasons),
+    }
+
+
+def _margins(found: Margins) -> dict[str, float]:
+    return {
+        "sensitivity_peak": found.sensitivity_peak,
+        "gain_margin": found.gain_margin,
+        "phase_margin_deg": found.phase_margin_deg,
+        "crossover_rad_s": found.crossover_rad_s,
+    }
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """A `summary` for people."""
+    test, plant, levels = found["test"], found["plant"], found["levels_m"]
+    low, high = plant["mass_ratio"]
+    shape = plant["bench_drive_mode_shape"]
+    out = [
+        f"{found['specimen']} (bench {found['bench']}), tuned",
+        f"multisine      {test['level_rms_v']:.4g} V RMS, coherence {test['coherence_force']:.5f} (force) and "
+        f"{test['coherence_drive']:.5f} (drive), distortion {100.0 * test['distortion']:.2g} %",
+        f"structure      {plant['frequency_hz']:.3f} Hz (bench {plant['bench_frequency_hz']:g}), damping "
+        f"{100.0 * plant['damping_ratio']:.3f} %, phi_d {plant['drive_mode_shape']:.4f} kg^-1/2 "
+        f"(bench {'none' if shape is None else format(shape, 'g')})",
+        f"with exciter   {plant['coupled_pole_hz']:.3f} Hz, damping {100.0 * plant['coupled_damping_ratio']:.2f} %, mass ratio "
+        + (f"{low:.3f}" if high - low < 0.2 * abs(high) else f"not to be told ({low:.3f} to {high:.3f})")
+        + f", {plant['force_per_v_n']:.3g} N/V at resonance; model within {100.0 * plant['fit_error']:.2g} %",
+        f"law            {found['law']}: {found['why']}",
+        *(f"  {name} = {_number(value)}" for name, value in found["gains"].items()),
+    ]
+    closed = found["closed_form"]
+    out.append(
+        f"closed form    K1 = {closed['k1']:.4g} 1/s, K2 = {closed['k2']:.4g} 1/s^2"
+        + (f"; does not apply: {'; '.join(closed['failed'])}" if closed["failed"] else "; its assumptions hold")
+    )
+    out += [line for design in found["designs"] for line in _design_lines(design)]
+    out.append(
+        f"levels         {levels[0]:.3g} to {levels[-1]:.3g} m in {len(levels)} steps, {found['needed_v'][0]:.3g} to "
+        f"{found['needed_v'][-1]:.3g} V on the linear plant; {found['levels_why']}"
+    )
+    return [*out, *(f"note: {note}" for note in found["notes"])]
+
+
+def _design_lines(design: dict[str, Any]) -> list[str]:
+    settling = max(design["settling_periods"].values())
+    out = [f"with {100.0 * design['damping_ratio']:.3g} % damping: settles within {settling:.0f} periods (predicted)"]
+    for name in ("frequency_loop", "response_loop"):
+        found = design[name]
+        if found is not None:
+            out.append(
+                f"  {name.replace('_', ' '):14} max |S| {found['sensitivity_peak']:.2f}, gain margin "
+                f"{found['gain_margin']:.2f}, phase margin {found['phase_margin_deg']:.0f} deg"
+            )
+    return [*out, *(f"  {reason}" for reason in design["reasons"])]
+
+
+def _number(value: float | list[float]) -> str:
+    return ", ".join(f"{v:.5g}" for v in value) if isinstance(value, list) else f"{value:.5g}"

@@ -1,0 +1,206 @@
+"""A tuning finds what the virtual rig is made of, and its plan runs as it is."""
+
+import json
+import math
+import sys
+from functools import cache
+
+import numpy as np
+import pytest
+
+import rig
+from identification import nonlinear_mode
+from rig.bench import Bench
+from rig.campaigns.plans import load_plan
+from rig.cli import main
+from rig.errors import ConfigurationError
+from rig.measurements import spectra
+from rig.recording.reader import Recording
+from rig.tuning import TuningError, tune
+from rig.tuning.plant import compared_with_bench
+from rig.tuning.report import summary
+from simulators.analysis import phase_resonance_backbone
+from simulators.virtual_rig import VirtualRig
+from tests.rig.rigs import bench_with
+
+NAMES = ("magnet-beam", "friction-beam")
+
+
+@pytest.fixture(scope="module")
+def tunings(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tuned")
+    return cache(lambda name: tune(name, folder / f"{name}.h5"))
+
+
+@pytest.fixture(params=NAMES)
+def tuned(request, tunings):
+    return tunings(request.param)
+
+
+@pytest.fixture
+def magnet(tunings):
+    return tunings("magnet-beam")
+
+
+def coupled_pole_of(virtual, near_hz):
+    """Eigenvalue of the rig's linear part, exciter included, that is nearest to a frequency."""
+    poles = np.linalg.eigvals(virtual.plant.dynamics)
+    return complex(poles[np.argmin(np.abs(poles - 2j * np.pi * near_hz))])
+
+
+def test_the_structure_is_found_as_it_was_made(tuned):
+    mode = VirtualRig.shipped(tuned.bench.name).linear_modes
+    truth = int(np.argmin(np.abs(mode.frequency_hz - tuned.bench.specimen.linear_frequency_hz)))
+    assert tuned.plant.frequency_rad_s / (2 * math.pi) == pytest.approx(mode.frequency_hz[truth], rel=2e-4)
+    assert tuned.plant.damping_ratio == pytest.approx(mode.damping_ratio[truth], rel=0.03)
+    assert tuned.plant.drive_shape == pytest.approx(tuned.bench.specimen.drive_mode_shape, rel=2e-3)
+
+
+def test_the_pole_that_the_response_loop_cancels_is_that_of_the_coupled_rig(tuned):
+    hertz = tuned.plant.coupled_pole_rad_s.imag / (2 * math.pi)
+    truth = coupled_pole_of(VirtualRig.shipped(tuned.bench.name), hertz)
+    offset = truth - 1j * tuned.plant.lock_frequency_rad_s()
+    assert complex(*tuned.plan.controller.plant_pole_rad_s) == pytest.approx(offset, abs=0.03 * abs(offset))
+
+
+def test_the_level_is_told_from_noise_and_far_from_the_limits(tuned):
+    assert min(tuned.test.coherence) > 0.999
+    with Recording(tuned.recording) as recording:
+        peak = max(point["voltage_peak_v"] for point in recording.latest.values())
+        assert recording.complete
+        assert list(spectra(recording)) == [tuned.test.level_rms_v]
+    assert peak < 0.1 * tuned.bench.limits.voltage_v
+
+
+def test_the_closed_form_is_taken_only_where_its_assumptions_hold(tuned):
+    failed = tuned.chosen.closed_form.failed
+    assert bool(failed) == (tuned.bench.name == "friction-beam")
+
+
+def test_every_loop_is_stable_with_its_margins_at_all_dampings(tuned):
+    for design in (tuned.chosen.design, *tuned.chosen.others):
+        assert design.suited
+        assert design.frequency_margins.sensitivity_peak < 3
+    assert tuned.chosen.design.frequency_margins.sensitivity_peak < 2
+    assert tuned.chosen.outside[0] < 0.5
+
+
+def test_the_plan_runs_as_it_is_onto_the_curve_of_harmonic_balance(tuned):
+    plan = tuned.plan
+    levels = plan.levels_m[3::2]  # some of them, for time
+    plan = plan.model_copy(update={"levels_m": levels, "start_v": tuned.levels.needed_v[3]})
+    with rig.run(plan, bench=tuned.bench, seed=1) as run:
+        assert run.complete
+        settled = [point["settle_periods"] for point in run.recording.points]
+        mode = nonlinear_mode(run.backbone())
+    assert max(settled) < 250
+    virtual = VirtualRig.shipped(tuned.bench.name)
+    for force, hertz, damping in zip(mode.force_n, mode.modal_frequency_hz, mode.damping_ratio, strict=True):
+        truth = phase_resonance_backbone(virtual, forces_n=np.geomspace(0.2 * force, force, 5))
+        assert hertz == pytest.approx(truth.modal_frequency_hz[-1], rel=2e-4)
+        assert damping == pytest.approx(truth.damping_ratio[-1], rel=0.02)
+
+
+def test_a_wrong_mode_shape_of_the_bench_is_said_and_not_used(magnet):
+    wrong = bench_with({"specimen": {"drive_mode_shape": 1.5 * 0.908466}})
+    (said,) = compared_with_bench(wrong, magnet.plant)
+    assert "1.50 times" in said
+    assert "2.25 times" in said
+    assert magnet.plan.controller.drive_mode_shape == pytest.approx(0.908466, rel=2e-3)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.3])
+def test_a_linear_frequency_that_is_30_percent_off_is_refused_with_the_measured_one(factor, tmp_path):
+    wrong = bench_with({"specimen": {"linear_frequency_hz": factor * 24.37}})
+    with pytest.raises(TuningError, match=r"mode that answers lies at 24\.3"):
+        tune(wrong, tmp_path / "test.h5", level_rms_v=0.02)
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ({"level_rms_v": 5.0}, "allows above 0 and up to 9.5 V"),
+        ({"level_rms_v": -1.0}, "--level = -1 V RMS: allowed is above 0"),
+        ({"law": "pid"}, "allowed is frequency-error, phase"),
+        ({"to_m": 0.02}, "up to 0.006 m"),
+        ({"from_m": 0.002, "to_m": 0.001}, "--from-m = 0.002 m: allowed is below"),
+        ({"points": 0}, "--points = 0"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_moves(request_, said, tmp_path):
+    with pytest.raises(ConfigurationError, match=said):
+        tune("magnet-beam", tmp_path / "test.h5", **request_)
+    assert not (tmp_path / "test.h5").exists()
+
+
+def sensors_with(name, **changes):
+    sensors = [sensor.model_dump() for sensor in VirtualRig.shipped("magnet-beam").sensors]
+    return [sensor | (changes if sensor["name"] == name else {}) for sensor in sensors]
+
+
+@pytest.mark.parametrize("name", ["force", "drive"])
+def test_a_dead_sensor_is_named(name, tmp_path):
+    bench = bench_with(sensors=sensors_with(name, sensitivity_v_per_unit=1e-9, noise_rms=0.0))
+    with pytest.raises(TuningError, match=f"dead, stuck or below one bit .* on channel {name}"):
+        tune(bench, tmp_path / "test.h5")
+
+
+def test_a_sensor_that_shows_noise_alone_is_named(tmp_path):
+    table = bench_with(sensors=sensors_with("drive", sensitivity_v_per_unit=1e-6, noise_rms=200.0)).model_dump()
+    with pytest.raises(TuningError, match=r"coherence .* of channel 'drive', needed is"):
+        tune(Bench.model_validate(table), tmp_path / "test.h5", level_rms_v=0.05)
+
+
+def test_a_sensor_that_is_mounted_the_other_way_round_is_told(tmp_path):
+    table = bench_with().model_dump()
+    table["channels"] = [
+        channel | {"sensitivity_v_per_unit": -channel["sensitivity_v_per_unit"]}
+        if channel["role"] == "drive"
+        else channel
+        for channel in table["channels"]
+    ]
+    with pytest.raises(TuningError, match="polarity"):
+        tune(Bench.model_validate(table), tmp_path / "test.h5", level_rms_v=0.02)
+
+
+def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_said(tmp_path):
+    bench = bench_with(name="friction-beam", delay_samples=300)
+    with pytest.raises(TuningError, match=r"unsuited .* max \|S\| = [\d.]+, allowed is 3"):
+        tune(bench, tmp_path / "test.h5", level_rms_v=0.02)
+
+
+def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):
+    tuned = tune("magnet-beam", tmp_path / "test.h5", level_rms_v=0.05, to_m=0.005, points=3)
+    assert [note for note in tuned.notes if "out of reach where the damping rises beyond 1.3 times" in note]
+    assert not magnet.notes
+
+
+def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    command = ["rig", "tune", "--bench", "magnet-beam", "-o", "tuned.toml", "--level", "0.02", "--figure", "tuned.png"]
+    command += ["--law", "phase"]
+    monkeypatch.setattr(sys, "argv", [*command, "--json"])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["plan"] == "tuned.toml"
+    assert told["plant"]["drive_mode_shape"] == pytest.approx(0.908466, rel=2e-3)
+    assert {path.name for path in tmp_path.iterdir()} == {"tuned.toml", "tuned.h5", "tuned.png"}
+    assert (tmp_path / "tuned.png").read_bytes()[:4] == b"\x89PNG"
+    written = (tmp_path / "tuned.toml").read_text()
+    plan = load_plan("tuned.toml")
+    assert plan.levels_v == pytest.approx(told["needed_v"], rel=1e-4)
+    assert plan.controller.k1 == pytest.approx(told["closed_form"]["k1"], rel=1e-4)
+    assert plan.controller.k2 == pytest.approx(told["closed_form"]["k2"], rel=1e-4)
+    monkeypatch.setattr(sys, "argv", command)
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 1
+    assert "tuned.toml: exists already" in capsys.readouterr().err
+    assert (tmp_path / "tuned.toml").read_text() == written
+
+
+def test_what_is_said_holds_numbers_alone(magnet):
+    text = json.dumps(summary(magnet), default=lambda value: pytest.fail(f"{value!r} is no number"))
+    assert json.loads(text)["law"] == "frequency-error"
