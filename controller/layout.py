@@ -98,6 +98,7 @@ LAW = np.dtype(
         ("kp", "f8"),
         ("ki", "f8"),
         ("mode_shape_squared", "f8"),
+        ("rest_gain", "f8"),
         ("centre_rad_s", "f8"),
         ("lowest_rad_s", "f8"),
         ("highest_rad_s", "f8"),
@@ -117,7 +118,8 @@ LAW = np.dtype(
     ]
 )
 """Frozen coefficients of the law (one record), made by `controller.law.Law.build`. ``turns``: whether the response's loop
-holds its phase too, by turning the output's."""
+holds its phase too, by turning the output's. ``rest_gain``: step of the low-pass behind the response's rate of change; 0 where
+the laws take force and lag as they are."""
 
 THRESHOLDS = np.dtype(
     [

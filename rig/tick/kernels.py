@@ -30,6 +30,7 @@ from rig.tick.laws.kernels import (
     controlled_size,
     demanded_amplitude,
     phase_error,
+    see_rest,
     take_over,
 )
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
@@ -179,6 +180,7 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
     present = loop.force_size >= thresholds.smallest_force_n and loop.response_size >= thresholds.smallest_response
     closed = present and loop.drive == LOOP_DRIVE
     loop.error = phase_error(t) if closed else 0.0
+    see_rest(t)
 
     if theta_in < loop.theta_in:
         loop.cycles += 1

@@ -4,7 +4,7 @@ import math
 
 from controller.amplitude.kernels import log_proportional_integral, log_ratio
 from controller.demodulation.kernels import phase_lag, root_mean_square
-from controller.kernels import TWO_PI, frequency_error, proportional_integral, wrap
+from controller.kernels import TWO_PI, frequency_error, proportional_integral, size, wrap
 from controller.layout import (
     ADAPTIVE,
     FORCE,
@@ -36,6 +36,32 @@ def phase_error(t: TickArrays) -> float:
         return float(0.5 * math.pi * loop.sign_mean - lag_of_skew)
     force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
     return wrap(t.progress[0].lag - phase_lag(force, drive) - lag_of_skew)
+
+
+@kernel
+def see_rest(t: TickArrays) -> None:
+    """The force that the vibration of the moment will need once it keeps still: what changes it is taken out.
+
+    A mode whose displacement X grows and turns slowly takes ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``; its last
+    term, by the acceleration's amplitude ``2 i/(W phi_d^2) dA/dt``, is off at rest. Force and motion pass one more low-pass
+    for the derivative. Without ``rest_gain`` force and lag are those measured.
+    """
+    law, loop = t.law[0], t.loop[0]
+    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
+    if law.rest_gain == 0.0 or loop.drive != LOOP_DRIVE:
+        loop.late_force, loop.late_drive = force, drive
+        loop.rest_force, loop.rest_response, loop.rest_error = loop.force_size, loop.response_size, loop.error
+        return
+    skew = t.inputs[loop.force_channel].skew_samples - t.inputs[loop.drive_channel].skew_samples
+    if skew != 0.0:
+        angle = loop.omega * skew * law.dt_s
+        drive *= complex(math.cos(angle), math.sin(angle))
+    loop.late_force += law.rest_gain * (force - loop.late_force)
+    step = law.rest_gain * (drive - loop.late_drive)
+    loop.late_drive += step
+    rest = loop.late_force + step * complex(0.0, 2.0 / (loop.omega * law.mode_shape_squared * law.dt_s))
+    loop.rest_force, loop.rest_response = size(rest), size(loop.late_drive)
+    loop.rest_error = wrap(t.progress[0].lag - phase_lag(rest, loop.late_drive))
 
 
 @kernel
@@ -139,17 +165,29 @@ def hold_response(t: TickArrays, displacement: float) -> None:
 
 
 @kernel
-def hold_force_through_response(t: TickArrays, level: float) -> None:
-    """The part of the force that feeds the vibration sets the response: ``d ln X_ref/dt = k ln(F* sin psi*/(F sin psi))``.
+def force_at_lag(t: TickArrays) -> float:
+    """What the amplitude loop holds (N), as it would be at the wanted lag and at rest, if the response stayed as it is.
 
-    psi is the lag of the displacement. A tone has no wanted lag: its whole force counts.
+    The part of the fundamental that feeds the vibration stays, ``F sin psi`` with the lag psi of the displacement, and so do the
+    harmonics. It may be negative where the force brakes. A tone has no wanted lag: the force as it is.
     """
-    law, loop, progress = t.law[0], t.loop[0], t.progress[0]
-    wanted, measured = level, controlled_size(t)
-    if loop.drive == LOOP_DRIVE:
-        wanted *= abs(math.sin(progress.lag))
-        measured *= math.sin(progress.lag - loop.error) * math.copysign(1.0, progress.lag)
-    error = log_ratio(wanted, measured)
+    loop, lag = t.loop[0], t.progress[0].lag
+    measured = controlled_size(t)
+    if loop.drive != LOOP_DRIVE:
+        return measured
+    # lag is that of the acceleration, whose sine is minus that of the displacement's: the ratio is the same
+    fundamental = loop.rest_force * math.sin(lag - loop.rest_error) / math.sin(lag)
+    if loop.amplitude_law != FORCE_RMS:
+        return float(fundamental)
+    above = max(measured * measured - 0.5 * loop.force_size * loop.force_size, 0.0)
+    return math.copysign(math.sqrt(above + 0.5 * fundamental * fundamental), fundamental)
+
+
+@kernel
+def hold_force_through_response(t: TickArrays, level: float) -> None:
+    """The part of the force that feeds the vibration sets the response: ``d ln X_ref/dt = k ln(F* sin psi*/(F sin psi))``."""
+    law, loop = t.law[0], t.loop[0]
+    error = log_ratio(level, force_at_lag(t))
     if error < 0.0 or (loop.saturated == 0 and loop.held_back == 0):
         loop.log_reference += law.reference_ki * law.dt_s * error
     hold_response(t, math.exp(loop.log_reference))
@@ -196,8 +234,8 @@ def choose_frequency(t: TickArrays, present: bool) -> None:
     elif present:
         error = loop.mean_error if law.period_mean == 1 else loop.error
         if law.frequency_law == FREQUENCY_ERROR:
-            ratio = law.mode_shape_squared * loop.force_size / loop.response_size
-            error = frequency_error(error, ratio, loop.omega, t.progress[0].lag)
+            ratio = law.mode_shape_squared * loop.rest_force / loop.rest_response
+            error = frequency_error(loop.rest_error, ratio, loop.omega, t.progress[0].lag)
         if loop.taking_over == 1:
             loop.taking_over = 0
             loop.phase_integral = loop.omega - law.centre_rad_s - law.kp * error
