@@ -111,6 +111,7 @@ LAW = np.dtype(
         ("force_ki", "f8"),
         ("response_kp", "c16"),
         ("response_ki", "f8"),
+        ("plant_gain", "c16"),
         ("turns", "i8"),
         ("reference_ki", "f8"),
         ("smallest_v", "f8"),

@@ -23,6 +23,10 @@ from rig.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from rig.tick.layout import TickArrays
 from vibrolock.compiled import Record, kernel
 
+SLOPE_FORGETS = 0.5  # rate at which a slope is forgotten, over that of the loop it is for
+STEEPEST = 10.0
+UNMOVED = 1e-7  # square of a logarithm's change (0.03 %) below which a slope is not believed
+PLANT_VARIES = 3.0  # factor that the plant's gain may be off and is still followed
 SMALLEST_M = 1e-15  # no displacement is smaller than an atom's nucleus: a floor for logarithms
 
 
@@ -137,6 +141,27 @@ def take_over(t: TickArrays, segment: Record) -> None:
     drive = t.watches[loop.drive_channel].estimate
     loop.reference_turn = math.atan2(drive.imag, drive.real)
     loop.response_error = 0.0
+    loop.slope_known = 0
+    loop.plant_ratio = 1.0
+
+
+@kernel
+def response_proportional(t: TickArrays) -> complex:
+    """kp of the response's loop, following the plant: ``kp (A/U)/G``, G what A/U was where kp was right.
+
+    A softening structure moves the plant's pole p, while the residue of ``A/U = R/(i W - p)`` is the shaker's: -p goes with U/A.
+    Within a factor; without G the gain stays.
+    """
+    law, loop = t.law[0], t.loop[0]
+    if law.plant_gain == 0.0:
+        return law.response_kp + 0j
+    drive, amplitude = t.watches[loop.drive_channel].estimate, t.guard[0].amplitude_v
+    if amplitude > 0.0:
+        now = drive * complex(math.cos(loop.turn), -math.sin(loop.turn)) / amplitude / law.plant_gain
+        loop.plant_ratio += 0.25 * law.response_ki * law.dt_s * (now - loop.plant_ratio)
+    ratio = size(loop.plant_ratio)
+    bounded = min(max(ratio, 1.0 / PLANT_VARIES), PLANT_VARIES) / ratio if ratio > 0.0 else 0.0
+    return law.response_kp * loop.plant_ratio * bounded
 
 
 @kernel
@@ -153,7 +178,7 @@ def hold_response(t: TickArrays, displacement: float) -> None:
     loop.demanded_v, angle, loop.log_integral = log_proportional_integral(
         error,
         loop.log_integral,
-        law.response_kp,
+        response_proportional(t),
         law.response_ki,
         law.dt_s,
         law.smallest_v,
@@ -184,10 +209,37 @@ def force_at_lag(t: TickArrays) -> float:
 
 
 @kernel
-def hold_force_through_response(t: TickArrays, level: float) -> None:
-    """The part of the force that feeds the vibration sets the response: ``d ln X_ref/dt = k ln(F* sin psi*/(F sin psi))``."""
+def force_slope(t: TickArrays) -> float:
+    """``d ln(F sin psi)/d ln X`` as it was of late, by least squares with forgetting, within bounds; 1 where nothing moved.
+
+    Where friction begins to slide it is 5 and more: the loop through the response would have so many times its gain.
+    """
     law, loop = t.law[0], t.loop[0]
-    error = log_ratio(level, force_at_lag(t))
+    active = loop.rest_force * abs(math.sin(t.progress[0].lag - loop.rest_error))
+    if law.rest_gain == 0.0 or loop.drive != LOOP_DRIVE or not active > 0.0:
+        return 1.0
+    x, f = math.log(loop.rest_response / (loop.omega * loop.omega)), math.log(active)
+    if loop.slope_known == 0:
+        loop.slope_known = 1
+        loop.slow_x, loop.slow_f, loop.square_x, loop.product_xf = x, f, 0.0, 0.0
+    gain = law.reference_ki * law.dt_s
+    loop.slow_x += gain * (x - loop.slow_x)
+    loop.slow_f += gain * (f - loop.slow_f)
+    x, f = x - loop.slow_x, f - loop.slow_f
+    loop.square_x += SLOPE_FORGETS * gain * (x * x - loop.square_x)
+    loop.product_xf += SLOPE_FORGETS * gain * (x * f - loop.product_xf)
+    slope = (loop.product_xf + UNMOVED) / (loop.square_x + UNMOVED)
+    return float(min(max(slope, 1.0), STEEPEST))
+
+
+@kernel
+def hold_force_through_response(t: TickArrays, level: float) -> None:
+    """The part of the force that feeds the vibration sets the response: ``d ln X_ref/dt = (k/s) ln(F* sin psi*/(F sin psi))``.
+
+    s is its slope over the response (`force_slope`).
+    """
+    law, loop = t.law[0], t.loop[0]
+    error = log_ratio(level, force_at_lag(t)) / force_slope(t)
     if error < 0.0 or (loop.saturated == 0 and loop.held_back == 0):
         loop.log_reference += law.reference_ki * law.dt_s * error
     hold_response(t, math.exp(loop.log_reference))
