@@ -116,9 +116,7 @@ class PhaseLockedLoop(Demodulation, AmplitudeLoops):
         shape = self.drive_mode_shape or drive_mode_shape
         needing = "the frequency-error law" if self.frequency_law == "frequency-error" else "rest_low_pass_rad_s"
         if shape is None and (self.frequency_law == "frequency-error" or self.rest_low_pass_rad_s > 0.0):
-            raise ValueError(
-                f"drive_mode_shape: {needing} needs it, here or as specimen.drive_mode_shape of the bench"
-            )
+            raise ValueError(f"drive_mode_shape: {needing} needs it, here or as specimen.drive_mode_shape of the bench")
         out = np.zeros(1, LAW)
         self.fill_demodulation(out, sample_rate_hz)
         self.fill_amplitude(out, amplitude_law, largest_v)

@@ -84,10 +84,10 @@ def _objection(plan: BackbonePlan, bench: Bench, vibration: PeriodicVibration, h
     error_deg = vibration.phase_error_deg
     if abs(error_deg) > plan.accepted_phase_error_deg:
         return f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
-    if hunting > plan.acceptedfrequency_scatter:
+    if hunting > plan.accepted_frequency_scatter:
         return (
             f"the loop hunts: the frequency scatters by {100.0 * hunting:.2f} % from period to period, "
-            f"accepted up to {100.0 * plan.acceptedfrequency_scatter:g} %"
+            f"accepted up to {100.0 * plan.accepted_frequency_scatter:g} %"
         )
     return drift_objection(bench, vibration, plan.accepted_drift)
 

@@ -6,7 +6,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from controller import AmplitudeLaw, PhaseLockedLoop
+from controller import PhaseLockedLoop
 from rig.bench import Bench
 from rig.campaigns.levels import Levels
 from rig.campaigns.plan import Plan, Target
@@ -61,6 +61,9 @@ class SteppedPhasePlan(Levels, Plan):
     """Largest phase error of the recorded fundamental with which a point is accepted, deg."""
     accepted_frequency_scatter: float = Field(1e-3, gt=0, le=1)
     """Largest scatter of the frequency from period to period, relative, with which a point is accepted."""
+    accepted_alien_force: float = Field(0.1, gt=0, le=1)
+    """Largest part of the force's RMS that is none of the evaluated harmonics with which a point is accepted: noise, another
+    mode, a loop that swings."""
     accepted_drift: float = Field(0.05, gt=0, le=1)
     """Largest change of the fundamental of force or drive over a record, relative, with which a point is accepted."""
     on_failure: Literal["skip", "stop"] = "skip"
@@ -80,15 +83,21 @@ class SteppedPhasePlan(Levels, Plan):
             if lag is not None and not low <= lag <= high:
                 raise ValueError(f"{name} = {lag:g}: allowed is {low:g} to {high:g}")
         if self.start_deg is not None and self.stop_deg is not None and not self.start_deg < self.stop_deg:
-            raise ValueError(f"stop_deg = {self.stop_deg:g}: allowed is above start_deg; direction says which way to go")
+            raise ValueError(
+                f"stop_deg = {self.stop_deg:g}: allowed is above start_deg; direction says which way to go"
+            )
         if len(self.lags) > MOST_LAGS:
             raise ValueError(f"step_deg = {self.step_deg:g}: allowed are up to {MOST_LAGS} lags")
         if len(set(self.lags)) != len(self.lags):
             raise ValueError("phase_lags_deg: a lag is given twice; use repeats to measure lags again")
         if self.controller.phase_lag_deg != -90.0:
-            raise ValueError(f"controller.phase_lag_deg = {self.controller.phase_lag_deg:g}: the plan gives the lags, leave it out")
+            raise ValueError(
+                f"controller.phase_lag_deg = {self.controller.phase_lag_deg:g}: the plan gives the lags, leave it out"
+            )
         if self.controller.detector == "sign" and self.lags != (-90.0,):
-            raise ValueError('controller.detector = "sign": it knows phase resonance only, allowed is two-phase or adaptive')
+            raise ValueError(
+                'controller.detector = "sign": it knows phase resonance only, allowed is two-phase or adaptive'
+            )
         return self
 
     @property
@@ -129,7 +138,8 @@ class SteppedPhasePlan(Levels, Plan):
         """
         failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
         out: list[Segment] = []
-        at, before = None, None
+        at: int | None = None
+        before: Target | None = None
         for target in self.targets():
             origin = before if before is not None and _same_pass(before, target) else None
             before = target
@@ -138,7 +148,12 @@ class SteppedPhasePlan(Levels, Plan):
             if origin is None or origin.number != at:
                 out += self._approach(target, origin)
             point = Segment(
-                SegmentKind.RAMP, target.number, target.level, self.ramp_periods, lag_deg=target.phase_lag_deg, geometric=True
+                SegmentKind.RAMP,
+                target.number,
+                target.level,
+                self.ramp_periods,
+                lag_deg=target.phase_lag_deg,
+                geometric=True,
             )
             longest, periods = self.settle.longest_periods, self.record_periods + 1.0
             failing = replace(point, on_failure=failure, on_lost_lock=lost)
@@ -172,21 +187,21 @@ class SteppedPhasePlan(Levels, Plan):
 
     def _approach(self, target: Target, origin: Target | None) -> list[Segment]:
         """From whatever was before to the target's level, at ``approach_deg``, then at the lag of the ``origin``."""
-        lags = [self.approach_deg, (origin or target).phase_lag_deg]
-        lags = [lag for lag in lags if lag is not None][: 1 if self.approach_deg is None and origin is None else None]
-        first = lags[0]
-        out = self.start_segments(lag_deg=first)
+        first = _lag(origin or target) if self.approach_deg is None else self.approach_deg
         ramp = Segment(SegmentKind.RAMP, -1, target.level, self.approach_periods, lag_deg=first, geometric=True)
-        out.append(ramp)
         hold = replace(ramp, kind=SegmentKind.HOLD, periods=float(2 * self.settle.average_periods))
-        for lag in lags[1:]:
-            steps = max(1.0, abs(lag - first) / self.step_deg)
-            out += [hold, replace(ramp, lag_deg=lag, periods=steps * self.ramp_periods)]
-        if origin is not None:
-            out.append(replace(hold, lag_deg=lags[-1]))
-        return out
+        out = [*self.start_segments(lag_deg=first), ramp]
+        if origin is not None and _lag(origin) != first:
+            steps = max(1.0, abs(_lag(origin) - first) / self.step_deg)
+            out += [hold, replace(ramp, lag_deg=_lag(origin), periods=steps * self.ramp_periods)]
+        return [*out, replace(hold, lag_deg=_lag(origin))] if origin is not None else out
 
 
 def _same_pass(before: Target, target: Target) -> bool:
     """Whether a point lies on the way that the one before it is on."""
     return before.level == target.level and before.repeat == target.repeat
+
+
+def _lag(target: Target) -> float:
+    """The lag that is asked for, deg."""
+    return 0.0 if target.phase_lag_deg is None else target.phase_lag_deg

@@ -8,6 +8,7 @@ import numpy as np
 
 from controller import AmplitudeLaw
 from identification import Backbone, FrequencyResponse, IdentificationError, PeriodicVibration, nonlinear_mode
+from identification.frequency_responses import Controlled
 from rig.bench import Bench
 from rig.campaigns.backbone_points import frequency_scatter
 from rig.campaigns.evaluate import (
@@ -35,6 +36,13 @@ STEPPED_PHASE_COLUMNS = (
     Column("settle_periods", "settled in", "periods", ".0f"),
 )
 
+CONTROLLED: dict[AmplitudeLaw, Controlled] = {
+    AmplitudeLaw.VOLTAGE: "voltage",
+    AmplitudeLaw.FORCE: "force",
+    AmplitudeLaw.FORCE_RMS: "force",
+    AmplitudeLaw.RESPONSE: "response",
+}
+
 
 def measure_stepped_phase_point(
     bench: Bench, plan: SteppedPhasePlan, target: Target, rows: np.ndarray, settling: np.void
@@ -52,9 +60,10 @@ def measure_stepped_phase_point(
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     force_rms_n = float(rows["inputs"][:-1, bench.index_of("force")].astype(float).std())
+    alien = _alien_share(vibration, bench, force_rms_n)
     missed = level_error(plan, target, vibration, force_rms_n)
     hunting = frequency_scatter(rows["theta_rad"])
-    reason = _objection(plan, bench, vibration, hunting, missed)
+    reason = _objection(plan, bench, vibration, hunting, missed, alien)
     damping = float(mode.damping_ratio[0])
     return {
         **point,
@@ -71,6 +80,7 @@ def measure_stepped_phase_point(
         "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
         "damping_ratio": damping if math.isfinite(damping) else None,
         "frequency_scatter": hunting,
+        "alien_force": alien,
         "voltage_v": float(np.abs(rows["command_v"]).mean()),
         "force_purity": float(mode.force_purity[0]),
         "response_purity": float(mode.response_purity[0]),
@@ -97,8 +107,20 @@ def level_error(
     return None if measured is None else float(measured / target.level - 1.0)
 
 
+def _alien_share(vibration: PeriodicVibration, bench: Bench, force_rms_n: float) -> float:
+    """Part of the force's RMS that the evaluated harmonics do not hold."""
+    harmonics = vibration.harmonics[bench.index_of("force"), 1:]
+    rest = force_rms_n**2 - 0.5 * float(np.sum(np.abs(harmonics) ** 2))
+    return math.sqrt(max(rest, 0.0)) / force_rms_n
+
+
 def _objection(
-    plan: SteppedPhasePlan, bench: Bench, vibration: PeriodicVibration, hunting: float, missed: float | None
+    plan: SteppedPhasePlan,
+    bench: Bench,
+    vibration: PeriodicVibration,
+    hunting: float,
+    missed: float | None,
+    alien: float,
 ) -> str:
     """Why a recorded point is not accepted; empty where it is."""
     error_deg = vibration.phase_error_deg
@@ -106,6 +128,11 @@ def _objection(
         return f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
     if missed is not None and abs(missed) > plan.accepted_level_error:
         return f"level missed by {100.0 * missed:.2f} %, accepted up to {100.0 * plan.accepted_level_error:g} %"
+    if alien > plan.accepted_alien_force:
+        return (
+            f"{100.0 * alien:.1f} % of the force's RMS are no harmonics up to {plan.harmonics}, accepted up to "
+            f"{100.0 * plan.accepted_alien_force:g} %: another mode, or a loop that swings"
+        )
     if hunting > plan.accepted_frequency_scatter:
         return (
             f"the loop hunts: the frequency scatters by {100.0 * hunting:.2f} % from period to period, "
@@ -142,18 +169,10 @@ def constant_level_responses(
                 force=fundamentals[:, force],
                 response=fundamentals[:, drive] / ((2j * np.pi * frequency_hz) ** 2 if in_metres else 1.0),
                 kind="displacement" if in_metres else "acceleration",
-                controlled=_CONTROLLED[law],
+                controlled=CONTROLLED[law],
                 level=level * (math.sqrt(2.0) if law is AmplitudeLaw.FORCE_RMS else 1.0),
                 label=f"{level:.4g} {accepted[0]['level_unit']}" + (f", {direction} {repeat}" if several else ""),
                 specimen=specimen,
             )
         )
     return tuple(out)
-
-
-_CONTROLLED = {
-    AmplitudeLaw.VOLTAGE: "voltage",
-    AmplitudeLaw.FORCE: "force",
-    AmplitudeLaw.FORCE_RMS: "force",
-    AmplitudeLaw.RESPONSE: "response",
-}

@@ -37,8 +37,8 @@ from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SE
 from vibrolock.compiled import Record, kernel
 
 STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
-UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
 HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
+UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
 
 
 @kernel

@@ -102,7 +102,9 @@ def close_period(t: TickArrays, present: bool) -> None:
         open_loop = loop.drive == TONE
         if not open_loop:
             next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
-        locked = (open_loop or t.lock[0].state == LOCKED) and loop.held_back == 0
+        # Where a loop holds the level, its own error says whether the output may; its ripple may be cut all the time.
+        behind = loop.held_back == 1 and loop.amplitude_law == VOLTAGE
+        locked = (open_loop or t.lock[0].state == LOCKED) and not behind
         judge_period(
             t.settling[0],
             t.rule[0],
@@ -147,21 +149,21 @@ def take_over(t: TickArrays, segment: Record) -> None:
 
 @kernel
 def response_proportional(t: TickArrays) -> complex:
-    """kp of the response's loop, following the plant: ``kp (A/U)/G``, G what A/U was where kp was right.
+    """The response loop's kp, following the plant: ``kp (A/U)/G``, G what A/U was where kp was right.
 
-    A softening structure moves the plant's pole p, while the residue of ``A/U = R/(i W - p)`` is the shaker's: -p goes with U/A.
-    Within a factor; without G the gain stays.
+    A softening structure moves the plant's pole p, while the residue of ``A/U = R/(i W - p)`` is the shaker's: -p goes
+    with U/A. Within a factor; without G the gain stays.
     """
     law, loop = t.law[0], t.loop[0]
     if law.plant_gain == 0.0:
-        return law.response_kp + 0j
+        return complex(law.response_kp)
     drive, amplitude = t.watches[loop.drive_channel].estimate, t.guard[0].amplitude_v
     if amplitude > 0.0:
         now = drive * complex(math.cos(loop.turn), -math.sin(loop.turn)) / amplitude / law.plant_gain
         loop.plant_ratio += 0.25 * law.response_ki * law.dt_s * (now - loop.plant_ratio)
     ratio = size(loop.plant_ratio)
     bounded = min(max(ratio, 1.0 / PLANT_VARIES), PLANT_VARIES) / ratio if ratio > 0.0 else 0.0
-    return law.response_kp * loop.plant_ratio * bounded
+    return complex(law.response_kp * loop.plant_ratio * bounded)
 
 
 @kernel
@@ -193,8 +195,8 @@ def hold_response(t: TickArrays, displacement: float) -> None:
 def force_at_lag(t: TickArrays) -> float:
     """What the amplitude loop holds (N), as it would be at the wanted lag and at rest, if the response stayed as it is.
 
-    The part of the fundamental that feeds the vibration stays, ``F sin psi`` with the lag psi of the displacement, and so do the
-    harmonics. It may be negative where the force brakes. A tone has no wanted lag: the force as it is.
+    The part of the fundamental that feeds the vibration stays, ``F sin psi`` with the lag psi of the displacement,
+    and so do the harmonics. It may be negative where the force brakes. A tone has no wanted lag: the force as it is.
     """
     loop, lag = t.loop[0], t.progress[0].lag
     measured = controlled_size(t)
