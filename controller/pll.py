@@ -38,6 +38,9 @@ class PhaseLockedLoop(Demodulation, AmplitudeLoops):
     """Where above 0, frequency error and force through response go by the force that is left once the response keeps still:
     the part that changes it is taken out, with this corner for its rate of change, rad/s; w_LP is a good value. Neither then
     waits for the structure."""
+    rest_share: float = Field(0.8, ge=0, le=1)
+    """Part of that force which is taken out. The mode shape may be too small by as much as is left: beyond, the level runs away,
+    the quicker the lower the damping. Too large a mode shape only slows it down."""
     drive_mode_shape: float | None = Field(None, gt=0)
     """Mass-normalised mode shape at the drive point for the frequency error, kg^-1/2; the bench's if not given. It may be wrong
     by a factor of 1.5."""
@@ -125,6 +128,7 @@ class PhaseLockedLoop(Demodulation, AmplitudeLoops):
         out["mode_shape_squared"] = (shape or 0.0) ** 2
         out["rest_gain"] = -math.expm1(-self.rest_low_pass_rad_s / sample_rate_hz)
         out["kp"], out["ki"] = self.proportional_and_integral()
+        out["rest_share"] = self.rest_share
         out["centre_rad_s"] = 2.0 * math.pi * self.centre_frequency_hz
         out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in self.frequency_window_hz)
         out["period_mean"] = self.period_mean
