@@ -39,8 +39,8 @@ class PhaseLockedLoop(Demodulation, AmplitudeLoops):
     the part that changes it is taken out, with this corner for its rate of change, rad/s; w_LP is a good value. Neither then
     waits for the structure."""
     rest_share: float = Field(0.8, ge=0, le=1)
-    """Part of that force which is taken out. The mode shape may be too small by as much as is left: beyond, the level runs away,
-    the quicker the lower the damping. Too large a mode shape only slows it down."""
+    """Part of that force which is taken out; what is left is room for a mode shape that is too small, with which the level
+    runs away. Too large a mode shape only slows the loops down."""
     drive_mode_shape: float | None = Field(None, gt=0)
     """Mass-normalised mode shape at the drive point for the frequency error, kg^-1/2; the bench's if not given. It may be wrong
     by a factor of 1.5."""

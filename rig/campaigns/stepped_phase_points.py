@@ -33,7 +33,6 @@ STEPPED_PHASE_COLUMNS = (
     Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
     Column("level_error", "level error", "%", ".2f", 100.0),
-    Column("settle_periods", "settled in", "periods", ".0f"),
 )
 
 CONTROLLED: dict[AmplitudeLaw, Controlled] = {

@@ -63,7 +63,9 @@ def see_rest(t: TickArrays) -> None:
     loop.late_force += law.rest_gain * (force - loop.late_force)
     step = law.rest_gain * (drive - loop.late_drive)
     loop.late_drive += step
-    rest = loop.late_force + step * complex(0.0, 2.0 * law.rest_share / (loop.omega * law.mode_shape_squared * law.dt_s))
+    rest = loop.late_force + step * complex(
+        0.0, 2.0 * law.rest_share / (loop.omega * law.mode_shape_squared * law.dt_s)
+    )
     loop.rest_force, loop.rest_response = size(rest), size(loop.late_drive)
     loop.rest_error = wrap(t.progress[0].lag - phase_lag(rest, loop.late_drive))
 
