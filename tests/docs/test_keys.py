@@ -16,6 +16,7 @@ from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.known_plant import PlantFacts
 from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.stepped_phase import SteppedPhasePlan
 from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.sweep import SweepPlan
 from rig.daq import Channel
@@ -30,6 +31,7 @@ from tests.docs.tables import PAGE, PARTS, table_of, table_under
 MODELS = {
     "Keys of a stepped-sine plan": SteppedSinePlan,
     "Keys of `[demodulation]`": OpenLoop,
+    "Keys of a stepped-phase plan": SteppedPhasePlan,
     "Keys of a sweep plan": SweepPlan,
     "Keys of a multisine plan": MultisinePlan,
     "Keys of a backbone plan": BackbonePlan,
