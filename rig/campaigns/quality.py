@@ -23,6 +23,7 @@ PURITY_COLUMNS = (
 BIASED_DAMPING = (
     0.01  # of the fundamental's power in all other harmonics: from here on the two dampings differ too much
 )
+OTHER_MODE = 0.1  # a nonlinear resonance this far from the linear one is rather that of another mode
 SCATTERING_DEG = 5.0  # a lag that scatters more tells of a signal that hardly stands out of noise and converter steps
 
 
@@ -65,6 +66,12 @@ def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: np.ndarra
         out.append(
             f"the lag scatters by {scatter:.1f} deg, trusted up to {SCATTERING_DEG:g}: too little signal "
             f"(force {vibration.force_n:.3g} N, {bits:.1f} bits), or too quick a detector"
+        )
+    linear_hz = bench.specimen.linear_frequency_hz
+    if math.isfinite(scatter) and abs(vibration.frequency_hz / linear_hz - 1.0) > OTHER_MODE:
+        out.append(
+            f"locked at {vibration.frequency_hz:.4g} Hz, more than {100.0 * OTHER_MODE:g} % from specimen.linear_frequency_hz = "
+            f"{linear_hz:g}: another mode looks the same to a phase"
         )
     share = purity(vibration)["harmonic_power"]
     if abs(share) > BIASED_DAMPING:

@@ -99,6 +99,8 @@ def take_over(t: TickArrays, segment: Record) -> None:
     law, loop, progress = t.law[0], t.loop[0], t.progress[0]
     if segment.drive == LOOP_DRIVE and loop.drive != LOOP_DRIVE:
         loop.taking_over = 1
+    if segment.drive == TONE and loop.drive == LOOP_DRIVE:
+        progress.omega = loop.omega  # from where the tone's ramp goes to its own frequency
     loop.drive = segment.drive
     if segment.amplitude_law == loop.amplitude_law:
         return
