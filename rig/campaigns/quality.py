@@ -70,8 +70,8 @@ def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: np.ndarra
     linear_hz = bench.specimen.linear_frequency_hz
     if math.isfinite(scatter) and abs(vibration.frequency_hz / linear_hz - 1.0) > OTHER_MODE:
         out.append(
-            f"locked at {vibration.frequency_hz:.4g} Hz, more than {100.0 * OTHER_MODE:g} % from specimen.linear_frequency_hz = "
-            f"{linear_hz:g}: another mode looks the same to a phase"
+            f"locked at {vibration.frequency_hz:.4g} Hz, more than {100.0 * OTHER_MODE:g} % from "
+            f"specimen.linear_frequency_hz = {linear_hz:g}: another mode looks the same to a phase"
         )
     share = purity(vibration)["harmonic_power"]
     if abs(share) > BIASED_DAMPING:

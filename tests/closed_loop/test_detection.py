@@ -22,8 +22,9 @@ def points_and_end(plan, bench, seed=0):
 
 def test_another_mode_locks_perfectly_so_that_only_its_frequency_tells():
     """In a window that reaches from the first mode to the second, the loop finds the second at 90 degrees."""
-    wide = {"centre_frequency_hz": 128.0, "frequency_window_hz": (20.0, 200.0)}
-    points, _ = points_and_end(plan_of("magnet-beam", wide, levels_v=(0.4,)), bench_with())
+    wide = preset("magnet-beam").model_dump() | {"centre_frequency_hz": 131.0, "frequency_window_hz": (20.0, 200.0)}
+    plan = BackbonePlan.model_validate({"bench": "magnet-beam", "controller": wide, "levels_v": (0.4,)})
+    points, _ = points_and_end(plan, bench_with())
     assert points[0]["accepted"]
     assert points[0]["frequency_hz"] == pytest.approx(134.06, abs=0.1)  # the rig's second mode
     assert abs(points[0]["phase_error_deg"]) < 1.0
@@ -33,8 +34,11 @@ def test_another_mode_locks_perfectly_so_that_only_its_frequency_tells():
 
 def test_the_frequency_window_keeps_another_mode_out_and_says_so():
     mistaken = bench_with({"specimen": {"linear_frequency_hz": 121.0}})
-    window = {"centre_frequency_hz": 121.0, "frequency_window_hz": (108.9, 133.1)}  # 10 % to either side; mode 2 is above
-    plan = plan_of("magnet-beam", window, levels_v=(0.2, 0.4), settle=SHORT)
+    window = {
+        "centre_frequency_hz": 121.0,
+        "frequency_window_hz": (108.9, 133.1),
+    }  # 10 % to either side; mode 2 is above
+    plan = plan_of("magnet-beam", window, levels_v=(0.2, 0.4))
     with rig.run(plan, bench=mistaken) as run:
         points, end = run.recording.points, run.recording.parts[0].end
         flags = run.recording.parts[0].rows("flags")
@@ -50,7 +54,7 @@ def test_the_frequency_window_keeps_another_mode_out_and_says_so():
 def test_a_scattering_lag_is_warned_of():
     points, _ = points_and_end(
         plan_of("magnet-beam", levels_v=(0.03,), settle=SettleRule(phase_deg=5, amplitude=0.1).model_dump()),
-        bench_with(noise_scale=6.0),
+        bench_with(noise_scale=18.0),
     )
     assert points[0]["phase_scatter_deg"] > 5.0
     assert any("the lag scatters by" in warning and "bits" in warning for warning in points[0]["warnings"])
@@ -66,10 +70,10 @@ def test_below_four_tenths_of_a_bit_no_phase_is_read_and_none_is_reported():
     assert end["skipped"] == "1 of 2 points skipped: not settled (0.002 V)"
 
 
-@pytest.mark.parametrize("levels", [{"levels_m": (5e-5, 2e-4)}, {"levels_n": (0.7, 40.0)}])
+@pytest.mark.parametrize("levels", [{"levels_m": (5e-5, 2e-4)}, {"levels_n": (2.0, 40.0)}])
 def test_a_level_beyond_the_voltage_limit_is_reported_and_the_next_is_measured(levels):
     bench = bench_with({"limits": {"voltage_v": 0.5}}, "friction-beam")
-    plan = plan_of("friction-beam", start_v=0.05, direction="up-down", settle=SHORT, **levels)
+    plan = plan_of("friction-beam", start_v=0.05, direction="up-down", **levels)
     points, end = points_and_end(plan, bench)
     assert [point["quality"] for point in points] == ["good", "unreachable", "good"]
     assert "voltage limit" in points[1]["reason"]
