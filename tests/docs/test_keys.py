@@ -28,7 +28,7 @@ from tests.docs.tables import PAGE, PARTS, table_of, table_under
 
 MODELS = {
     "Keys of a stepped-sine plan": SteppedSinePlan,
-    "Keys of `[demodulation]`": OpenLoop,
+    "Keys of `[controller]` in open loop": OpenLoop,
     "Keys of a sweep plan": SweepPlan,
     "Keys of a multisine plan": MultisinePlan,
     "Keys of a backbone plan": BackbonePlan,
@@ -45,8 +45,8 @@ MODELS = {
 
 
 def keys_under(heading: str) -> dict[str, tuple[str, str]]:
-    """Default and allowed column of every key in the table below a heading of the guide or of the page of campaigns."""
-    pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("user-guide.md", "campaigns.md")]
+    """Default and allowed column of every key in the table below a heading of the guide, of the page of the controller or of that of campaigns."""
+    pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("user-guide.md", "controller.md", "campaigns.md")]
     rows = re.findall(
         r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table_under(heading, "\n".join(pages))["table"], re.MULTILINE
     )
