@@ -48,13 +48,15 @@ LOOP = np.dtype(
         ("saturated", "i8"),
         ("clamped", "i8"),
         ("held_back", "i8"),
+        ("behind", "i8"),
         ("drive", "i8"),
         ("waveform", "i8"),
         ("play", "i8"),
     ]
 )
 """State of oscillator and laws (one record). ``turn``: angle of the complex command U; ``displacement``: amplitude of the
-drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at."""
+drive point (m); ``behind``: 1 while the output is on its way up to what the law demands, -1 while on
+its way down; ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """What the tick has sent out and the inputs have not yet seen; a ring."""

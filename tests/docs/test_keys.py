@@ -45,8 +45,11 @@ MODELS = {
 
 
 def keys_under(heading: str) -> dict[str, tuple[str, str]]:
-    """Default and allowed column of every key in the table below a heading of the guide, of the page of the controller or of that of campaigns."""
-    pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("user-guide.md", "controller.md", "campaigns.md")]
+    """Default and allowed column of every key in the table below a heading of the pages that have keys of plans and benches."""
+    pages = [
+        (ROOT / "docs" / name).read_text(encoding="utf-8")
+        for name in ("user-guide.md", "controller.md", "campaigns.md")
+    ]
     rows = re.findall(
         r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table_under(heading, "\n".join(pages))["table"], re.MULTILINE
     )

@@ -134,7 +134,7 @@ def hold_response(t: TickArrays, displacement: float) -> None:
         law.dt_s,
         law.smallest_v,
         law.largest_v,
-        loop.held_back == 1,
+        loop.behind,
     )
     if law.turns == 1:
         loop.turn = angle
@@ -152,7 +152,7 @@ def hold_force_through_response(t: TickArrays, level: float) -> None:
         wanted *= abs(math.sin(progress.lag))
         measured *= math.sin(progress.lag - loop.error) * math.copysign(1.0, progress.lag)
     error = log_ratio(wanted, measured)
-    if error < 0.0 or (loop.saturated == 0 and loop.held_back == 0):
+    if loop.behind >= 0 if error < 0.0 else (loop.saturated == 0 and loop.behind <= 0):
         loop.log_reference += law.reference_ki * law.dt_s * error
     hold_response(t, math.exp(loop.log_reference))
 
@@ -167,9 +167,11 @@ def demanded_amplitude(t: TickArrays, present: bool) -> float:
         if present:
             hold_response(t, level)
     elif law.force_loop == LINEAR:
-        loop.demanded_v, loop.force_integral = proportional_integral(
+        loop.demanded_v, integral = proportional_integral(
             level - controlled_size(t), loop.force_integral, law.k3, law.k4, law.dt_s, 0.0, 0.0, law.largest_v
         )
+        if (integral - loop.force_integral) * loop.behind <= 0.0:  # no further the way that the output cannot follow
+            loop.force_integral = integral
     elif law.force_loop == LOGARITHMIC:
         loop.demanded_v, _, loop.log_integral = log_proportional_integral(
             complex(log_ratio(level, controlled_size(t)), 0.0),
@@ -179,7 +181,7 @@ def demanded_amplitude(t: TickArrays, present: bool) -> float:
             law.dt_s,
             law.smallest_v,
             law.largest_v,
-            loop.held_back == 1,
+            loop.behind,
         )
     elif present:
         hold_force_through_response(t, level)
