@@ -52,21 +52,29 @@ if TYPE_CHECKING:
     from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
     from identification.prediction.sweeps import predict_sweep
     from identification.prediction.uncertainty import ResponseBand, response_band
+    from identification.response_control.curves import ConstantForceCurve
+    from identification.response_control.force_surface import ForceSurface, force_surface
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
     from identification.signals.sweeps import ForceDropOut, force_drop_out
     from identification.signals.transients import Transient, demodulate
+    from identification.slow_flows.continuous import ContinuousBackbone, continuous_backbone
+    from identification.slow_flows.short_points import ShortPoint, short_point
+    from identification.slow_flows.slow_flow import SlowFlow, slow_flow
 
 __all__ = [
     "Backbone",
     "BackboneMapping",
     "Channel",
     "Comparison",
+    "ConstantForceCurve",
+    "ContinuousBackbone",
     "DistortionLevels",
     "Exciter",
     "ExtrapolationError",
     "ForceDropOut",
+    "ForceSurface",
     "FrequencyResponse",
     "FrequencyResponseMapping",
     "FrequencyResponseMatrix",
@@ -88,6 +96,8 @@ __all__ = [
     "Repeatability",
     "ResponseBand",
     "ResponseMatrixMapping",
+    "ShortPoint",
+    "SlowFlow",
     "StabilisationDiagram",
     "StateSpace",
     "SteadyPrediction",
@@ -100,12 +110,14 @@ __all__ = [
     "combined",
     "compare",
     "compare_sweep",
+    "continuous_backbone",
     "decimated",
     "demodulate",
     "distortion_levels",
     "error_table",
     "extrapolated_to_zero",
     "force_drop_out",
+    "force_surface",
     "frequency_response",
     "identify_exciter",
     "linear_modes",
@@ -124,7 +136,9 @@ __all__ = [
     "recorded_force_response",
     "repeatability",
     "response_band",
+    "short_point",
     "single_point_mode",
+    "slow_flow",
     "stabilisation",
     "steady_predictions",
     "stepped_sine_mode",
@@ -138,10 +152,13 @@ _MODULE_OF = {
     "BackboneMapping": "mapping.backbone",
     "Channel": "channels",
     "Comparison": "prediction.comparison",
+    "ConstantForceCurve": "response_control.curves",
+    "ContinuousBackbone": "slow_flows.continuous",
     "DistortionLevels": "multisine.distortion",
     "Exciter": "prediction.exciter",
     "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
+    "ForceSurface": "response_control.force_surface",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping.stepped_sine",
     "FrequencyResponseMatrix": "linear.response_matrix",
@@ -163,6 +180,8 @@ _MODULE_OF = {
     "Repeatability": "nonlinear.repeatability",
     "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
+    "ShortPoint": "slow_flows.short_points",
+    "SlowFlow": "slow_flows.slow_flow",
     "StabilisationDiagram": "linear.stabilisation",
     "StateSpace": "linear.subspace",
     "SteadyPrediction": "prediction.steady_prediction",
@@ -175,12 +194,14 @@ _MODULE_OF = {
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
     "compare_sweep": "prediction.sweep_prediction",
+    "continuous_backbone": "slow_flows.continuous",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
     "error_table": "prediction.comparison",
     "extrapolated_to_zero": "linear.extrapolation",
     "force_drop_out": "signals.sweeps",
+    "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
     "identify_exciter": "prediction.exciter_fit",
     "linear_modes": "linear.modal_analysis",
@@ -199,7 +220,9 @@ _MODULE_OF = {
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",
+    "short_point": "slow_flows.short_points",
     "single_point_mode": "nonlinear.single_points",
+    "slow_flow": "slow_flows.slow_flow",
     "stabilisation": "linear.stabilisation",
     "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",
