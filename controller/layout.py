@@ -98,6 +98,8 @@ LAW = np.dtype(
         ("kp", "f8"),
         ("ki", "f8"),
         ("mode_shape_squared", "f8"),
+        ("rest_gain", "f8"),
+        ("rest_share", "f8"),
         ("centre_rad_s", "f8"),
         ("lowest_rad_s", "f8"),
         ("highest_rad_s", "f8"),
@@ -110,6 +112,7 @@ LAW = np.dtype(
         ("force_ki", "f8"),
         ("response_kp", "c16"),
         ("response_ki", "f8"),
+        ("plant_gain", "c16"),
         ("turns", "i8"),
         ("reference_ki", "f8"),
         ("smallest_v", "f8"),
@@ -117,7 +120,8 @@ LAW = np.dtype(
     ]
 )
 """Frozen coefficients of the law (one record), made by `controller.law.Law.build`. ``turns``: whether the response's loop
-holds its phase too, by turning the output's."""
+holds its phase too, by turning the output's. ``rest_gain``: step of the low-pass behind the response's rate of change; 0 where
+the laws take force and lag as they are; ``rest_share``: part of the force behind that rate which is taken out."""
 
 THRESHOLDS = np.dtype(
     [

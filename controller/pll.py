@@ -34,6 +34,13 @@ class PhaseLockedLoop(Demodulation, AmplitudeLoops):
     """Proportional gain of the frequency error, 1."""
     frequency_integral_per_s: float = Field(0.0, ge=0, le=1e4)
     """Integral gain of the frequency error, 1/s; w_LP/12 to w_LP/8 are good values."""
+    rest_low_pass_rad_s: float = Field(0.0, ge=0, le=1e4)
+    """Where above 0, frequency error and force through response go by the force that is left once the response keeps still:
+    the part that changes it is taken out, with this corner for its rate of change, rad/s; w_LP is a good value. Neither then
+    waits for the structure."""
+    rest_share: float = Field(0.8, ge=0, le=1)
+    """Part of that force which is taken out. The mode shape may be too small by as much as is left: beyond, the level runs away,
+    the quicker the lower the damping. Too large a mode shape only slows it down."""
     drive_mode_shape: float | None = Field(None, gt=0)
     """Mass-normalised mode shape at the drive point for the frequency error, kg^-1/2; the bench's if not given. It may be wrong
     by a factor of 1.5."""
@@ -110,17 +117,18 @@ class PhaseLockedLoop(Demodulation, AmplitudeLoops):
                 f"it may reach {sample_rate_hz / 4.0:g} Hz"
             )
         shape = self.drive_mode_shape or drive_mode_shape
-        if self.frequency_law == "frequency-error" and shape is None:
-            raise ValueError(
-                "drive_mode_shape: the frequency-error law needs it, here or as specimen.drive_mode_shape of the bench"
-            )
+        needing = "the frequency-error law" if self.frequency_law == "frequency-error" else "rest_low_pass_rad_s"
+        if shape is None and (self.frequency_law == "frequency-error" or self.rest_low_pass_rad_s > 0.0):
+            raise ValueError(f"drive_mode_shape: {needing} needs it, here or as specimen.drive_mode_shape of the bench")
         out = np.zeros(1, LAW)
         self.fill_demodulation(out, sample_rate_hz)
         self.fill_amplitude(out, amplitude_law, largest_v)
         out["target_lag_rad"] = math.radians(self.phase_lag_deg)
         out["frequency_law"] = FrequencyLaw[self.frequency_law.upper().replace("-", "_")]
         out["mode_shape_squared"] = (shape or 0.0) ** 2
+        out["rest_gain"] = -math.expm1(-self.rest_low_pass_rad_s / sample_rate_hz)
         out["kp"], out["ki"] = self.proportional_and_integral()
+        out["rest_share"] = self.rest_share
         out["centre_rad_s"] = 2.0 * math.pi * self.centre_frequency_hz
         out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in self.frequency_window_hz)
         out["period_mean"] = self.period_mean

@@ -33,7 +33,7 @@ class Run:
         return backbone(self.recording)
 
     def frequency_responses(self) -> tuple[FrequencyResponse, ...]:
-        """The accepted points of a stepped-sine test, one frequency response per level."""
+        """The accepted points of a stepped-sine or stepped-phase test, one frequency response per level."""
         return frequency_responses(self.recording)
 
     def sweeps(self) -> dict[int, Transient]:

@@ -20,6 +20,8 @@ from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import backbone_of
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.multisine_points import spectra_of
+from rig.campaigns.stepped_phase import SteppedPhasePlan
+from rig.campaigns.stepped_phase_points import constant_level_responses
 from rig.campaigns.stepped_sine_points import frequency_responses_of
 from rig.campaigns.sweep_points import transient_of
 from rig.configuration import validated
@@ -57,10 +59,19 @@ def backbone(recording: Recording) -> Backbone:
 
 
 def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a stepped-sine recording: the fundamentals of force and drive, one response per level.
+    """The accepted points of a stepped-sine or stepped-phase recording: fundamentals of force and drive, a response per level.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    In the order of measurement, which for stepped phase is that along the branch; one response per pass where there are
+    several. Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
+    if recording.kind == "stepped-phase":
+        plan = validated(SteppedPhasePlan, recording.configuration["plan"], "plan of the recording")
+        return constant_level_responses(
+            recording.latest.values(),
+            recording.channels,
+            bench_of_recording(recording).specimen.name,
+            plan.amplitude_law,
+        )
     _expect(recording, "stepped-sine")
     return frequency_responses_of(
         recording.latest.values(), recording.channels, bench_of_recording(recording).specimen.name

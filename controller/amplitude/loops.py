@@ -40,6 +40,9 @@ class AmplitudeLoops(BaseModel):
     plant_pole_rad_s: tuple[float, float] | None = None
     """p: real and imaginary part of the plant's pole (voltage to response) less i times the locked frequency, rad/s. It sets
     the proportional gain K/(-p), which cancels it; without, the loop is integral alone."""
+    plant_gain_per_v: tuple[float, float] | None = None
+    """Real and imaginary part of the drive point's acceleration over the output, m/s^2 per V, at the lock at which
+    `plant_pole_rad_s` holds. With it the proportional gain follows the pole as this ratio changes with the level."""
     reference_integral_per_s: float = Field(0.0, ge=0, le=1e4)
     """Gain from the logarithm of the active force ratio to that of the response's level, 1/s."""
 
@@ -60,6 +63,7 @@ class AmplitudeLoops(BaseModel):
         out["force_kp"], out["force_ki"] = self.force_proportional, self.force_integral_per_s
         out["response_kp"] = self._response_proportional()
         out["response_ki"] = self.response_integral_per_s
+        out["plant_gain"] = 0.0 if self.plant_gain_per_v is None else complex(*self.plant_gain_per_v)
         out["turns"] = self.response_loop == "complex"
         out["reference_ki"] = self.reference_integral_per_s
         out["smallest_v"], out["largest_v"] = SMALLEST_PART * largest_v, largest_v

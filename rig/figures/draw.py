@@ -8,6 +8,7 @@ import numpy as np
 from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
 from rig.figures.nonlinear_mode import draw_properties
+from rig.figures.stepped_phase import draw_stepped_phase
 from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
 from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
 from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
@@ -94,6 +95,19 @@ def _draw_stepped_sine(page: "Figure", recording: Recording) -> None:
     draw_stepped_sine(page, responses, title=f"{_specimen(recording)}: stepped sine, {len(responses)} levels")
 
 
+def _draw_stepped_phase(page: "Figure", recording: Recording) -> None:
+    points = recording.latest.values()
+    left_out = sum(not point["accepted"] for point in points)
+    text = f"{_specimen(recording)}: stepped phase, {len(points)} points"
+    plan = recording.configuration["plan"]
+    draw_stepped_phase(
+        page,
+        frequency_responses(recording),
+        held="RMS of the force" if plan.get("levels_rms_n") else "",
+        title=text + (f", {left_out} not accepted" if left_out else ""),
+    )
+
+
 def _draw_multisine(page: "Figure", recording: Recording) -> None:
     """The highest level of a recording."""
     level, at_level = max(spectra(recording).items())
@@ -105,6 +119,7 @@ def _draw_multisine(page: "Figure", recording: Recording) -> None:
 _DRAW = {
     "backbone": _draw_backbone,
     "sweep": _draw_sweep,
+    "stepped-phase": _draw_stepped_phase,
     "stepped-sine": _draw_stepped_sine,
     "multisine": _draw_multisine,
 }

@@ -30,14 +30,15 @@ from rig.tick.laws.kernels import (
     controlled_size,
     demanded_amplitude,
     phase_error,
+    see_rest,
     take_over,
 )
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
 from vibrolock.compiled import Record, kernel
 
 STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
-UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
 HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
+UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
 
 
 @kernel
@@ -179,6 +180,7 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
     present = loop.force_size >= thresholds.smallest_force_n and loop.response_size >= thresholds.smallest_response
     closed = present and loop.drive == LOOP_DRIVE
     loop.error = phase_error(t) if closed else 0.0
+    see_rest(t)
 
     if theta_in < loop.theta_in:
         loop.cycles += 1

@@ -38,6 +38,17 @@ LOOP = np.dtype(
         ("log_reference", "f8"),
         ("reference_turn", "f8"),
         ("response_error", "c16"),
+        ("late_force", "c16"),
+        ("late_drive", "c16"),
+        ("rest_force", "f8"),
+        ("rest_response", "f8"),
+        ("rest_error", "f8"),
+        ("plant_ratio", "c16"),
+        ("slope_known", "i8"),
+        ("slow_x", "f8"),
+        ("slow_f", "f8"),
+        ("square_x", "f8"),
+        ("product_xf", "f8"),
         ("error", "f8"),
         ("mean_error", "f8"),
         ("sum_error", "f8"),
@@ -55,8 +66,9 @@ LOOP = np.dtype(
     ]
 )
 """State of oscillator and laws (one record). ``turn``: angle of the complex command U; ``displacement``: amplitude of the
-drive point (m); ``behind``: 1 while the output is on its way up to what the law demands, -1 while on
-its way down; ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at."""
+drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at;
+``late_`` amplitudes that passed one more low-pass, ``rest_`` sizes and phase error as they will be once the response keeps
+still (`rig.tick.laws.kernels.see_rest`)."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """What the tick has sent out and the inputs have not yet seen; a ring."""

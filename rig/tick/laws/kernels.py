@@ -4,7 +4,7 @@ import math
 
 from controller.amplitude.kernels import log_proportional_integral, log_ratio
 from controller.demodulation.kernels import phase_lag, root_mean_square
-from controller.kernels import TWO_PI, frequency_error, proportional_integral, wrap
+from controller.kernels import TWO_PI, frequency_error, proportional_integral, size, wrap
 from controller.layout import (
     ADAPTIVE,
     FORCE,
@@ -23,6 +23,10 @@ from rig.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from rig.tick.layout import TickArrays
 from vibrolock.compiled import Record, kernel
 
+SLOPE_FORGETS = 0.5  # rate at which a slope is forgotten, over that of the loop it is for
+STEEPEST = 10.0
+UNMOVED = 1e-7  # square of a logarithm's change (0.03 %) below which a slope is not believed
+PLANT_VARIES = 3.0  # factor that the plant's gain may be off and is still followed
 SMALLEST_M = 1e-15  # no displacement is smaller than an atom's nucleus: a floor for logarithms
 
 
@@ -36,6 +40,32 @@ def phase_error(t: TickArrays) -> float:
         return float(0.5 * math.pi * loop.sign_mean - lag_of_skew)
     force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
     return wrap(t.progress[0].lag - phase_lag(force, drive) - lag_of_skew)
+
+
+@kernel
+def see_rest(t: TickArrays) -> None:
+    """The force that the vibration of the moment will need once it keeps still: what changes it is taken out.
+
+    A mode whose displacement X grows and turns slowly takes ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``; its last
+    term, by the acceleration's amplitude ``2 i/(W phi_d^2) dA/dt``, is off at rest. Force and motion pass one more low-pass
+    for the derivative. Without ``rest_gain`` force and lag are those measured.
+    """
+    law, loop = t.law[0], t.loop[0]
+    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
+    if law.rest_gain == 0.0 or loop.drive != LOOP_DRIVE:
+        loop.late_force, loop.late_drive = force, drive
+        loop.rest_force, loop.rest_response, loop.rest_error = loop.force_size, loop.response_size, loop.error
+        return
+    skew = t.inputs[loop.force_channel].skew_samples - t.inputs[loop.drive_channel].skew_samples
+    if skew != 0.0:
+        angle = loop.omega * skew * law.dt_s
+        drive *= complex(math.cos(angle), math.sin(angle))
+    loop.late_force += law.rest_gain * (force - loop.late_force)
+    step = law.rest_gain * (drive - loop.late_drive)
+    loop.late_drive += step
+    rest = loop.late_force + step * complex(0.0, 2.0 * law.rest_share / (loop.omega * law.mode_shape_squared * law.dt_s))
+    loop.rest_force, loop.rest_response = size(rest), size(loop.late_drive)
+    loop.rest_error = wrap(t.progress[0].lag - phase_lag(rest, loop.late_drive))
 
 
 @kernel
@@ -72,7 +102,9 @@ def close_period(t: TickArrays, present: bool) -> None:
         open_loop = loop.drive == TONE
         if not open_loop:
             next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
-        locked = (open_loop or t.lock[0].state == LOCKED) and loop.held_back == 0
+        # Where a loop holds the level, its own error says whether the output may; its ripple may be cut all the time.
+        behind = loop.held_back == 1 and loop.amplitude_law == VOLTAGE
+        locked = (open_loop or t.lock[0].state == LOCKED) and not behind
         judge_period(
             t.settling[0],
             t.rule[0],
@@ -113,6 +145,27 @@ def take_over(t: TickArrays, segment: Record) -> None:
     drive = t.watches[loop.drive_channel].estimate
     loop.reference_turn = math.atan2(drive.imag, drive.real)
     loop.response_error = 0.0
+    loop.slope_known = 0
+    loop.plant_ratio = 1.0
+
+
+@kernel
+def response_proportional(t: TickArrays) -> complex:
+    """The response loop's kp, following the plant: ``kp (A/U)/G``, G what A/U was where kp was right.
+
+    A softening structure moves the plant's pole p, while the residue of ``A/U = R/(i W - p)`` is the shaker's: -p goes
+    with U/A. Within a factor; without G the gain stays.
+    """
+    law, loop = t.law[0], t.loop[0]
+    if law.plant_gain == 0.0:
+        return complex(law.response_kp)
+    drive, amplitude = t.watches[loop.drive_channel].estimate, t.guard[0].amplitude_v
+    if amplitude > 0.0:
+        now = drive * complex(math.cos(loop.turn), -math.sin(loop.turn)) / amplitude / law.plant_gain
+        loop.plant_ratio += 0.25 * law.response_ki * law.dt_s * (now - loop.plant_ratio)
+    ratio = size(loop.plant_ratio)
+    bounded = min(max(ratio, 1.0 / PLANT_VARIES), PLANT_VARIES) / ratio if ratio > 0.0 else 0.0
+    return complex(law.response_kp * loop.plant_ratio * bounded)
 
 
 @kernel
@@ -129,7 +182,7 @@ def hold_response(t: TickArrays, displacement: float) -> None:
     loop.demanded_v, angle, loop.log_integral = log_proportional_integral(
         error,
         loop.log_integral,
-        law.response_kp,
+        response_proportional(t),
         law.response_ki,
         law.dt_s,
         law.smallest_v,
@@ -141,17 +194,56 @@ def hold_response(t: TickArrays, displacement: float) -> None:
 
 
 @kernel
-def hold_force_through_response(t: TickArrays, level: float) -> None:
-    """The part of the force that feeds the vibration sets the response: ``d ln X_ref/dt = k ln(F* sin psi*/(F sin psi))``.
+def force_at_lag(t: TickArrays) -> float:
+    """What the amplitude loop holds (N), as it would be at the wanted lag and at rest, if the response stayed as it is.
 
-    psi is the lag of the displacement. A tone has no wanted lag: its whole force counts.
+    The part of the fundamental that feeds the vibration stays, ``F sin psi`` with the lag psi of the displacement,
+    and so do the harmonics. It may be negative where the force brakes. A tone has no wanted lag: the force as it is.
     """
-    law, loop, progress = t.law[0], t.loop[0], t.progress[0]
-    wanted, measured = level, controlled_size(t)
-    if loop.drive == LOOP_DRIVE:
-        wanted *= abs(math.sin(progress.lag))
-        measured *= math.sin(progress.lag - loop.error) * math.copysign(1.0, progress.lag)
-    error = log_ratio(wanted, measured)
+    loop, lag = t.loop[0], t.progress[0].lag
+    measured = controlled_size(t)
+    if loop.drive != LOOP_DRIVE:
+        return measured
+    # lag is that of the acceleration, whose sine is minus that of the displacement's: the ratio is the same
+    fundamental = loop.rest_force * math.sin(lag - loop.rest_error) / math.sin(lag)
+    if loop.amplitude_law != FORCE_RMS:
+        return float(fundamental)
+    above = max(measured * measured - 0.5 * loop.force_size * loop.force_size, 0.0)
+    return math.copysign(math.sqrt(above + 0.5 * fundamental * fundamental), fundamental)
+
+
+@kernel
+def force_slope(t: TickArrays) -> float:
+    """``d ln(F sin psi)/d ln X`` as it was of late, by least squares with forgetting, within bounds; 1 where nothing moved.
+
+    Where friction begins to slide it is 5 and more: the loop through the response would have so many times its gain.
+    """
+    law, loop = t.law[0], t.loop[0]
+    active = loop.rest_force * abs(math.sin(t.progress[0].lag - loop.rest_error))
+    if law.rest_gain == 0.0 or loop.drive != LOOP_DRIVE or not active > 0.0:
+        return 1.0
+    x, f = math.log(loop.rest_response / (loop.omega * loop.omega)), math.log(active)
+    if loop.slope_known == 0:
+        loop.slope_known = 1
+        loop.slow_x, loop.slow_f, loop.square_x, loop.product_xf = x, f, 0.0, 0.0
+    gain = law.reference_ki * law.dt_s
+    loop.slow_x += gain * (x - loop.slow_x)
+    loop.slow_f += gain * (f - loop.slow_f)
+    x, f = x - loop.slow_x, f - loop.slow_f
+    loop.square_x += SLOPE_FORGETS * gain * (x * x - loop.square_x)
+    loop.product_xf += SLOPE_FORGETS * gain * (x * f - loop.product_xf)
+    slope = (loop.product_xf + UNMOVED) / (loop.square_x + UNMOVED)
+    return float(min(max(slope, 1.0), STEEPEST))
+
+
+@kernel
+def hold_force_through_response(t: TickArrays, level: float) -> None:
+    """The part of the force that feeds the vibration sets the response: ``d ln X_ref/dt = (k/s) ln(F* sin psi*/(F sin psi))``.
+
+    s is its slope over the response (`force_slope`).
+    """
+    law, loop = t.law[0], t.loop[0]
+    error = log_ratio(level, force_at_lag(t)) / force_slope(t)
     if loop.behind >= 0 if error < 0.0 else (loop.saturated == 0 and loop.behind <= 0):
         loop.log_reference += law.reference_ki * law.dt_s * error
     hold_response(t, math.exp(loop.log_reference))
@@ -200,8 +292,8 @@ def choose_frequency(t: TickArrays, present: bool) -> None:
     elif present:
         error = loop.mean_error if law.period_mean == 1 else loop.error
         if law.frequency_law == FREQUENCY_ERROR:
-            ratio = law.mode_shape_squared * loop.force_size / loop.response_size
-            error = frequency_error(error, ratio, loop.omega, t.progress[0].lag)
+            ratio = law.mode_shape_squared * loop.rest_force / loop.rest_response
+            error = frequency_error(loop.rest_error, ratio, loop.omega, t.progress[0].lag)
         if loop.taking_over == 1:
             loop.taking_over = 0
             loop.phase_integral = loop.omega - law.centre_rad_s - law.kp * error
