@@ -69,9 +69,9 @@ class PhaseLockedLoop(Demodulation, AmplitudeLoops):
                 f"phase_lag_deg = {self.phase_lag_deg:g}: the sign detector knows phase resonance only, allowed is -90"
             )
         if self.frequency_law == "phase":
-            given = {"k1", "k2"} & self.model_fields_set
-            if not given:
-                raise ValueError("k1, k2: the phase law needs its gains")
+            for name in ("k1", "k2"):
+                if name not in self.model_fields_set:
+                    raise ValueError(f"{name}: is missing, and the phase law needs it")
         else:
             self._frequency_error_possible()
         return self

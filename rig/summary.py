@@ -6,6 +6,7 @@ from typing import Any
 from rig.campaigns.continuation import changed_keys
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
+from rig.campaigns.quality import what_was_skipped
 from rig.models.files import KINDS, load
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -15,7 +16,17 @@ __all__ = ["summarise", "summarise_recording"]
 BULKY = {"harmonics", "harmonics_std", "residual_rms", "drift"}
 """What a point holds and a summary leaves in the file."""
 
-QUALITY = ("settled", "accepted", "reason", "periods", "settle_periods", "warnings", "first_sample", "end_sample")
+QUALITY = (
+    "settled",
+    "accepted",
+    "quality",
+    "reason",
+    "periods",
+    "settle_periods",
+    "warnings",
+    "first_sample",
+    "end_sample",
+)
 
 
 def summarise(path: Path) -> dict[str, Any]:
@@ -51,6 +62,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "seed": recording.seed,
         "complete": recording.complete,
         "points_planned": len(plan.targets()),
+        "skipped": what_was_skipped(recording.latest.values(), len(plan.targets())),
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),

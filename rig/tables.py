@@ -19,6 +19,8 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     pace = f", {factor:.0f} times real time in the loop" if factor else ""
     ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
     print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
+    if summary["skipped"]:
+        print(summary["skipped"])
     if not summary["complete"]:
         print(
             f"what was accepted is kept; `rig resume {path}` measures the rest, with --plan PLAN.toml by a changed plan"
@@ -39,6 +41,8 @@ def print_summary(summary: dict[str, Any]) -> None:
     loop = summary["loop"]
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
     _print_points(summary["kind"], summary["points"])
+    if summary["skipped"]:
+        print(summary["skipped"])
     if summary["former_points"]:
         print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
         _print_points(summary["kind"], summary["former_points"])

@@ -19,12 +19,13 @@ def log_ratio(wanted: float, measured: float) -> float:
 
 @kernel
 def log_proportional_integral(
-    error: complex, integral: complex, kp: complex, ki: float, dt: float, lowest: float, highest: float, hold: bool
+    error: complex, integral: complex, kp: complex, ki: float, dt: float, lowest: float, highest: float, held: int
 ) -> tuple[float, float, complex]:
     """``ln U = kp E + ki int E`` with complex E, U and kp: returns (|U|, arg U, integral).
 
-    |U| stays within ``lowest`` to ``highest``; while it stands at one, or with ``hold``, the integral of the amplitude may
-    only move away from there. The angle is never held.
+    |U| stays within ``lowest`` to ``highest``; while it stands at one the integral of the amplitude may only move away from
+    there. ``held``: 1 while the output cannot rise to U as fast as it should, -1 while it cannot fall: the integral goes no
+    further that way. The angle is never held.
     """
     step = error * (ki * dt)
     proposed = integral + step
@@ -32,8 +33,8 @@ def log_proportional_integral(
     angle = proposed.imag + kp.real * error.imag + kp.imag * error.real
     least, most = math.log(lowest), math.log(highest)
     grown = proposed.real
-    if size > most or hold:
+    if size > most or held > 0:
         grown = min(grown, integral.real)
-    if size < least:
+    if size < least or held < 0:
         grown = max(grown, integral.real)
     return math.exp(min(max(size, least), most)), angle, complex(grown, proposed.imag)

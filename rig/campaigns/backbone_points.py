@@ -14,11 +14,11 @@ from rig.campaigns.evaluate import (
     as_pairs,
     drift_objection,
     head,
-    quantisation_warnings,
     recorded_vibration,
     within_periods,
 )
 from rig.campaigns.plan import Column, Target
+from rig.campaigns.quality import PURITY_COLUMNS, lag_scatter_deg, purity, quality_warnings
 
 __all__ = ["BACKBONE_COLUMNS", "backbone_of", "frequency_scatter", "measure_backbone_point"]
 
@@ -28,6 +28,7 @@ BACKBONE_COLUMNS = (
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
     Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
     Column("phase_error_deg", "phase error", "deg", ".2f"),
+    *PURITY_COLUMNS,
 )
 
 
@@ -51,7 +52,6 @@ def measure_backbone_point(
     hunting = frequency_scatter(rows["theta_rad"])
     reason = _objection(plan, bench, vibration, hunting)
     damping = float(mode.damping_ratio[0])
-    scatter = rows["phase_error_rad"][np.isfinite(rows["phase_error_rad"])].astype(float)
     return {
         **point,
         "settled": True,
@@ -64,10 +64,9 @@ def measure_backbone_point(
         "amplitude_m": vibration.amplitude_m,
         "phase_error_deg": error_deg,
         "frequency_scatter": hunting,
-        "phase_scatter_deg": math.degrees(float(scatter.std())),
+        "phase_scatter_deg": lag_scatter_deg(rows),
         "voltage_v": float(np.abs(rows["command_v"]).mean()),
-        "force_purity": float(mode.force_purity[0]),
-        "response_purity": float(mode.response_purity[0]),
+        **purity(vibration),
         "periods": vibration.periods,
         "settle_periods": float(settling["periods"]),
         "amplitude_drift": float(settling["drift"]),
@@ -75,7 +74,7 @@ def measure_backbone_point(
         "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
         "residual_rms": vibration.residual_rms.tolist(),
         "drift": None if vibration.drift is None else as_pairs(vibration.drift),
-        "warnings": [*vibration.warnings, *quantisation_warnings(vibration, bench)],
+        "warnings": quality_warnings(bench, vibration, rows),
     }
 
 

@@ -140,9 +140,9 @@ def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: s
 
 
 def changed_keys(before: dict[str, Any], after: dict[str, Any], path: str = "") -> list[str]:
-    """Dotted paths of the keys in which two tables differ."""
+    """Dotted paths of the keys in which two tables differ, in alphabetical order."""
     out = []
-    for key in dict.fromkeys([*before, *after]):
+    for key in sorted({*before, *after}):
         old, new = before.get(key), after.get(key)
         if isinstance(old, dict) and isinstance(new, dict):
             out += changed_keys(old, new, f"{path}{key}.")

@@ -77,6 +77,7 @@ def failed_point(plan: Plan, target: Target, outcome: np.void) -> dict[str, Any]
         **head(plan, target),
         "settled": False,
         "accepted": False,
+        "quality": code.name.lower().replace("_", "-"),
         "reason": why,
         "settle_periods": float(outcome["periods"]),
     }

@@ -16,6 +16,7 @@ from rig.bench import Bench
 from rig.campaigns.evaluate import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
+from rig.campaigns.quality import what_was_skipped
 from rig.daq import DAQ
 from rig.errors import RecordingError
 from rig.loop import Loop, LoopStatistics
@@ -86,8 +87,10 @@ class Execution:
         self.measure = KINDS[plan.kind].measure
         self.targets = plan.targets()
         self.numbers = range(len(self.targets)) if numbers is None else numbers
-        self.finished = len(done)
-        self.accepted = len(done)
+        self.done = len(done)
+        self.finished = self.done
+        self.accepted = self.done
+        self.reported: dict[int, dict[str, Any]] = {}
         self.next_segment = 0
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept: deque[tuple[int, np.ndarray]] = deque()
@@ -207,8 +210,10 @@ class Execution:
 
     def _report(self, point: dict[str, Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
-        point = {**point, "number": self.numbers[point["number"]]}
+        quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
+        point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
         self._write(self.journal.point, point)
+        self.reported[point["number"]] = point
         self.finished += 1
         self.accepted += 1 if point["accepted"] else 0
         self.progress.point(point, self.finished, len(self.targets))
@@ -231,6 +236,7 @@ class Execution:
             "reason": reason.name.lower(),
             "text": text,
             "tripped": reason.is_trip,
+            "skipped": what_was_skipped(self.reported.values(), len(self.targets) - self.done),
             "loop": _loop_report(self.loop.statistics, int(self.tick.arrays.loop["cycles"][0])),
             "counters": self.daq.counters,
         }
@@ -243,6 +249,7 @@ def nothing_left(bench: Bench) -> dict[str, Any]:
         "reason": EndReason.COMPLETED.name.lower(),
         "text": "nothing was left to measure",
         "tripped": False,
+        "skipped": "",
         "loop": _loop_report(LoopStatistics(bench.sample_rate_hz), 0),
         "counters": {},
     }

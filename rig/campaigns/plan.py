@@ -38,7 +38,8 @@ class Target(Configured):
 class Column(NamedTuple):
     """A quantity of a point as it is shown: key in the point, heading, unit, format, and what it is multiplied with.
 
-    ``plain``: in a line of its own unit's company it needs no name.
+    ``plain``: in a line of its own unit's company it needs no name. ``in_line``: whether it is shown while the test runs, too,
+    and not in tables alone.
     """
 
     key: str
@@ -47,6 +48,7 @@ class Column(NamedTuple):
     pattern: str
     scale: float = 1.0
     plain: bool = False
+    in_line: bool = True
 
 
 class Plan(Configured):

@@ -12,11 +12,11 @@ from rig.campaigns.evaluate import (
     as_pairs,
     drift_objection,
     head,
-    quantisation_warnings,
     recorded_vibration,
     within_periods,
 )
 from rig.campaigns.plan import Column, Target
+from rig.campaigns.quality import PURITY_COLUMNS, purity, quality_warnings
 from rig.campaigns.stepped_sine import SteppedSinePlan
 
 __all__ = ["STEPPED_SINE_COLUMNS", "frequency_responses_of", "measure_stepped_sine_point"]
@@ -26,6 +26,7 @@ STEPPED_SINE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),
     Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),
+    *PURITY_COLUMNS,
 )
 
 
@@ -50,13 +51,14 @@ def measure_stepped_sine_point(
         "amplitude_m": vibration.amplitude_m,
         "phase_lag_deg": vibration.phase_lag_deg,
         "voltage_v": float(np.abs(rows["command_v"]).mean()),
+        **purity(vibration),
         "periods": vibration.periods,
         "settle_periods": float(settling["periods"]),
         "amplitude_drift": float(settling["drift"]),
         "harmonics": as_pairs(vibration.harmonics),
         "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
         "residual_rms": vibration.residual_rms.tolist(),
-        "warnings": [*vibration.warnings, *quantisation_warnings(vibration, bench)],
+        "warnings": quality_warnings(bench, vibration, rows),
     }
 
 

@@ -211,6 +211,7 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
         flags |= SATURATED if loop.saturated == 1 else 0
     amplitude = permitted_amplitude(guard, t.limits[0], demanded, now)
     loop.held_back = 1 if abs(amplitude - demanded) > HELD_BACK * abs(demanded) else 0
+    loop.behind = 0 if loop.held_back == 0 else (1 if demanded > amplitude else -1)
     output = oscillate(t, amplitude)
 
     row.phase_error_rad = loop.error if closed else math.nan

@@ -59,6 +59,7 @@ LOOP = np.dtype(
         ("saturated", "i8"),
         ("clamped", "i8"),
         ("held_back", "i8"),
+        ("behind", "i8"),
         ("drive", "i8"),
         ("waveform", "i8"),
         ("play", "i8"),

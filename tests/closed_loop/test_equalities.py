@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
+from controller import AmplitudeLaw
 from rig.drivers import make_daq
 from rig.loop import Loop
+from rig.sequencer.layout import SegmentKind
+from rig.sequencer.segments import Excitation, Segment, SettleRule
 from rig.tick.kernels import tick_block
+from rig.tick.tick import Tick
+from tests.closed_loop.laws import law_of
 from tests.rig.rigs import bench_with, tick_for
 
 SAMPLES = 12_000
@@ -92,3 +97,43 @@ def test_the_loop_through_exchange_is_the_loop_fused():
             tick = tick_for(bench, bench.block + daq.latency_samples, 0.3)
             runs.append(np.concatenate(list(Loop(daq, tick, fused=fused).run())))
     assert runs[0].tobytes() == runs[1].tobytes()
+
+
+def _through_all_laws(bench, lead, force_loop):
+    """A tick that goes from a tone to the loop, and through every amplitude law, a ramp of the lag and a geometric ramp."""
+    laws = AmplitudeLaw
+    steps = [
+        (laws.VOLTAGE, 0.3, {"excitation": Excitation(24.4)}),
+        (laws.VOLTAGE, 0.3, {}),
+        (laws.RESPONSE, 2.5e-4, {"geometric": True}),
+        (laws.FORCE, 0.06, {"lag_deg": -80.0}),
+        (laws.FORCE_RMS, 0.05, {"lag_deg": -100.0}),
+        (laws.VOLTAGE, 0.2, {}),
+    ]
+    segments = [
+        Segment(kind, -1, level, 8.0, amplitude_law=law, **keys)
+        for law, level, keys in steps
+        for kind in (SegmentKind.RAMP, SegmentKind.HOLD)
+    ]
+    law = law_of("magnet-beam", force_loop=force_loop, k4=10.0)
+    return Tick(bench, law, laws.VOLTAGE, SettleRule(), segments, lead)
+
+
+@pytest.mark.parametrize("force_loop", ["linear", "logarithmic", "through-response"])
+@pytest.mark.parametrize(("block", "options"), [(1, {}), (8, {"queue_blocks": 1}), (40, {})])
+def test_through_every_law_the_exchanged_run_is_the_fused_one_bit_for_bit(block, options, force_loop):
+    runs = []
+    for fused in (True, False):
+        bench = bench_with({"block": block}, **options)
+        with make_daq(bench, 7) as daq:
+            daq.start(block)
+            tick = _through_all_laws(bench, block + daq.latency_samples, force_loop)
+            rows = np.concatenate(list(Loop(daq, tick, fused=fused).run()))
+            runs.append((rows, tick))
+    (ours, tick_f), (theirs, tick_e) = runs
+    samples = min(ours.size, theirs.size)  # the fused run ends with the sample, the other with its block
+    assert ours[:samples].tobytes() == theirs[:samples].tobytes()
+    assert abs(ours.size - theirs.size) < block
+    assert tick_f.outcomes.tobytes() == tick_e.outcomes.tobytes()
+    assert tick_f.guard["reason"][0] == tick_e.guard["reason"][0] == 1  # completed
+    assert np.unique(ours["segment"]).size == 13

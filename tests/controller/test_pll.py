@@ -63,3 +63,73 @@ def test_a_window_beyond_a_quarter_of_the_rate_is_refused():
 def test_levels_in_newtons_need_an_integral_gain():
     with pytest.raises(ValueError, match="k4"):
         preset("magnet-beam", "backbone").build(5000.0, AmplitudeLaw.FORCE, 5.0)
+
+
+def _second_generation(**changes):
+    table = {
+        "detector": "adaptive",
+        "low_pass_rad_s": 30.0,
+        "frequency_law": "frequency-error",
+        "frequency_integral_per_s": 3.0,
+        "drive_mode_shape": 0.9,
+        "centre_frequency_hz": 24.37,
+        "frequency_window_hz": (21.9, 26.8),
+        "response_integral_per_s": 7.5,
+        "plant_pole_rad_s": (-11.5, 3.9),
+    }
+    return PhaseLockedLoop.model_validate(table | changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"frequency_law": "phase"}, "k1: is missing"),
+        ({"frequency_law": "phase", "k1": 1.0}, "k2: is missing"),
+        ({"frequency_integral_per_s": 0.0}, "frequency_integral_per_s = 0"),
+        ({"detector": "sign"}, "allowed is two-phase or adaptive"),
+        ({"period_mean": True}, "period_mean = true"),
+        ({"phase_lag_deg": -2.0}, "phase_lag_deg = -2"),
+        ({"phase_lag_deg": 180.0}, "phase_lag_deg = 180"),
+        ({"drive_mode_shape": 0.0}, "drive_mode_shape"),
+        ({"harmonics_followed": 13}, "harmonics_followed"),
+        ({"force_loop": "cubic"}, "force_loop"),
+    ],
+)
+def test_what_the_frequency_error_law_cannot_do_is_refused(changes, named):
+    with pytest.raises(ValidationError, match=named):
+        _second_generation(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "law", "named"),
+    [
+        ({"drive_mode_shape": None}, AmplitudeLaw.VOLTAGE, "drive_mode_shape: the frequency-error law needs it"),
+        ({"response_integral_per_s": 0.0}, AmplitudeLaw.RESPONSE, "response_integral_per_s = 0"),
+        ({"force_loop": "through-response"}, AmplitudeLaw.FORCE, "reference_integral_per_s = 0"),
+        (
+            {"force_loop": "through-response", "reference_integral_per_s": 1.0, "response_integral_per_s": 0.0},
+            AmplitudeLaw.FORCE_RMS,
+            "response_integral_per_s = 0",
+        ),
+        ({"plant_pole_rad_s": (3.0, 1.0)}, AmplitudeLaw.RESPONSE, "a real part below 0"),
+        ({"low_pass_rad_s": 600.0}, AmplitudeLaw.VOLTAGE, "allows up to 476.6"),
+    ],
+)
+def test_levels_that_no_loop_would_hold_are_refused_for_the_sample_rate_and_levels_at_hand(changes, law, named):
+    with pytest.raises(ValueError, match=named):
+        _second_generation(**changes).build(5000.0, law, 5.0)
+
+
+def test_the_response_gain_cancels_the_plants_pole_and_is_real_for_the_amplitude_alone():
+    complex_law = _second_generation().build(5000.0, AmplitudeLaw.RESPONSE, 5.0)
+    assert complex_law["response_kp"][0] == pytest.approx(7.5 / (11.5 - 3.9j))
+    real_law = _second_generation(response_loop="amplitude").build(5000.0, AmplitudeLaw.RESPONSE, 5.0)
+    assert real_law["response_kp"][0] == pytest.approx((7.5 / (11.5 - 3.9j)).real)
+    assert (complex_law["turns"][0], real_law["turns"][0]) == (1, 0)
+
+
+def test_the_mode_shape_of_the_controller_goes_before_that_of_the_bench():
+    own = _second_generation().build(5000.0, AmplitudeLaw.VOLTAGE, 5.0, drive_mode_shape=0.5)
+    benchs = _second_generation(drive_mode_shape=None).build(5000.0, AmplitudeLaw.VOLTAGE, 5.0, drive_mode_shape=0.5)
+    assert own["mode_shape_squared"][0] == pytest.approx(0.81)
+    assert benchs["mode_shape_squared"][0] == pytest.approx(0.25)

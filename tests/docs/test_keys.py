@@ -30,7 +30,7 @@ from tests.docs.tables import PAGE, PARTS, table_of, table_under
 
 MODELS = {
     "Keys of a stepped-sine plan": SteppedSinePlan,
-    "Keys of `[demodulation]`": OpenLoop,
+    "Keys of `[controller]` in open loop": OpenLoop,
     "Keys of a stepped-phase plan": SteppedPhasePlan,
     "Keys of a sweep plan": SweepPlan,
     "Keys of a multisine plan": MultisinePlan,
@@ -49,9 +49,10 @@ MODELS = {
 
 
 def keys_under(heading: str) -> dict[str, tuple[str, str]]:
-    """Default and allowed column of every key in the table below a heading of the guide or of the page of campaigns."""
+    """Default and allowed column of every key in the table below a heading of the pages that have keys of plans and benches."""
     pages = [
-        (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("user-guide.md", "campaigns.md", "tuning.md")
+        (ROOT / "docs" / name).read_text(encoding="utf-8")
+        for name in ("user-guide.md", "controller.md", "campaigns.md", "tuning.md")
     ]
     rows = re.findall(
         r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table_under(heading, "\n".join(pages))["table"], re.MULTILINE

@@ -352,7 +352,8 @@ def test_the_command_measures_what_is_new_and_show_tells_what_was_changed(output
     assert [words[2:4] for words in lines] == [["0.5", "V"]]
     _, shown, _ = command(monkeypatch, capsys, "show run.h5")
     assert "no longer asked for by the plan, and not used: 1" in shown
-    assert "changed in the plan: controller.low_pass_rad_s" in shown
+    changed = "controller.frequency_window_hz, controller.k2, controller.low_pass_rad_s, levels_v"
+    assert f"changed in the plan: {changed}" in shown
 
 
 def test_an_unfinished_run_says_how_to_go_on(monkeypatch, capsys, tmp_path):

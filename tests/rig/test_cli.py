@@ -254,7 +254,7 @@ def test_a_mistake_is_answered_in_one_line_and_leaves_no_file(command, tmp_path,
         (("k1 = 2.0", 'k1 = "2"'), "controller.k1 = '2'"),
         (("record_periods = 20", "record_periods = 0"), "greater than or equal to 4"),
         (("k2 = 6.283185307179586", "k2 = -1"), "controller.k2 = -1"),
-        (("k2 = 6.283185307179586", ""), "controller.k2: is missing"),
+        (("k2 = 6.283185307179586", ""), "controller: k2: is missing"),
         (("[21.933, 26.807]", "[25.0, 26.807]"), "frequency_window_hz"),
         (("[21.933, 26.807]", "[5.0, 26.807]"), "the bench magnet-beam allows"),
         (('"magnet-beam"', '"nosuch"'), "there is no such bench"),
@@ -314,6 +314,8 @@ def test_a_run_with_a_failed_point_exits_with_one(command, tmp_path):
     status, out, err = command("run plan.toml -o run.h5")
     assert status == 1
     assert "0 of 2 points accepted" in out
+    assert "2 of 2 points skipped: not settled (0.4 V, 0.8 V)" in out.splitlines()
+    assert "2 of 2 points skipped: not settled (0.4 V, 0.8 V)" in command("show run.h5")[1].splitlines()
     assert err.count("FAILED") == 2
     assert command("identify run.h5 -o model.h5")[0] == 1
     assert not (tmp_path / "model.h5").exists()

@@ -133,6 +133,8 @@ def take_over(t: TickArrays, segment: Record) -> None:
     law, loop, progress = t.law[0], t.loop[0], t.progress[0]
     if segment.drive == LOOP_DRIVE and loop.drive != LOOP_DRIVE:
         loop.taking_over = 1
+    if segment.drive == TONE and loop.drive == LOOP_DRIVE:
+        progress.omega = loop.omega  # from where the tone's ramp goes to its own frequency
     loop.drive = segment.drive
     if segment.amplitude_law == loop.amplitude_law:
         return
@@ -187,7 +189,7 @@ def hold_response(t: TickArrays, displacement: float) -> None:
         law.dt_s,
         law.smallest_v,
         law.largest_v,
-        loop.held_back == 1,
+        loop.behind,
     )
     if law.turns == 1:
         loop.turn = angle
@@ -244,7 +246,7 @@ def hold_force_through_response(t: TickArrays, level: float) -> None:
     """
     law, loop = t.law[0], t.loop[0]
     error = log_ratio(level, force_at_lag(t)) / force_slope(t)
-    if error < 0.0 or (loop.saturated == 0 and loop.held_back == 0):
+    if loop.behind >= 0 if error < 0.0 else (loop.saturated == 0 and loop.behind <= 0):
         loop.log_reference += law.reference_ki * law.dt_s * error
     hold_response(t, math.exp(loop.log_reference))
 
@@ -259,9 +261,11 @@ def demanded_amplitude(t: TickArrays, present: bool) -> float:
         if present:
             hold_response(t, level)
     elif law.force_loop == LINEAR:
-        loop.demanded_v, loop.force_integral = proportional_integral(
+        loop.demanded_v, integral = proportional_integral(
             level - controlled_size(t), loop.force_integral, law.k3, law.k4, law.dt_s, 0.0, 0.0, law.largest_v
         )
+        if (integral - loop.force_integral) * loop.behind <= 0.0:  # no further the way that the output cannot follow
+            loop.force_integral = integral
     elif law.force_loop == LOGARITHMIC:
         loop.demanded_v, _, loop.log_integral = log_proportional_integral(
             complex(log_ratio(level, controlled_size(t)), 0.0),
@@ -271,7 +275,7 @@ def demanded_amplitude(t: TickArrays, present: bool) -> float:
             law.dt_s,
             law.smallest_v,
             law.largest_v,
-            loop.held_back == 1,
+            loop.behind,
         )
     elif present:
         hold_force_through_response(t, level)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.layout import LOCK, LockState
+from controller.layout import LOCK, AmplitudeLaw, LockState
 from rig.safety.layout import EndReason, GuardMode
 from rig.safety.limits import guard_record
 from rig.sequencer.kernels import advance, judge_period
@@ -82,15 +82,16 @@ class Walk:
         self.progress["segments"] = len(segments)
         self.settling, self.lock, self.guard = np.zeros(1, SETTLING), np.zeros(1, LOCK), guard_record(True)
         self.lock["state"] = LockState.LOCKED
-        self.cycle, self.sample, self.levels = 0.0, 0, []
+        self.cycle, self.sample, self.levels, self.lags = 0.0, 0, [], []
 
-    def go(self, periods, per_period=50):
+    def go(self, periods, per_period=50, unreached=False):
         for _ in range(int(periods * per_period)):
             advance(
                 self.progress[0], self.table, self.outcomes, self.settling[0], RULE.build()[0], self.lock[0],
-                self.guard[0], self.cycle, self.sample, False,
+                self.guard[0], self.cycle, self.sample, unreached,
             )  # fmt: skip
             self.levels.append(float(self.progress["level"][0]))
+            self.lags.append(float(self.progress["lag"][0]))
             self.cycle += 1.0 / per_period
             self.sample += 1
         return self
@@ -113,6 +114,70 @@ def test_a_ramp_is_half_a_cosine_between_the_levels():
     expected = 1.0 + 2.0 * 0.5 * (1 - np.cos(np.pi * np.arange(ramp.size) / ramp.size))
     np.testing.assert_allclose(ramp[5:-5], expected[5:-5], atol=2.0 * np.pi / 500 * 3)
     assert max(np.abs(np.diff(walk.levels[60:]))) < 0.02
+
+
+def _held(level, periods, **keys):
+    return Segment(SegmentKind.HOLD, -1, level, periods, amplitude_law=AmplitudeLaw.RESPONSE, **keys)
+
+
+def _ramp(level, periods, point=-1, **keys):
+    return Segment(SegmentKind.RAMP, point, level, periods, amplitude_law=AmplitudeLaw.RESPONSE, **keys)
+
+
+def test_a_geometric_ramp_is_half_a_cosine_of_the_logarithm_and_never_leaves_its_ends():
+    walk = Walk(_held(1e-5, 1.0), _ramp(1e-3, 10.0, geometric=True)).go(12)
+    ramp = np.array(walk.levels[51:551])
+    expected = -5 + 2.0 * 0.5 * (1 - np.cos(np.pi * np.arange(ramp.size) / ramp.size))
+    np.testing.assert_allclose(np.log10(ramp), expected, atol=2e-2)
+    assert 1e-5 <= ramp.min() <= ramp.max() <= 1e-3
+
+
+def test_from_rest_a_geometric_ramp_is_a_plain_one():
+    walk = Walk(_ramp(2.0, 10.0, geometric=True)).go(10)
+    assert walk.levels[250] == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_wanted_lag_is_ramped_with_the_level_and_then_held():
+    start, end = math.radians(-150.0), math.radians(-30.0)
+    segments = (_held(1.0, 1.0, lag_deg=-150.0), _ramp(1.0, 10.0, lag_deg=-30.0), _held(1.0, 5.0, lag_deg=-30.0))
+    walk = Walk(*segments).go(15)
+    ramp = np.array(walk.lags[51:551])
+    expected = start + (end - start) * 0.5 * (1 - np.cos(np.pi * np.arange(ramp.size) / ramp.size))
+    np.testing.assert_allclose(ramp, expected, atol=0.02)
+    assert walk.lags[-1] == pytest.approx(end)
+
+
+def test_a_ramp_up_waits_while_its_level_is_not_reached_and_goes_on_where_it_was():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0)).go(6)
+    waiting = walk.levels[-1]
+    walk.go(15, unreached=True)
+    assert walk.levels[-1] == pytest.approx(waiting, abs=0.02)
+    walk.go(4.9)
+    assert waiting < walk.levels[-1] <= 3.0
+    walk.go(1)
+    assert walk.codes() == ["DONE", "DONE"]
+    assert walk.outcomes["periods"][1] == pytest.approx(25.0, abs=0.1)
+
+
+def test_a_ramp_up_that_waits_for_twenty_periods_is_out_of_reach_and_skips_its_point():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0, point=0), *_point(1, 2.0)).go(6).go(21, unreached=True)
+    assert walk.codes()[:3] == ["DONE", "UNREACHABLE", "RUNNING"]
+
+
+def test_a_ramp_down_from_a_level_that_was_not_reached_does_not_wait():
+    walk = Walk(_held(3.0, 1.0), _ramp(1.0, 10.0), _held(1.0, 5.0)).go(1).go(11, unreached=True)
+    assert walk.codes() == ["DONE", "DONE", "RUNNING"]
+    assert walk.levels[-1] == 1.0
+
+
+def test_a_frequency_that_stands_at_its_window_for_twenty_periods_fails_the_point():
+    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(12)
+    walk.settling["clamped_periods"] = 19
+    walk.go(1)
+    assert walk.codes()[1] == "RUNNING"
+    walk.settling["clamped_periods"] = 20
+    walk.go(1)
+    assert walk.codes()[:3] == ["DONE", "OUTSIDE_WINDOW", "SKIPPED"]
 
 
 def test_a_plan_that_settles_is_recorded_and_ends_the_run():
