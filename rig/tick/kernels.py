@@ -23,16 +23,9 @@ from rig.safety.kernels import (
 from rig.safety.layout import ARMED
 from rig.sequencer.kernels import advance, is_ramp
 from rig.sequencer.layout import LOOP_DRIVE, WAVEFORM
-from rig.tick.laws.kernels import (
-    add_to_period,
-    choose_frequency,
-    close_period,
-    controlled_size,
-    demanded_amplitude,
-    phase_error,
-    see_rest,
-    take_over,
-)
+from rig.tick.laws.amplitude.kernels import controlled_size, demanded_amplitude, take_over
+from rig.tick.laws.frequency.kernels import choose_frequency, phase_error, see_rest
+from rig.tick.laws.periods.kernels import add_to_period, close_period
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
 from vibrolock.compiled import Record, kernel
 

@@ -1,25 +1,20 @@
-"""Compiled laws of the tick: phase error, frequency, amplitude, and the change from one law to another without a bump."""
+"""Compiled amplitude laws: what is held, how, and how one law takes over from another without a bump."""
 
 import math
 
 from controller.amplitude.kernels import log_proportional_integral, log_ratio
-from controller.demodulation.kernels import phase_lag, root_mean_square
-from controller.kernels import TWO_PI, frequency_error, proportional_integral, size, wrap
+from controller.demodulation.kernels import root_mean_square
+from controller.kernels import proportional_integral, size, wrap
 from controller.layout import (
     ADAPTIVE,
     FORCE,
     FORCE_RMS,
-    FREQUENCY_ERROR,
     LINEAR,
-    LOCKED,
     LOGARITHMIC,
     RESPONSE,
-    SIGN,
     VOLTAGE,
 )
-from controller.lock.kernels import next_lock_state
-from rig.sequencer.kernels import judge_period
-from rig.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
+from rig.sequencer.layout import LOOP_DRIVE, TONE
 from rig.tick.layout import TickArrays
 from vibrolock.compiled import Record, kernel
 
@@ -31,46 +26,6 @@ SMALLEST_M = 1e-15  # no displacement is smaller than an atom's nucleus: a floor
 
 
 @kernel
-def phase_error(t: TickArrays) -> float:
-    """Wanted minus measured phase lag in rad, by the detector of the plan, with the channels' skew taken out."""
-    law, loop = t.law[0], t.loop[0]
-    skew = t.inputs[loop.force_channel].skew_samples - t.inputs[loop.drive_channel].skew_samples
-    lag_of_skew = loop.omega * skew * law.dt_s
-    if law.detector == SIGN:
-        return float(0.5 * math.pi * loop.sign_mean - lag_of_skew)
-    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
-    return wrap(t.progress[0].lag - phase_lag(force, drive) - lag_of_skew)
-
-
-@kernel
-def see_rest(t: TickArrays) -> None:
-    """The force that the vibration of the moment will need once it keeps still: what changes it is taken out.
-
-    A mode whose displacement X grows and turns slowly takes ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``; its last
-    term, by the acceleration's amplitude ``2 i/(W phi_d^2) dA/dt``, is off at rest. Force and motion pass one more low-pass
-    for the derivative. Without ``rest_gain`` force and lag are those measured.
-    """
-    law, loop = t.law[0], t.loop[0]
-    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
-    if law.rest_gain == 0.0 or loop.drive != LOOP_DRIVE:
-        loop.late_force, loop.late_drive = force, drive
-        loop.rest_force, loop.rest_response, loop.rest_error = loop.force_size, loop.response_size, loop.error
-        return
-    skew = t.inputs[loop.force_channel].skew_samples - t.inputs[loop.drive_channel].skew_samples
-    if skew != 0.0:
-        angle = loop.omega * skew * law.dt_s
-        drive *= complex(math.cos(angle), math.sin(angle))
-    loop.late_force += law.rest_gain * (force - loop.late_force)
-    step = law.rest_gain * (drive - loop.late_drive)
-    loop.late_drive += step
-    rest = loop.late_force + step * complex(
-        0.0, 2.0 * law.rest_share / (loop.omega * law.mode_shape_squared * law.dt_s)
-    )
-    loop.rest_force, loop.rest_response = size(rest), size(loop.late_drive)
-    loop.rest_error = wrap(t.progress[0].lag - phase_lag(rest, loop.late_drive))
-
-
-@kernel
 def controlled_size(t: TickArrays) -> float:
     """What the amplitude loop of the moment holds: a force (N), its RMS (N) or a displacement (m); 0 without a loop."""
     law, loop = t.law[0], t.loop[0]
@@ -79,52 +34,6 @@ def controlled_size(t: TickArrays) -> float:
     if loop.amplitude_law == FORCE_RMS:
         return root_mean_square(t.filters[0]) if law.detector == ADAPTIVE else math.sqrt(loop.force_square)
     return float(loop.displacement) if loop.amplitude_law == RESPONSE else 0.0
-
-
-@kernel
-def add_to_period(t: TickArrays) -> None:
-    """Sums for the means of the period under way."""
-    loop = t.loop[0]
-    loop.sum_error += loop.error
-    loop.sum_response += loop.response_size
-    loop.sum_force += loop.force_size
-    loop.sum_controlled += controlled_size(t)
-    loop.sum_samples += 1
-
-
-@kernel
-def close_period(t: TickArrays, present: bool) -> None:
-    """An oscillator period has ended at the inputs: lock state and settle rule take its means."""
-    loop = t.loop[0]
-    n = loop.sum_samples
-    if n > 0:
-        loop.mean_error = loop.sum_error / n
-    if n > 0 and loop.drive != WAVEFORM:
-        error = loop.sum_error / n if present else math.nan
-        open_loop = loop.drive == TONE
-        if not open_loop:
-            next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
-        # Where a loop holds the level, its own error says whether the output may; its ripple may be cut all the time.
-        behind = loop.held_back == 1 and loop.amplitude_law == VOLTAGE
-        locked = (open_loop or t.lock[0].state == LOCKED) and not behind
-        judge_period(
-            t.settling[0],
-            t.rule[0],
-            locked,
-            error,
-            loop.sum_response / n,
-            loop.sum_force / n,
-            t.progress[0].level if loop.amplitude_law != VOLTAGE else 0.0,
-            loop.sum_controlled / n,
-            loop.saturated == 1,
-            loop.clamped == 1,
-            open_loop or loop.amplitude_law == RESPONSE,
-        )
-    loop.sum_error = 0.0
-    loop.sum_response = 0.0
-    loop.sum_force = 0.0
-    loop.sum_controlled = 0.0
-    loop.sum_samples = 0
 
 
 @kernel
@@ -281,32 +190,3 @@ def demanded_amplitude(t: TickArrays, present: bool) -> float:
         hold_force_through_response(t, level)
     loop.saturated = 1 if loop.demanded_v >= law.largest_v else 0
     return float(loop.demanded_v)
-
-
-@kernel
-def choose_frequency(t: TickArrays, present: bool) -> None:
-    """Frequency law: that of the loop, or the plan's; notes a loop that stands at an end of its window."""
-    law, loop = t.law[0], t.loop[0]
-    if loop.drive == WAVEFORM:
-        loop.omega = TWO_PI / (t.waveforms.shape[1] * law.dt_s)
-    elif loop.drive == TONE:
-        loop.omega = t.progress[0].omega
-    elif present:
-        error = loop.mean_error if law.period_mean == 1 else loop.error
-        if law.frequency_law == FREQUENCY_ERROR:
-            ratio = law.mode_shape_squared * loop.rest_force / loop.rest_response
-            error = frequency_error(loop.rest_error, ratio, loop.omega, t.progress[0].lag)
-        if loop.taking_over == 1:
-            loop.taking_over = 0
-            loop.phase_integral = loop.omega - law.centre_rad_s - law.kp * error
-        loop.omega, loop.phase_integral = proportional_integral(
-            error,
-            loop.phase_integral,
-            law.kp,
-            law.ki,
-            law.dt_s,
-            law.centre_rad_s,
-            law.lowest_rad_s,
-            law.highest_rad_s,
-        )
-        loop.clamped = 1 if loop.omega == law.lowest_rad_s or loop.omega == law.highest_rad_s else 0

@@ -1,0 +1,1 @@
+"""The amplitude laws within the tick."""

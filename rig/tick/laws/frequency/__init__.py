@@ -1,0 +1,1 @@
+"""The frequency law within the tick."""

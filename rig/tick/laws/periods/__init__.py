@@ -1,0 +1,1 @@
+"""The periods of the oscillator within the tick."""

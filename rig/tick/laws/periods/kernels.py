@@ -1,0 +1,61 @@
+"""Compiled means of every period, which lock state and settle rule go by."""
+
+import math
+
+from controller.layout import (
+    LOCKED,
+    RESPONSE,
+    VOLTAGE,
+)
+from controller.lock.kernels import next_lock_state
+from rig.sequencer.kernels import judge_period
+from rig.sequencer.layout import TONE, WAVEFORM
+from rig.tick.laws.amplitude.kernels import controlled_size
+from rig.tick.layout import TickArrays
+from vibrolock.compiled import kernel
+
+
+@kernel
+def add_to_period(t: TickArrays) -> None:
+    """Sums for the means of the period under way."""
+    loop = t.loop[0]
+    loop.sum_error += loop.error
+    loop.sum_response += loop.response_size
+    loop.sum_force += loop.force_size
+    loop.sum_controlled += controlled_size(t)
+    loop.sum_samples += 1
+
+
+@kernel
+def close_period(t: TickArrays, present: bool) -> None:
+    """An oscillator period has ended at the inputs: lock state and settle rule take its means."""
+    loop = t.loop[0]
+    n = loop.sum_samples
+    if n > 0:
+        loop.mean_error = loop.sum_error / n
+    if n > 0 and loop.drive != WAVEFORM:
+        error = loop.sum_error / n if present else math.nan
+        open_loop = loop.drive == TONE
+        if not open_loop:
+            next_lock_state(t.lock[0], t.thresholds[0], present, loop.held == 1, error)
+        # Where a loop holds the level, its own error says whether the output may; its ripple may be cut all the time.
+        behind = loop.held_back == 1 and loop.amplitude_law == VOLTAGE
+        locked = (open_loop or t.lock[0].state == LOCKED) and not behind
+        judge_period(
+            t.settling[0],
+            t.rule[0],
+            locked,
+            error,
+            loop.sum_response / n,
+            loop.sum_force / n,
+            t.progress[0].level if loop.amplitude_law != VOLTAGE else 0.0,
+            loop.sum_controlled / n,
+            loop.saturated == 1,
+            loop.clamped == 1,
+            open_loop or loop.amplitude_law == RESPONSE,
+        )
+    loop.sum_error = 0.0
+    loop.sum_response = 0.0
+    loop.sum_force = 0.0
+    loop.sum_controlled = 0.0
+    loop.sum_samples = 0
