@@ -68,7 +68,7 @@ LOOP = np.dtype(
 """State of oscillator and laws (one record). ``turn``: angle of the complex command U; ``displacement``: amplitude of the
 drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at;
 ``late_`` amplitudes that passed one more low-pass, ``rest_`` sizes and phase error as they will be once the response keeps
-still (`rig.tick.laws.kernels.see_rest`)."""
+still (`rig.tick.laws.frequency.kernels.see_rest`)."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """What the tick has sent out and the inputs have not yet seen; a ring."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller import AmplitudeLaw, PhaseLockedLoop
-from rig.tick.laws.kernels import force_slope, response_proportional
+from rig.tick.laws.amplitude.kernels import force_slope, response_proportional
 from tests.rig.rigs import bench_with, tick_for
 
 POLE, GAIN = complex(-6.0, -24.0), complex(200.0, 30.0)

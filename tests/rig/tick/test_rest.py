@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from controller import AmplitudeLaw, PhaseLockedLoop
-from rig.tick.laws.kernels import see_rest
+from rig.tick.laws.frequency.kernels import see_rest
 from tests.rig.rigs import bench_with, tick_for
 
 W, ZETA, SHAPE = 2 * math.pi * 24.37, 0.004, 0.9
