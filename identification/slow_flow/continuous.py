@@ -1,0 +1,218 @@
+"""Continuous backbone: the level is ramped up and down without ever waiting, and every instant is a measurement.
+
+Joints with memory do not know a state by its amplitude alone: while the level rises they dissipate otherwise than while it
+falls. To first order in the rate the two deviations are opposite, so that their mean at equal amplitude is that of the
+settled vibration. Half of what lies between the two, as far as it stands out of the noise, is given as systematic error.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.backbones import Backbone
+from identification.errors import IdentificationError
+from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
+from identification.nonlinear.phase_resonance import nonlinear_mode
+from identification.slow_flow.fits import LocalFit, noise_variances
+from identification.slow_flow.resonance import Amplitudes, amplitudes_at, fit_at, resonant_vibration
+from identification.slow_flow.slow_flow import SlowFlow
+from identification.validation import finite_array
+
+__all__ = ["ContinuousBackbone", "continuous_backbone"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_DEGREE = 2
+_FEWEST_INSTANTS = 8
+_WIDEN = 1.25
+_WIDEST = 1.0  # in the logarithm of the amplitude
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ContinuousBackbone:
+    """Modal properties over the amplitude, from ramps up and down.
+
+    Parameters
+    ----------
+    backbone
+        The settled vibrations at phase resonance that have the mean properties, one per level: a backbone like any other.
+    amplitude_m
+        float[n], levels: peak of the fundamental of the displacement at the drive point.
+    stiffness, damping_1_s
+        float[2, n], k (1/s^2) and c (1/s) found on the way up and on the way down.
+    stiffness_std, damping_std_1_s
+        float[2, n], their random standard errors.
+    periods
+        Periods of both ramps together.
+    """
+
+    backbone: Backbone
+    amplitude_m: Float
+    stiffness: Float
+    damping_1_s: Float
+    stiffness_std: Float
+    damping_std_1_s: Float
+    periods: float
+
+    @property
+    def modal_frequency_hz(self) -> Float:
+        """float[2, n]: undamped modal frequency, up and down."""
+        return np.asarray(np.sqrt(self.stiffness) / (2.0 * np.pi))
+
+    @property
+    def damping_ratio(self) -> Float:
+        """float[2, n]: damping ratio, up and down."""
+        return np.asarray(self.damping_1_s / (2.0 * np.sqrt(self.stiffness)))
+
+    def nonlinear_mode(self, **options: Any) -> NonlinearMode:
+        """The nonlinear mode; ``options`` are those of `identification.nonlinear_mode`.
+
+        What lies between up and down is counted as a systematic error of modal frequency, damping and force.
+        """
+        mode = nonlinear_mode(self.backbone, **options)
+        frequency = _beyond_noise(self.stiffness, self.stiffness_std) / (8.0 * np.pi**2 * mode.modal_frequency_hz)
+        relative = _beyond_noise(self.damping_1_s, self.damping_std_1_s) / np.mean(self.damping_1_s, axis=0)
+        systematic = {
+            "modal_frequency_hz": frequency,
+            "damping_ratio": np.abs(relative * mode.damping_ratio),
+            "damping_ratio_total_power": np.abs(relative * mode.damping_ratio),
+            "force_n": np.abs(relative * mode.force_n),
+        }
+        return _with_systematic(replace(mode, source="continuous backbone"), systematic)
+
+
+def continuous_backbone(
+    up: SlowFlow,
+    down: SlowFlow,
+    *,
+    levels_m: ArrayLike | None = None,
+    number: int = 15,
+    bandwidth: float = 0.15,
+    specimen: str = "",
+) -> ContinuousBackbone:
+    """Backbone from a ramp of the level up and one down, in any order.
+
+    Parameters
+    ----------
+    up, down
+        Slow flows of the two ramps: parts of one (`SlowFlow.between`), or of two records.
+    levels_m
+        Amplitudes of the drive point's displacement, m; if None, ``number`` of them in equal ratios over what both
+        ramps cover.
+    bandwidth
+        Half width in ln(amplitude) of what is taken together at a level (parabolic weights, properties quadratic in
+        ln(amplitude)); wider where a ramp has fewer than eight instants there.
+    specimen
+        Name of what was tested.
+
+    Raises
+    ------
+    IdentificationError
+        On channels or mode shapes that differ, ramps without common amplitudes, levels beyond them.
+    """
+    if up.channels != down.channels or up.drive_mode_shape != down.drive_mode_shape:
+        raise IdentificationError("up, down: channels or drive_mode_shape differ")
+    levels = _levels(up, down, levels_m, number)
+    ways = [_along(flow, levels, bandwidth) for flow in (up, down)]
+    stiffness, damping = (np.array([[getattr(fit, name) for fit in way.fits] for way in ways]) for name in _PROPERTIES)
+    errors = np.array([way.errors for way in ways])
+    points = []
+    for n, level in enumerate(levels):
+        both = [way.amplitudes[n] for way in ways]
+        mean = Amplitudes(0.5 * (both[0].values + both[1].values), 0.5 * np.hypot(both[0].std, both[1].std))
+        random = 0.5 * np.hypot(errors[0, n], errors[1, n])
+        points.append(
+            resonant_vibration(
+                up,
+                float(level),
+                float(np.mean(stiffness[:, n])),
+                float(np.mean(damping[:, n])),
+                (float(random[0]), float(random[1])),
+                mean,
+                sum(way.periods[n] for way in ways),
+            )
+        )
+    return ContinuousBackbone(
+        backbone=Backbone(tuple(points), specimen, up.drive_mode_shape),
+        amplitude_m=levels,
+        stiffness=stiffness,
+        damping_1_s=damping,
+        stiffness_std=errors[..., 0],
+        damping_std_1_s=errors[..., 1],
+        periods=float(np.ptp(up.phase_periods) + np.ptp(down.phase_periods)),
+    )
+
+
+_PROPERTIES = ("stiffness", "damping")
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """One ramp: a fit, its standard errors, amplitudes, and the periods taken, per level."""
+
+    fits: list[LocalFit]
+    errors: Float
+    amplitudes: list[Amplitudes]
+    periods: list[float]
+
+
+def _levels(up: SlowFlow, down: SlowFlow, levels_m: ArrayLike | None, number: int) -> Float:
+    low = max(float(flow.amplitude_m.min()) for flow in (up, down))
+    high = min(float(flow.amplitude_m.max()) for flow in (up, down))
+    if not low < high:
+        raise IdentificationError("up, down: the ramps have no amplitudes in common")
+    if levels_m is None:
+        if number < 1:
+            raise IdentificationError(f"number: is {number}, needs at least 1")
+        return np.geomspace(low, high, number)
+    levels: Float = finite_array("levels_m", levels_m, np.float64, 1)
+    if not levels.size or levels.min() < low or levels.max() > high:
+        raise IdentificationError(f"levels_m: both ramps cover {low:.4g} to {high:.4g} m, {levels_m} was asked for")
+    return levels
+
+
+def _along(flow: SlowFlow, levels: Float, bandwidth: float) -> _Way:
+    """Fits at every level of one ramp."""
+    size = np.log(flow.amplitude_m)
+    fits, found, periods = [], [], []
+    for level in np.log(levels):
+        width = bandwidth
+        while np.count_nonzero(np.abs(size - level) < width) < _FEWEST_INSTANTS:
+            width *= _WIDEN
+            if width > _WIDEST:
+                raise IdentificationError(
+                    f"levels_m: fewer than {_FEWEST_INSTANTS} instants near {np.exp(level):.4g} m; ramp more slowly"
+                )
+        near = np.abs(size - level) < width
+        part = flow.select(near)
+        place = (size[near] - level) / width
+        weight = 1.0 - place**2
+        fits.append(fit_at(part, place, weight, _DEGREE))
+        found.append(amplitudes_at(part, place, weight, _DEGREE))
+        periods.append(float(np.count_nonzero(near)) * float(np.median(np.diff(flow.phase_periods))))
+    errors = [fit.standard_errors(noise_variances(fits[max(0, n - 2) : n + 3])) for n, fit in enumerate(fits)]
+    return _Way(fits, np.array(errors), found, periods)
+
+
+def _beyond_noise(values: Float, std: Float) -> Float:
+    """float[n]: half the difference of up and down, less what noise makes of it."""
+    half = 0.5 * (values[0] - values[1])
+    return np.asarray(np.sqrt(np.maximum(half**2 - 0.25 * np.sum(std**2, axis=0), 0.0)))
+
+
+def _with_systematic(mode: NonlinearMode, further: dict[str, Float]) -> NonlinearMode:
+    """The mode with further systematic standard errors, independent of those it has."""
+    changes: dict[str, Float] = {}
+    systematic, intervals = mode.systematic_std.copy(), mode.interval_95.copy()
+    for name, std in further.items():
+        column = QUANTITIES.index(name)
+        old = np.asarray(getattr(mode, STANDARD_ERRORS[name]))
+        changes[STANDARD_ERRORS[name]] = np.hypot(old, std)
+        systematic[:, column] = np.hypot(systematic[:, column], std)
+        middle = np.asarray(getattr(mode, name))[:, None]
+        side = np.array([-1.0, 1.0]) * np.hypot(intervals[:, column] - middle, 1.96 * std[:, None])
+        intervals[:, column] = middle + side
+    return replace(mode, **changes, systematic_std=systematic, interval_95=intervals)

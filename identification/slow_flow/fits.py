@@ -1,0 +1,97 @@
+"""Real least squares for stiffness and damping, and what noise does to them.
+
+At every instant ``g = k + c b`` with ``g = (phi_d^2 F - A) / X`` and ``b = V / X``: complex data, real unknowns, each a
+polynomial of a place (time, or level) that is zero where they are wanted.
+
+Noise stands in ``e = g X``, alike in its real and imaginary part and at all instants. It has two parts, for white noise
+of two sensors: that of the force comes as the window of the demodulation lets it; that of the motion, which is in A, V and
+X alike, cancels but for its rate of change. Their correlations over time are the window's autocorrelation and minus its
+second derivative. The second averages out much faster, so that one must know how much there is of each: the residuals'
+sum of squares, plain and smoothed, tells (moments equated to their expectations).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.slow_flow.signals import window_correlations
+
+__all__ = ["LocalFit", "local_fit", "noise_variances"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LocalFit:
+    """Stiffness k (1/s^2) and damping c (1/s) where the place is zero.
+
+    ``spread`` float[2, 2]: variance of k and c per unit variance of either part of the noise; ``moments`` float[2] of the
+    residuals and ``expected`` float[2, 2], what either part of the noise contributes to them.
+    """
+
+    stiffness: float
+    damping: float
+    spread: Float
+    moments: Float
+    expected: Float
+
+    def standard_errors(self, variances: Float) -> tuple[float, float]:
+        """Of k and c, for noise of these two variances."""
+        k, c = np.sqrt(self.spread @ variances)
+        return float(k), float(c)
+
+
+def local_fit(
+    stiffness: Complex, rate: Complex, size: Float, periods: Float, place: Float, weight: Float, degree: int = 1
+) -> LocalFit:
+    """Least squares over n instants.
+
+    Parameters
+    ----------
+    stiffness, rate, size
+        complex[n], complex[n], float[n]: g (1/s^2), b (1/s) and ``|X|``.
+    periods
+        float[n], time in periods, for the overlap of the windows.
+    place, weight
+        float[n], what k and c are polynomials of, and weights of the instants.
+    degree
+        Of these polynomials.
+    """
+    scale = size * np.sqrt(weight)
+    powers = place[:, None] ** np.arange(degree + 1)
+    columns = np.hstack([powers, powers * rate[:, None]]) * scale[:, None]
+    design = np.vstack([columns.real, columns.imag])
+    values = np.r_[(stiffness * scale).real, (stiffness * scale).imag]
+    inverse = np.linalg.pinv(design)
+    solution = inverse @ values
+    residual = values - design @ solution
+    wanted = inverse[[0, degree + 1]]
+    correlations = [
+        np.kron(np.eye(2), part * np.sqrt(np.outer(weight, weight)))
+        for part in window_correlations(periods[:, None] - periods[None, :])
+    ]
+    left = [noise - design @ (inverse @ noise) for noise in correlations]
+    left = [part - (part @ inverse.T) @ design.T for part in left]
+    return LocalFit(
+        stiffness=float(solution[0]),
+        damping=float(solution[degree + 1]),
+        spread=np.column_stack([np.einsum("in,nm,im->i", wanted, noise, wanted) for noise in correlations]),
+        moments=np.array([residual @ residual, residual @ correlations[0] @ residual]),
+        expected=np.array([[np.trace(part) for part in left], [np.sum(correlations[0] * part) for part in left]]),
+    )
+
+
+def noise_variances(fits: Sequence[LocalFit]) -> Float:
+    """float[2]: variances of the two parts of the noise, common to ``fits``; neither below zero."""
+    moments = np.sum([fit.moments for fit in fits], axis=0)
+    expected = np.sum([fit.expected for fit in fits], axis=0)
+    if abs(np.linalg.det(expected)) > 1e-9 * expected[0, 0] * expected[1, 1]:
+        both = np.linalg.solve(expected, moments)
+        if both.min() >= 0.0:
+            return np.asarray(both)
+        if both[0] < 0.0:
+            return np.array([0.0, moments[0] / expected[0, 1]])
+    return np.array([moments[0] / expected[0, 0], 0.0])

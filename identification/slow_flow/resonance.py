@@ -1,0 +1,105 @@
+"""The settled vibration at phase resonance that has the properties found in a slow flow.
+
+Stiffness k and damping c at an amplitude X say how the mode would vibrate there if it were held at phase resonance: at
+``w = sqrt(k)``, under the force ``i c w X / phi_d^2``. Written so, an estimate from a moving vibration is a point like any
+other for `identification.nonlinear_mode`, which finds ``w`` and ``z = c / (2 w)`` in it again.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER, find_role
+from identification.errors import IdentificationError
+from identification.measurements import PeriodicVibration
+from identification.slow_flow.fits import LocalFit, local_fit
+from identification.slow_flow.signals import window_correlations
+from identification.slow_flow.slow_flow import SlowFlow
+
+__all__ = ["Amplitudes", "amplitudes_at", "fit_at", "resonant_vibration"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Amplitudes:
+    """Harmonics complex[n_channels, H + 1] of all channels for a motion of phase zero, and their standard errors.
+
+    The fundamentals of motions are displacements over that of the drive point.
+    """
+
+    values: Complex
+    std: Float
+
+
+def fit_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> LocalFit:
+    """Stiffness and damping of a slow flow where ``place`` (float[n]) is zero."""
+    return local_fit(flow.dynamic_stiffness, flow.rate_1_s, flow.amplitude_m, flow.phase_periods, place, weight, degree)
+
+
+def amplitudes_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> Amplitudes:
+    """Harmonics where ``place`` is zero, by least squares over the instants; turned so that the drive point has phase zero."""
+    orders = np.arange(flow.harmonics.shape[2])
+    series = flow.harmonics * np.exp(-1j * np.outer(np.angle(flow.drive_m), orders))
+    for row, channel in enumerate(flow.channels):
+        if channel.role in ("drive", "response"):
+            series[row, :, 1] = flow.harmonics[row, :, 1] / (
+                flow.drive_m * flow.rate_1_s ** MOTION_ORDER[channel.motion]
+            )
+    root = np.sqrt(weight)
+    design = place[:, None] ** np.arange(degree + 1) * root[:, None]
+    inverse = np.linalg.pinv(design)
+    values = (series * root[:, None]).transpose(1, 0, 2).reshape(place.size, -1)
+    solution = inverse @ values
+    residual = np.sum(np.abs(values - design @ solution) ** 2, axis=0)
+    noise = window_correlations(flow.phase_periods[:, None] - flow.phase_periods[None, :])[0] * np.outer(root, root)
+    left = noise - design @ (inverse @ noise)
+    expected = 2.0 * (np.trace(left) - np.sum((left @ inverse.T) * design))
+    spread = inverse[0] @ noise @ inverse[0]
+    shape = (len(flow.channels), orders.size)
+    return Amplitudes(solution[0].reshape(shape), np.sqrt(residual * spread / expected).reshape(shape))
+
+
+def resonant_vibration(
+    flow: SlowFlow,
+    amplitude_m: float,
+    stiffness: float,
+    damping_1_s: float,
+    errors: tuple[float, float],
+    found: Amplitudes,
+    periods: float,
+    warnings: tuple[str, ...] = (),
+) -> PeriodicVibration:
+    """The settled vibration at phase resonance of ``amplitude_m`` with this stiffness (1/s^2) and damping (1/s).
+
+    ``errors`` are the standard errors of stiffness and damping; ``found`` gives harmonics and the other channels.
+    """
+    if not stiffness > 0.0:
+        raise IdentificationError(
+            f"samples: stiffness {stiffness:g} 1/s^2 at an amplitude of {amplitude_m:g} m gives no real modal frequency; "
+            "check the polarity of force and drive channel, and drive_mode_shape"
+        )
+    omega = float(np.sqrt(stiffness))
+    harmonics, std = found.values.copy(), found.std.copy()
+    for row, channel in enumerate(flow.channels):
+        if channel.role in ("drive", "response"):
+            to_unit = (1j * omega) ** MOTION_ORDER[channel.motion] * amplitude_m
+            harmonics[row, 1] *= to_unit
+            std[row, 1] *= abs(to_unit)
+    force, drive = find_role(flow.channels, "force"), find_role(flow.channels, "drive")
+    per_stiffness = amplitude_m / flow.drive_mode_shape**2
+    harmonics[force, 1] = 1j * damping_1_s * omega * per_stiffness
+    std[force, 1] = per_stiffness * float(np.hypot(errors[0], omega * errors[1])) / np.sqrt(2.0)
+    # Between its own displacement and itself the drive channel has no error; what it has goes with k and c.
+    harmonics[drive, 1] = (1j * omega) ** MOTION_ORDER[flow.channels[drive].motion] * amplitude_m
+    return PeriodicVibration(
+        channels=flow.channels,
+        frequency_hz=omega / (2.0 * np.pi),
+        harmonics=harmonics,
+        periods=max(1, int(periods + 1e-6)),
+        residual_rms=std[:, 1],
+        harmonics_std=std,
+        warnings=warnings,
+    )

@@ -1,0 +1,105 @@
+"""A point of a backbone from few periods, the approach included, whether or not it had settled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.measurements import PeriodicVibration
+from identification.slow_flow.resonance import amplitudes_at, fit_at, resonant_vibration
+from identification.slow_flow.slow_flow import SlowFlow
+
+__all__ = ["ShortPoint", "short_point"]
+
+_FEWEST_PERIODS = 2.0
+_STEADY = 0.1  # change of the amplitude below which properties are taken to change in proportion to time
+_LARGEST_CHANGE = 0.5
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ShortPoint:
+    """One point, brought to phase resonance.
+
+    Parameters
+    ----------
+    vibration
+        The settled vibration at phase resonance with the properties found; points of a `Backbone` are made of it.
+    modal_frequency_hz, modal_frequency_std_hz, damping_ratio, damping_ratio_std
+        What was found, with standard errors.
+    phase_lag_deg
+        Lag of the displacement behind the force as it was, on the average; it has been corrected for.
+    growth_1_s
+        Relative rate at which the amplitude still changed, on the average; likewise.
+    force_n
+        Peak of the fundamental of the force as it was, on the average.
+    periods
+        Periods between the first and the last instant used.
+    """
+
+    vibration: PeriodicVibration
+    modal_frequency_hz: float
+    modal_frequency_std_hz: float
+    damping_ratio: float
+    damping_ratio_std: float
+    phase_lag_deg: float
+    growth_1_s: float
+    force_n: float
+    periods: float
+
+
+def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float | None = None) -> ShortPoint:
+    """Modal properties at the amplitude that the vibration had from ``start_s`` to ``stop_s``.
+
+    Parameters
+    ----------
+    flow
+        From the whole record, the way to the point included: velocity and displacement need the room.
+    start_s, stop_s
+        Where the point begins and ends, seconds from the first sample on; all of the flow if None. Every instant also
+        stands for one and a half periods before and after it.
+
+    Returns
+    -------
+    ShortPoint
+        At the mean amplitude of this part.
+
+    Raises
+    ------
+    IdentificationError
+        On fewer than two periods, an amplitude that changes by more than half, a stiffness or damping that is none.
+    """
+    part = flow.between(flow.time_s[0] if start_s is None else start_s, flow.time_s[-1] if stop_s is None else stop_s)
+    periods = float(part.phase_periods[-1] - part.phase_periods[0])
+    if periods < _FEWEST_PERIODS:
+        raise IdentificationError(
+            f"start_s, stop_s: {periods:.2f} periods between the first and the last instant, needs {_FEWEST_PERIODS:g}"
+        )
+    level = np.log(part.amplitude_m)
+    change = float(np.ptp(level))
+    if change > _LARGEST_CHANGE:
+        raise IdentificationError(
+            f"start_s, stop_s: the amplitude changes by {100.0 * change:.0f} %, allowed is {100.0 * _LARGEST_CHANGE:g} %; "
+            "begin the point later"
+        )
+    centre = float(np.mean(level))
+    middle = part.phase_periods - np.mean(part.phase_periods)
+    place = (level - centre) / change if change > _STEADY else middle / periods
+    weight = np.ones(place.size)
+    fit = fit_at(part, place, weight, 1)
+    errors = fit.standard_errors(np.mean(part.noise, axis=0))
+    size = float(np.exp(centre))
+    vibration = resonant_vibration(
+        part, size, fit.stiffness, fit.damping, errors, amplitudes_at(part, place, weight, 1), periods
+    )
+    omega = float(np.sqrt(fit.stiffness))
+    return ShortPoint(
+        vibration=vibration,
+        modal_frequency_hz=omega / (2.0 * np.pi),
+        modal_frequency_std_hz=errors[0] / (4.0 * np.pi * omega),
+        damping_ratio=fit.damping / (2.0 * omega),
+        damping_ratio_std=errors[1] / (2.0 * omega),
+        phase_lag_deg=float(np.degrees(np.angle(np.mean(part.force[:, 1] * np.conj(part.drive_m))))),
+        growth_1_s=float(np.mean(part.growth_1_s)),
+        force_n=float(np.mean(part.force_n)),
+        periods=periods,
+    )

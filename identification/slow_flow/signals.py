@@ -1,0 +1,100 @@
+"""From a record to slowly varying amplitudes that keep a linear equation of motion.
+
+Any linear filter that force, acceleration, velocity and displacement share keeps ``phi_d^2 F = a + c v + k x``. Two are
+applied here: a zero-phase high-pass below the fundamental, without which velocity and displacement could not be had from
+an acceleration, and the window of the demodulation. Both run over the whole record; slices are taken afterwards.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["WINDOW_PERIODS", "amplitudes", "derivatives", "window_correlations"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+WINDOW_PERIODS = 3.0
+"""Length of the Blackman window: its zeros lie on all other multiples of the fundamental's frequency, the mean included."""
+
+_STOP, _PASS = 0.25, 0.6  # edges of the high-pass over the fundamental frequency
+_END_FIT_PERIODS = 3.0
+_END_PERIODS = 12.0  # the filter rings for about 1 / (_PASS - _STOP) periods
+_END_HARMONICS = 3
+
+
+def derivatives(theta: Float, data: Float, rate_hz: float, delay_s: Float, orders: tuple[int, ...]) -> Float:
+    """float[n_signals, n]: every signal differentiated ``orders[i]`` times (integrated where negative), its delay taken out.
+
+    ``data`` float[n_signals, n]; ``delay_s`` float[n_signals]. All pass the same high-pass. The ends are led to zero by the
+    harmonics that stand there, fading over some periods, so that nothing rings into the record.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+
+    step = float(theta[-1] - theta[0]) / (theta.size - 1)
+    fade = int(_END_PERIODS * 2.0 * np.pi / step)
+    padded = np.zeros((data.shape[0], next_fast_len(theta.size + 2 * fade, real=True)))
+    padded[:, fade : fade + theta.size] = data
+    padded[:, :fade] = _ending(theta[::-1], data[:, ::-1], fade)[:, ::-1]
+    padded[:, fade + theta.size : 2 * fade + theta.size] = _ending(theta, data, fade)
+    omega = 2.0 * np.pi * rfftfreq(padded.shape[1], 1.0 / rate_hz)
+    place = np.clip((omega / (step * rate_hz) - _STOP) / (_PASS - _STOP), 0.0, 1.0)
+    high_pass = np.sin(0.5 * np.pi * place) ** 2
+    rotation = 1j * np.where(omega > 0.0, omega, 1.0)
+    spectra = rfft(padded, axis=1)
+    for row, order in enumerate(orders):
+        spectra[row] *= high_pass * rotation**order * np.exp(1j * omega * delay_s[row])
+    return np.asarray(irfft(spectra, padded.shape[1], axis=1)[:, fade : fade + theta.size])
+
+
+def _ending(theta: Float, data: Float, length: int) -> Float:
+    """float[n_signals, length]: harmonics of the last few periods going on beyond the record, faded out by half a cosine."""
+    last = np.abs(theta - theta[-1]) <= 2.0 * np.pi * _END_FIT_PERIODS
+    orders = np.arange(_END_HARMONICS + 1)
+
+    def columns(phase: Float) -> Float:
+        turns = np.outer(phase, orders)
+        return np.hstack([np.cos(turns), np.sin(turns[:, 1:])])
+
+    step = (theta[last][-1] - theta[last][0]) / max(1, int(last.sum()) - 1)
+    further = theta[-1] + step * np.arange(1, length + 1)
+    found = np.linalg.lstsq(columns(theta[last]), data[:, last].T, rcond=None)[0]
+    return np.asarray((columns(further) @ found).T * 0.5 * (1.0 + np.cos(np.pi * np.arange(1, length + 1) / length)))
+
+
+def amplitudes(theta: Float, data: Float, at: Float, harmonics: int) -> Complex:
+    """complex[n_signals, len(at), H + 1]: harmonics around the phases ``at``, weighted by a Blackman window on the phase."""
+    half = np.pi * WINDOW_PERIODS
+    weight = np.gradient(theta)
+    rotations = np.exp(-1j * np.outer(np.arange(harmonics + 1), theta))
+    first, end = np.searchsorted(theta, at - half), np.searchsorted(theta, at + half)
+    factor = np.full(harmonics + 1, 2.0)
+    factor[0] = 1.0
+    out = np.empty((data.shape[0], at.size, harmonics + 1), np.complex128)
+    for number, centre in enumerate(at):
+        part = slice(int(first[number]), int(end[number]))
+        window = _blackman((theta[part] - centre) / half) * weight[part]
+        out[:, number] = (data[:, part] * (window / window.sum())) @ rotations[:, part].T
+    return np.asarray(out * factor)
+
+
+def _blackman(place: Float) -> Float:
+    """Blackman window over -1 ... 1."""
+    return np.asarray(0.42 + 0.5 * np.cos(np.pi * place) + 0.08 * np.cos(2.0 * np.pi * place))
+
+
+def window_correlations(distance_periods: Float) -> tuple[Float, Float]:
+    """Correlations of the noise at instants so many periods apart: of white noise seen through the window, and of its rate.
+
+    The autocorrelation r of the window, and r'' / r''(0); both vanish where windows do not overlap.
+    """
+    grid = np.linspace(-1.0, 1.0, 601)
+    window = _blackman(grid)
+    lags = np.linspace(-2.0, 2.0, 1201) * 0.5 * WINDOW_PERIODS
+    plain = np.correlate(window, window, mode="full")
+    slope = np.gradient(window)
+    rate = np.correlate(slope, slope, mode="full")
+    apart = np.abs(distance_periods)
+    return (
+        np.asarray(np.interp(apart, lags, plain / plain.max(), right=0.0)),
+        np.asarray(np.interp(apart, lags, rate / rate.max(), right=0.0)),
+    )

@@ -1,0 +1,311 @@
+"""Modal properties at every instant of a phase-locked vibration that may grow, decay or wander in frequency.
+
+One nonlinear mode whose properties change little within a few periods obeys ``phi_d^2 F = a + c v + k x`` at the drive
+point, with ``k = w^2`` and ``c = 2 w z`` at the amplitude of the moment. Demodulated with one and the same window, it becomes
+``g = k + c b`` with ``g = (phi_d^2 F_1 - A_1) / X_1`` and ``b = V_1 / X_1``, whether the vibration is settled or not: what a
+growing vibration stores is in A_1 and V_1.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import MOTION_ORDER, Channel, find_name, find_role
+from identification.errors import IdentificationError
+from identification.slow_flow.fits import LocalFit, local_fit, noise_variances
+from identification.slow_flow.signals import WINDOW_PERIODS, amplitudes, derivatives
+from identification.validation import finite_array, positive
+
+__all__ = ["SlowFlow", "slow_flow"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_MIN_FIT_PERIODS = 1.0
+_POOLED_PERIODS = 20.0  # over which the noise is taken for constant
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SlowFlow:
+    """A vibration as it goes, at n instants.
+
+    Parameters
+    ----------
+    channels
+        One per row of ``harmonics``; exactly one of role ``force`` and one of role ``drive``.
+    time_s, phase_periods
+        float[n], from the first sample of the record on; phase of the oscillator in periods.
+    harmonics
+        complex[n_channels, n, H + 1], peak, in the unit of each channel, against the phase of the oscillator.
+    drive_m
+        complex[n], fundamental of the displacement at the drive point.
+    dynamic_stiffness, rate_1_s
+        complex[n], ``g = (phi_d^2 F - A) / X`` (1/s^2) and ``b = V / X`` (1/s): growth rate and frequency of the motion.
+    stiffness, damping_1_s
+        float[n], k (1/s^2) and c (1/s) from least squares over ``fit_periods`` around each instant.
+    stiffness_std, damping_std_1_s
+        float[n], their standard errors from what the fits leave over, overlapping windows accounted for.
+    noise
+        float[n, 2], variances of real and imaginary part of ``g X``, (m/s^2)^2: the part that averages out as white noise
+        of the force does, and the part that averages out faster (`identification.slow_flow.fits`).
+    drive_mode_shape
+        phi_d, kg^-1/2.
+    fit_periods
+        Length of the sliding fits.
+    """
+
+    channels: tuple[Channel, ...]
+    time_s: Float
+    phase_periods: Float
+    harmonics: Complex
+    drive_m: Complex
+    dynamic_stiffness: Complex
+    rate_1_s: Complex
+    stiffness: Float
+    damping_1_s: Float
+    stiffness_std: Float
+    damping_std_1_s: Float
+    noise: Float
+    drive_mode_shape: float
+    fit_periods: float
+
+    def index(self, name: str) -> int:
+        """Row of the channel called ``name``."""
+        return find_name(self.channels, name)
+
+    def between(self, start_s: float, stop_s: float) -> "SlowFlow":
+        """The instants from ``start_s`` to ``stop_s``."""
+        inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
+        if not inside.any():
+            raise IdentificationError(
+                f"start_s, stop_s: no instant from {start_s:g} to {stop_s:g} s; there are some from {self.time_s[0]:g} to "
+                f"{self.time_s[-1]:g} s"
+            )
+        return self.select(inside)
+
+    def select(self, keep: NDArray[np.bool_]) -> "SlowFlow":
+        """The instants where ``keep`` (bool[n]) is true."""
+        cut: dict[str, Any] = {name: getattr(self, name)[keep] for name in _PER_INSTANT}
+        return replace(self, harmonics=self.harmonics[:, keep], **cut)
+
+    @property
+    def force(self) -> Complex:
+        """complex[n, H + 1]: harmonics of the force, N."""
+        return np.asarray(self.harmonics[find_role(self.channels, "force")])
+
+    @property
+    def force_n(self) -> Float:
+        """float[n]: peak of the fundamental of the force as it was, N."""
+        return np.asarray(np.abs(self.force[:, 1]))
+
+    @property
+    def resonant_force_n(self) -> Float:
+        """float[n]: force that would hold the amplitude of the moment at phase resonance, ``c w |X| / phi_d^2``, N."""
+        omega = np.sqrt(np.maximum(self.stiffness, 0.0))
+        return np.asarray(self.damping_1_s * omega * self.amplitude_m / self.drive_mode_shape**2)
+
+    @property
+    def amplitude_m(self) -> Float:
+        """float[n]: peak of the fundamental of the displacement at the drive point, m."""
+        return np.asarray(np.abs(self.drive_m))
+
+    @property
+    def frequency_hz(self) -> Float:
+        """float[n]: momentary frequency of the motion, Hz."""
+        return np.asarray(self.rate_1_s.imag / (2.0 * np.pi))
+
+    @property
+    def growth_1_s(self) -> Float:
+        """float[n]: rate at which the motion grows, relative, 1/s."""
+        return np.asarray(self.rate_1_s.real)
+
+    @property
+    def phase_lag_deg(self) -> Float:
+        """float[n]: lag of the displacement behind the force at the drive point, in (-180, 180]."""
+        return np.asarray(np.degrees(np.angle(self.force[:, 1] * np.conj(self.drive_m))))
+
+    @property
+    def modal_frequency_hz(self) -> Float:
+        """float[n]: undamped modal frequency, Hz; NaN where the stiffness is not positive."""
+        return np.asarray(np.sqrt(np.where(self.stiffness > 0.0, self.stiffness, np.nan)) / (2.0 * np.pi))
+
+    @property
+    def modal_frequency_std_hz(self) -> Float:
+        """float[n]: its standard error."""
+        return np.asarray(self.stiffness_std / (8.0 * np.pi**2 * self.modal_frequency_hz))
+
+    @property
+    def damping_ratio(self) -> Float:
+        """float[n]: ``c / (2 w)``."""
+        return np.asarray(self.damping_1_s / (4.0 * np.pi * self.modal_frequency_hz))
+
+    @property
+    def damping_ratio_std(self) -> Float:
+        """float[n]: its standard error."""
+        return np.asarray(self.damping_std_1_s / (4.0 * np.pi * self.modal_frequency_hz))
+
+    def deflection_ratio(self, name: str) -> Complex:
+        """complex[n]: displacement at the channel called ``name`` over that at the drive point, fundamentals."""
+        own, drive = self.index(name), find_role(self.channels, "drive")
+        order = MOTION_ORDER[self.channels[own].motion] - MOTION_ORDER[self.channels[drive].motion]
+        return np.asarray(self.harmonics[own, :, 1] / self.harmonics[drive, :, 1] / self.rate_1_s**order)
+
+
+_PER_INSTANT = (
+    *("time_s", "phase_periods", "drive_m", "dynamic_stiffness", "rate_1_s", "stiffness", "damping_1_s"),
+    *("stiffness_std", "damping_std_1_s", "noise"),
+)
+
+
+def slow_flow(
+    theta_rad: ArrayLike,
+    samples: ArrayLike,
+    channels: Sequence[Channel],
+    *,
+    sample_rate_hz: float,
+    drive_mode_shape: float,
+    harmonics: int = 7,
+    fit_periods: float = 6.0,
+    points_per_period: int = 2,
+    skew_samples: ArrayLike | None = None,
+) -> SlowFlow:
+    """Modal properties at every instant of a record.
+
+    Parameters
+    ----------
+    theta_rad
+        float[n], phase of the oscillator at the instant that each sample was measured, rising; wrapped or not.
+    samples
+        float[n_channels, n], in the unit of each channel, SI. Give the whole record and take slices of the result.
+    channels
+        The channels, one per row of ``samples``; force and drive-point motion among them.
+    sample_rate_hz
+        Samples per second.
+    drive_mode_shape
+        Mass-normalised linear mode shape at the drive point, kg^-1/2; damping goes with its square.
+    harmonics
+        Highest harmonic H.
+    fit_periods
+        Periods that the sliding fits take together: more leave less noise, fewer show faster changes.
+    points_per_period
+        Instants per period; the window passes too little above one per period for more than two to tell more.
+    skew_samples
+        float[n_channels], how late each channel is, in samples; none if None.
+
+    Returns
+    -------
+    SlowFlow
+        Without the first and last one and a half periods, where the window of the demodulation would not be whole.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, unequal lengths, a phase that falls, too few samples per period, a record that is too short,
+        missing roles.
+    """
+    theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
+    data = finite_array("samples", samples, np.float64, 2)
+    rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
+    if data.shape != (len(channels), theta.size):
+        raise IdentificationError(
+            f"samples: shape {data.shape}, needs ({len(channels)}, {theta.size}): channels by samples of theta_rad"
+        )
+    delay_s = _skew(skew_samples, len(channels)) / rate_hz
+    force, drive = find_role(channels, "force"), find_role(channels, "drive")
+    at = _instants(theta, harmonics, fit_periods, points_per_period)
+    order = MOTION_ORDER[channels[drive].motion]
+    rows = [*range(len(channels)), drive, drive, drive]
+    orders = (*[0] * len(channels), -order, 1 - order, 2 - order)
+    smooth = derivatives(theta, data[rows], rate_hz, delay_s[rows], orders)
+    found = amplitudes(theta, smooth, at, harmonics)
+    found[: len(channels), :, 0] = amplitudes(theta, data, at, 0)[..., 0].real
+    x, v, a = found[-3:, :, 1]
+    if not np.all(np.abs(x) > 0.0):
+        raise IdentificationError("samples: the drive point does not move, nothing can be identified")
+    shape = float(drive_mode_shape)
+    if not (np.isfinite(shape) and shape):
+        raise IdentificationError(f"drive_mode_shape: is {shape}, must be finite and not zero")
+    stiffness, rate = (shape**2 * found[force, :, 1] - a) / x, v / x
+    periods = at / (2.0 * np.pi)
+    fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods, degree=1)
+    # Properties that bend within a fit are no noise: they are let bend where the noise is looked for.
+    noise = _pooled(_sliding(stiffness, rate, np.abs(x), periods, fit_periods, degree=2), periods)
+    errors = np.array([fit.standard_errors(variances) for fit, variances in zip(fits, noise, strict=True)])
+    return SlowFlow(
+        channels=tuple(channels),
+        time_s=np.interp(at, theta, np.arange(theta.size) / rate_hz),
+        phase_periods=periods,
+        harmonics=found[: len(channels)],
+        drive_m=x,
+        dynamic_stiffness=stiffness,
+        rate_1_s=rate,
+        stiffness=np.array([fit.stiffness for fit in fits]),
+        damping_1_s=np.array([fit.damping for fit in fits]),
+        stiffness_std=errors[:, 0],
+        damping_std_1_s=errors[:, 1],
+        noise=noise,
+        drive_mode_shape=shape,
+        fit_periods=fit_periods,
+    )
+
+
+def _skew(skew_samples: ArrayLike | None, channels: int) -> Float:
+    if skew_samples is None:
+        return np.zeros(channels)
+    skew: Float = finite_array("skew_samples", skew_samples, np.float64, 1)
+    if skew.size != channels:
+        raise IdentificationError(f"skew_samples: {skew.size} given for {channels} channels")
+    return skew
+
+
+def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_period: int) -> Float:
+    """float[n]: phases at which the window is whole, evenly spaced; refuses phases that are of no use."""
+    if harmonics < 1:
+        raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
+    if not fit_periods >= _MIN_FIT_PERIODS:
+        raise IdentificationError(f"fit_periods: is {fit_periods}, needs at least {_MIN_FIT_PERIODS:g}")
+    if points_per_period < 1:
+        raise IdentificationError(f"points_per_period: is {points_per_period}, needs at least 1")
+    steps = np.diff(theta)
+    if np.any(steps <= 0.0):
+        where = int(np.argmax(steps <= 0.0))
+        raise IdentificationError(f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time")
+    covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
+    if covered < WINDOW_PERIODS + fit_periods:
+        raise IdentificationError(
+            f"theta_rad: covers {covered:.2f} periods, needs {WINDOW_PERIODS + fit_periods:g} with fit_periods = "
+            f"{fit_periods:g}"
+        )
+    needed = 2 * harmonics + 2
+    if (per_period := 2.0 * np.pi / float(steps.max())) <= needed:
+        raise IdentificationError(
+            f"harmonics: {harmonics} need more than {needed} samples per period, the record has {per_period:.2f}"
+        )
+    half = np.pi * WINDOW_PERIODS
+    count = int((theta[-1] - theta[0] - 2.0 * half) / (2.0 * np.pi) * points_per_period)
+    return np.asarray(theta[0] + half + 2.0 * np.pi / points_per_period * np.arange(count + 1))
+
+
+def _sliding(
+    stiffness: Complex, rate: Complex, size: Float, periods: Float, fit_periods: float, degree: int
+) -> list[LocalFit]:
+    """One fit around every instant; at the ends over as many instants, further to one side."""
+    half = 0.5 * fit_periods + 1e-9
+    fits = []
+    for centre in periods:
+        middle = min(max(centre, periods[0] + half), periods[-1] - half)
+        near = np.abs(periods - middle) <= half
+        place = (periods[near] - centre) / half
+        fits.append(
+            local_fit(stiffness[near], rate[near], size[near], periods[near], place, np.ones(place.size), degree)
+        )
+    return fits
+
+
+def _pooled(fits: list[LocalFit], periods: Float) -> Float:
+    """float[n, 2]: variances of the noise around each instant, from the residuals of the fits near it."""
+    near = [np.flatnonzero(np.abs(periods - centre) <= 0.5 * _POOLED_PERIODS) for centre in periods]
+    return np.array([noise_variances([fits[number] for number in some]) for some in near])
