@@ -57,12 +57,16 @@ if TYPE_CHECKING:
     from identification.signals.half_periods import HalfPeriods, zero_crossings
     from identification.signals.sweeps import ForceDropOut, force_drop_out
     from identification.signals.transients import Transient, demodulate
+    from identification.slow_flows.continuous import ContinuousBackbone, continuous_backbone
+    from identification.slow_flows.short_points import ShortPoint, short_point
+    from identification.slow_flows.slow_flow import SlowFlow, slow_flow
 
 __all__ = [
     "Backbone",
     "BackboneMapping",
     "Channel",
     "Comparison",
+    "ContinuousBackbone",
     "DistortionLevels",
     "Exciter",
     "ExtrapolationError",
@@ -88,6 +92,8 @@ __all__ = [
     "Repeatability",
     "ResponseBand",
     "ResponseMatrixMapping",
+    "ShortPoint",
+    "SlowFlow",
     "StabilisationDiagram",
     "StateSpace",
     "SteadyPrediction",
@@ -100,6 +106,7 @@ __all__ = [
     "combined",
     "compare",
     "compare_sweep",
+    "continuous_backbone",
     "decimated",
     "demodulate",
     "distortion_levels",
@@ -124,7 +131,9 @@ __all__ = [
     "recorded_force_response",
     "repeatability",
     "response_band",
+    "short_point",
     "single_point_mode",
+    "slow_flow",
     "stabilisation",
     "steady_predictions",
     "stepped_sine_mode",
@@ -138,6 +147,7 @@ _MODULE_OF = {
     "BackboneMapping": "mapping.backbone",
     "Channel": "channels",
     "Comparison": "prediction.comparison",
+    "ContinuousBackbone": "slow_flows.continuous",
     "DistortionLevels": "multisine.distortion",
     "Exciter": "prediction.exciter",
     "ExtrapolationError": "prediction.properties",
@@ -163,6 +173,8 @@ _MODULE_OF = {
     "Repeatability": "nonlinear.repeatability",
     "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
+    "ShortPoint": "slow_flows.short_points",
+    "SlowFlow": "slow_flows.slow_flow",
     "StabilisationDiagram": "linear.stabilisation",
     "StateSpace": "linear.subspace",
     "SteadyPrediction": "prediction.steady_prediction",
@@ -175,6 +187,7 @@ _MODULE_OF = {
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
     "compare_sweep": "prediction.sweep_prediction",
+    "continuous_backbone": "slow_flows.continuous",
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
@@ -199,7 +212,9 @@ _MODULE_OF = {
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",
+    "short_point": "slow_flows.short_points",
     "single_point_mode": "nonlinear.single_points",
+    "slow_flow": "slow_flows.slow_flow",
     "stabilisation": "linear.stabilisation",
     "steady_predictions": "prediction.frequency_response",
     "stepped_sine_mode": "nonlinear.stepped_sine",

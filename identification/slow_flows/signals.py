@@ -5,6 +5,8 @@ applied here: a zero-phase high-pass below the fundamental, without which veloci
 an acceleration, and the window of the demodulation. Both run over the whole record; slices are taken afterwards.
 """
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,8 +39,7 @@ def derivatives(theta: Float, data: Float, rate_hz: float, delay_s: Float, order
     padded[:, :fade] = _ending(theta[::-1], data[:, ::-1], fade)[:, ::-1]
     padded[:, fade + theta.size : 2 * fade + theta.size] = _ending(theta, data, fade)
     omega = 2.0 * np.pi * rfftfreq(padded.shape[1], 1.0 / rate_hz)
-    place = np.clip((omega / (step * rate_hz) - _STOP) / (_PASS - _STOP), 0.0, 1.0)
-    high_pass = np.sin(0.5 * np.pi * place) ** 2
+    high_pass = _high_pass(omega / (step * rate_hz))
     rotation = 1j * np.where(omega > 0.0, omega, 1.0)
     spectra = rfft(padded, axis=1)
     for row, order in enumerate(orders):
@@ -82,19 +83,29 @@ def _blackman(place: Float) -> Float:
     return np.asarray(0.42 + 0.5 * np.cos(np.pi * place) + 0.08 * np.cos(2.0 * np.pi * place))
 
 
-def window_correlations(distance_periods: Float) -> tuple[Float, Float]:
-    """Correlations of the noise at instants so many periods apart: of white noise seen through the window, and of its rate.
+def window_correlations(distance_periods: Float) -> tuple[Complex, Complex]:
+    """Correlations of noise at instants so many periods apart (the first less the second).
 
-    The autocorrelation r of the window, and r'' / r''(0); both vanish where windows do not overlap.
+    Of white noise seen through the window; and of white noise of an acceleration in ``a + w^2 x`` at resonance, where it
+    cancels but for ``1 - 1 / (1 + n)^2``, n its distance in frequency from the fundamental, over the fundamental.
     """
-    grid = np.linspace(-1.0, 1.0, 601)
-    window = _blackman(grid)
-    lags = np.linspace(-2.0, 2.0, 1201) * 0.5 * WINDOW_PERIODS
-    plain = np.correlate(window, window, mode="full")
-    slope = np.gradient(window)
-    rate = np.correlate(slope, slope, mode="full")
-    apart = np.abs(distance_periods)
-    return (
-        np.asarray(np.interp(apart, lags, plain / plain.max(), right=0.0)),
-        np.asarray(np.interp(apart, lags, rate / rate.max(), right=0.0)),
-    )
+    lags, plain, motion = _correlations()
+    return np.interp(distance_periods, lags, plain), np.interp(distance_periods, lags, motion)
+
+
+@cache
+def _correlations() -> tuple[Float, Complex, Complex]:
+    """Lags in periods, and both correlations there, by their spectra."""
+    places = np.linspace(-1.0, 1.0, 241)
+    orders = np.linspace(-0.75, 2.0, 551)  # the high-pass stops below, the window above
+    turns = np.exp(-1j * np.pi * WINDOW_PERIODS * np.outer(orders, places))
+    plain = np.abs(turns @ _blackman(places)) ** 2 * _high_pass(1.0 + orders) ** 2
+    lags = np.linspace(-2.0, 2.0, 401) * WINDOW_PERIODS
+    back = np.exp(2j * np.pi * np.outer(lags, orders))
+    both = [back @ spectrum / spectrum.sum() for spectrum in (plain, plain * (1.0 - (1.0 + orders) ** -2.0) ** 2)]
+    return lags, both[0], both[1]
+
+
+def _high_pass(order: Float) -> Float:
+    """Gain at frequencies given over the fundamental's."""
+    return np.asarray(np.sin(0.5 * np.pi * np.clip((order - _STOP) / (_PASS - _STOP), 0.0, 1.0)) ** 2)

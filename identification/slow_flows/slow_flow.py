@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
-from identification.slow_flow.fits import LocalFit, local_fit, noise_variances
-from identification.slow_flow.signals import WINDOW_PERIODS, amplitudes, derivatives
+from identification.slow_flows.fits import LocalFit, local_fit, noise_variances
+from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, derivatives
 from identification.validation import finite_array, positive
 
 __all__ = ["SlowFlow", "slow_flow"]
@@ -25,7 +25,8 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _MIN_FIT_PERIODS = 1.0
-_POOLED_PERIODS = 20.0  # over which the noise is taken for constant
+_NOISE_FITS = 2.0  # how much longer fits are that the noise is looked for in
+_POOLED_PERIODS = 40.0  # over which the noise is taken for constant
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,10 +48,11 @@ class SlowFlow:
     stiffness, damping_1_s
         float[n], k (1/s^2) and c (1/s) from least squares over ``fit_periods`` around each instant.
     stiffness_std, damping_std_1_s
-        float[n], their standard errors from what the fits leave over, overlapping windows accounted for.
+        float[n], their standard errors from what the fits leave over, overlapping windows; what properties bend within twice
+        that length counts as noise.
     noise
         float[n, 2], variances of real and imaginary part of ``g X``, (m/s^2)^2: the part that averages out as white noise
-        of the force does, and the part that averages out faster (`identification.slow_flow.fits`).
+        of the force does, and the part that averages out faster (`identification.slow_flows.fits`).
     drive_mode_shape
         phi_d, kg^-1/2.
     fit_periods
@@ -230,9 +232,10 @@ def slow_flow(
         raise IdentificationError(f"drive_mode_shape: is {shape}, must be finite and not zero")
     stiffness, rate = (shape**2 * found[force, :, 1] - a) / x, v / x
     periods = at / (2.0 * np.pi)
-    fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods, degree=1)
-    # Properties that bend within a fit are no noise: they are let bend where the noise is looked for.
-    noise = _pooled(_sliding(stiffness, rate, np.abs(x), periods, fit_periods, degree=2), periods)
+    fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods)
+    # The two parts of the noise are told apart by how slowly they vary: that takes longer fits.
+    longer = min(_NOISE_FITS * fit_periods, float(np.ptp(periods)))
+    noise = _pooled(_sliding(stiffness, rate, np.abs(x), periods, longer, degree=2), periods)
     errors = np.array([fit.standard_errors(variances) for fit, variances in zip(fits, noise, strict=True)])
     return SlowFlow(
         channels=tuple(channels),
@@ -290,7 +293,7 @@ def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_perio
 
 
 def _sliding(
-    stiffness: Complex, rate: Complex, size: Float, periods: Float, fit_periods: float, degree: int
+    stiffness: Complex, rate: Complex, size: Float, periods: Float, fit_periods: float, degree: int = 1
 ) -> list[LocalFit]:
     """One fit around every instant; at the ends over as many instants, further to one side."""
     half = 0.5 * fit_periods + 1e-9

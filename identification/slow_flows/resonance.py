@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
-from identification.slow_flow.fits import LocalFit, local_fit
-from identification.slow_flow.signals import window_correlations
-from identification.slow_flow.slow_flow import SlowFlow
+from identification.slow_flows.fits import LocalFit, local_fit
+from identification.slow_flows.signals import window_correlations
+from identification.slow_flows.slow_flow import SlowFlow
 
 __all__ = ["Amplitudes", "amplitudes_at", "fit_at", "resonant_vibration"]
 
@@ -54,7 +54,9 @@ def amplitudes_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> A
     values = (series * root[:, None]).transpose(1, 0, 2).reshape(place.size, -1)
     solution = inverse @ values
     residual = np.sum(np.abs(values - design @ solution) ** 2, axis=0)
-    noise = window_correlations(flow.phase_periods[:, None] - flow.phase_periods[None, :])[0] * np.outer(root, root)
+    noise = window_correlations(flow.phase_periods[:, None] - flow.phase_periods[None, :])[0].real * np.outer(
+        root, root
+    )
     left = noise - design @ (inverse @ noise)
     expected = 2.0 * (np.trace(left) - np.sum((left @ inverse.T) * design))
     spread = inverse[0] @ noise @ inverse[0]

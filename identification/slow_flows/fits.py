@@ -5,9 +5,9 @@ polynomial of a place (time, or level) that is zero where they are wanted.
 
 Noise stands in ``e = g X``, alike in its real and imaginary part and at all instants. It has two parts, for white noise
 of two sensors: that of the force comes as the window of the demodulation lets it; that of the motion, which is in A, V and
-X alike, cancels but for its rate of change. Their correlations over time are the window's autocorrelation and minus its
-second derivative. The second averages out much faster, so that one must know how much there is of each: the residuals'
-sum of squares, plain and smoothed, tells (moments equated to their expectations).
+X alike, cancels but for its rate of change (`identification.slow_flows.signals`). The second averages out much faster, so
+that one must know how much there is of each: the residuals' sum of squares, plain and smoothed, tells (moments equated to
+their expectations).
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.slow_flow.signals import window_correlations
+from identification.slow_flows.signals import window_correlations
 
 __all__ = ["LocalFit", "local_fit", "noise_variances"]
 
@@ -70,7 +70,8 @@ def local_fit(
     residual = values - design @ solution
     wanted = inverse[[0, degree + 1]]
     correlations = [
-        np.kron(np.eye(2), part * np.sqrt(np.outer(weight, weight)))
+        np.block([[part.real, -part.imag], [part.imag, part.real]])
+        * np.sqrt(np.outer(np.tile(weight, 2), np.tile(weight, 2)))
         for part in window_correlations(periods[:, None] - periods[None, :])
     ]
     left = [noise - design @ (inverse @ noise) for noise in correlations]

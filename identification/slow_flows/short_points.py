@@ -6,8 +6,9 @@ import numpy as np
 
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
-from identification.slow_flow.resonance import amplitudes_at, fit_at, resonant_vibration
-from identification.slow_flow.slow_flow import SlowFlow
+from identification.slow_flows.fits import noise_variances
+from identification.slow_flows.resonance import amplitudes_at, fit_at, resonant_vibration
+from identification.slow_flows.slow_flow import SlowFlow
 
 __all__ = ["ShortPoint", "short_point"]
 
@@ -86,7 +87,7 @@ def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float |
     place = (level - centre) / change if change > _STEADY else middle / periods
     weight = np.ones(place.size)
     fit = fit_at(part, place, weight, 1)
-    errors = fit.standard_errors(np.mean(part.noise, axis=0))
+    errors = fit.standard_errors(noise_variances([fit]))
     size = float(np.exp(centre))
     vibration = resonant_vibration(
         part, size, fit.stiffness, fit.damping, errors, amplitudes_at(part, place, weight, 1), periods

@@ -15,9 +15,9 @@ from identification.backbones import Backbone
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
 from identification.nonlinear.phase_resonance import nonlinear_mode
-from identification.slow_flow.fits import LocalFit, noise_variances
-from identification.slow_flow.resonance import Amplitudes, amplitudes_at, fit_at, resonant_vibration
-from identification.slow_flow.slow_flow import SlowFlow
+from identification.slow_flows.fits import LocalFit, noise_variances
+from identification.slow_flows.resonance import Amplitudes, amplitudes_at, fit_at, resonant_vibration
+from identification.slow_flows.slow_flow import SlowFlow
 from identification.validation import finite_array
 
 __all__ = ["ContinuousBackbone", "continuous_backbone"]
@@ -27,6 +27,7 @@ Float = NDArray[np.float64]
 
 _DEGREE = 2
 _FEWEST_INSTANTS = 8
+_NEIGHBOURS = 2
 _WIDEN = 1.25
 _WIDEST = 1.0  # in the logarithm of the amplitude
 
@@ -91,6 +92,7 @@ def continuous_backbone(
     levels_m: ArrayLike | None = None,
     number: int = 15,
     bandwidth: float = 0.15,
+    accuracy: float = 0.015,
     specimen: str = "",
 ) -> ContinuousBackbone:
     """Backbone from a ramp of the level up and one down, in any order.
@@ -100,11 +102,15 @@ def continuous_backbone(
     up, down
         Slow flows of the two ramps: parts of one (`SlowFlow.between`), or of two records.
     levels_m
-        Amplitudes of the drive point's displacement, m; if None, ``number`` of them in equal ratios over what both
-        ramps cover.
+        Amplitudes of the drive point's displacement, m; if None, in equal ratios over what both ramps cover.
+    number
+        How many of them, then.
     bandwidth
         Half width in ln(amplitude) of what is taken together at a level (parabolic weights, properties quadratic in
-        ln(amplitude)); wider where a ramp has fewer than eight instants there.
+        ln(amplitude)); wider where a ramp has fewer than eight instants there. What bends within it is smoothed.
+    accuracy
+        Relative random standard error of one ramp's damping above which more than the bandwidth is taken together, up to
+        one in ln(amplitude).
     specimen
         Name of what was tested.
 
@@ -116,7 +122,12 @@ def continuous_backbone(
     if up.channels != down.channels or up.drive_mode_shape != down.drive_mode_shape:
         raise IdentificationError("up, down: channels or drive_mode_shape differ")
     levels = _levels(up, down, levels_m, number)
-    ways = [_along(flow, levels, bandwidth) for flow in (up, down)]
+    first = [_first_fits(flow, levels, bandwidth) for flow in (up, down)]
+    noise = _noise([fits for _, fits in first])
+    ways = [
+        _along(flow, levels, widths, fits, noise, accuracy)
+        for flow, (widths, fits) in zip((up, down), first, strict=True)
+    ]
     stiffness, damping = (np.array([[getattr(fit, name) for fit in way.fits] for way in ways]) for name in _PROPERTIES)
     errors = np.array([way.errors for way in ways])
     points = []
@@ -174,38 +185,72 @@ def _levels(up: SlowFlow, down: SlowFlow, levels_m: ArrayLike | None, number: in
     return levels
 
 
-def _along(flow: SlowFlow, levels: Float, bandwidth: float) -> _Way:
-    """Fits at every level of one ramp."""
+def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float, list[LocalFit]]:
+    """Widths and fits at every level of one ramp, over the bandwidth or what takes in enough instants."""
     size = np.log(flow.amplitude_m)
-    fits, found, periods = [], [], []
-    for level in np.log(levels):
-        width = bandwidth
-        while np.count_nonzero(np.abs(size - level) < width) < _FEWEST_INSTANTS:
+    widths = np.array([_wide_enough(size, level, bandwidth) for level in np.log(levels)])
+    return widths, [
+        fit_at(*_around(flow, at, width), _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)
+    ]
+
+
+def _noise(fits: list[list[LocalFit]]) -> list[Float]:
+    """Variances of the noise at every level, from the fits of both ramps near it."""
+    count = len(fits[0])
+    near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(count)]
+    return [noise_variances([fit for way in fits for fit in way[some]]) for some in near]
+
+
+def _along(
+    flow: SlowFlow, levels: Float, widths: Float, fits: list[LocalFit], noise: list[Float], accuracy: float
+) -> _Way:
+    """One ramp: where noise leaves too little of the damping, fits over more."""
+    found, periods = [], []
+    step = float(np.median(np.diff(flow.phase_periods)))
+    for n, level in enumerate(np.log(levels)):
+        width = widths[n]
+        while fits[n].standard_errors(noise[n])[1] > accuracy * abs(fits[n].damping) and width * _WIDEN <= _WIDEST:
             width *= _WIDEN
-            if width > _WIDEST:
-                raise IdentificationError(
-                    f"levels_m: fewer than {_FEWEST_INSTANTS} instants near {np.exp(level):.4g} m; ramp more slowly"
-                )
-        near = np.abs(size - level) < width
-        part = flow.select(near)
-        place = (size[near] - level) / width
-        weight = 1.0 - place**2
-        fits.append(fit_at(part, place, weight, _DEGREE))
+            fits[n] = fit_at(*_around(flow, level, width), _DEGREE)
+        part, place, weight = _around(flow, level, width)
         found.append(amplitudes_at(part, place, weight, _DEGREE))
-        periods.append(float(np.count_nonzero(near)) * float(np.median(np.diff(flow.phase_periods))))
-    errors = [fit.standard_errors(noise_variances(fits[max(0, n - 2) : n + 3])) for n, fit in enumerate(fits)]
+        periods.append(place.size * step)
+    errors = [fit.standard_errors(variances) for fit, variances in zip(fits, noise, strict=True)]
     return _Way(fits, np.array(errors), found, periods)
 
 
+def _around(flow: SlowFlow, level: float, width: float) -> tuple[SlowFlow, Float, Float]:
+    """The instants around ``ln X = level``, their places and weights."""
+    place = (np.log(flow.amplitude_m) - level) / width
+    near = np.abs(place) < 1.0
+    return flow.select(near), place[near], 1.0 - place[near] ** 2
+
+
+def _wide_enough(size: Float, level: float, bandwidth: float) -> float:
+    """The bandwidth, or as much more as takes in enough instants."""
+    width = bandwidth
+    while np.count_nonzero(np.abs(size - level) < width) < _FEWEST_INSTANTS:
+        width *= _WIDEN
+        if width > _WIDEST:
+            raise IdentificationError(
+                f"levels_m: fewer than {_FEWEST_INSTANTS} instants near {np.exp(level):.4g} m; ramp more slowly"
+            )
+    return width
+
+
 def _beyond_noise(values: Float, std: Float) -> Float:
-    """float[n]: half the difference of up and down, less what noise makes of it."""
-    half = 0.5 * (values[0] - values[1])
-    return np.asarray(np.sqrt(np.maximum(half**2 - 0.25 * np.sum(std**2, axis=0), 0.0)))
+    """float[n]: half the difference of up and down, less what noise makes of it.
+
+    Root of the mean square over neighbouring levels: where the two curves happen to cross, nothing is known any better.
+    """
+    square = 0.25 * (values[0] - values[1]) ** 2 - 0.25 * np.sum(std**2, axis=0)
+    near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(square.size)]
+    return np.asarray(np.sqrt(np.maximum([np.mean(square[some]) for some in near], 0.0)))
 
 
 def _with_systematic(mode: NonlinearMode, further: dict[str, Float]) -> NonlinearMode:
     """The mode with further systematic standard errors, independent of those it has."""
-    changes: dict[str, Float] = {}
+    changes: dict[str, Any] = {}
     systematic, intervals = mode.systematic_std.copy(), mode.interval_95.copy()
     for name, std in further.items():
         column = QUANTITIES.index(name)

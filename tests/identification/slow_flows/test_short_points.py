@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+
+from identification import Backbone, IdentificationError, nonlinear_mode, short_point, slow_flow
+from tests.identification.slow_flows.ramps import (
+    CHANNELS,
+    PHI,
+    RATE_HZ,
+    TIP,
+    Ramp,
+    damping_ratio,
+    half_cosine,
+    modal_rad_s,
+    ramp,
+)
+
+NOISE = (1e-3, 5e-3)
+
+
+def flow_of(record: Ramp):  # type: ignore[no-untyped-def]
+    return slow_flow(record.theta, record.samples, CHANNELS, sample_rate_hz=RATE_HZ, drive_mode_shape=PHI)
+
+
+def approached(low_m: float, high_m: float, seed: int = 0, wobble_hz: float = 0.0) -> Ramp:
+    """Fifteen periods: six on the way to the level, nine at it."""
+    return ramp(half_cosine(low_m, high_m, 6 / 25), 15 / 25, noise=NOISE, seed=seed, wobble_hz=wobble_hz)
+
+
+@pytest.mark.parametrize("wobble_hz", [0.0, 0.1])
+def test_a_point_of_fifteen_periods_gives_the_settled_point_at_phase_resonance(wobble_hz: float) -> None:
+    levels = np.geomspace(1e-4, 1.6e-3, 10)
+    records = [approached(level, 1.25 * level, n, wobble_hz) for n, level in enumerate(levels)]
+    points = [short_point(flow_of(record), start_s=6 / 25) for record in records]
+    mode = nonlinear_mode(Backbone(tuple(point.vibration for point in points), "mode", PHI))
+    size = 1.25 * levels
+    np.testing.assert_allclose(mode.amplitude_m, size, rtol=5e-3)
+    np.testing.assert_allclose(mode.modal_frequency_hz, modal_rad_s(mode.amplitude_m) / (2 * np.pi), rtol=2e-4)
+    np.testing.assert_allclose(mode.damping_ratio, damping_ratio(mode.amplitude_m), rtol=0.02)
+    np.testing.assert_allclose(mode.phase_lag_deg, 90.0, atol=1e-9)
+    np.testing.assert_allclose(mode.force_n, 2 * mode.damping_ratio * modal_rad_s(size) ** 2 * size / PHI**2, rtol=0.01)
+    tip = [abs(point.vibration.displacement_m("tip")[1]) / point.vibration.amplitude_m for point in points]
+    np.testing.assert_allclose(tip, TIP, rtol=2e-3)
+
+
+def test_the_nonlinear_mode_finds_what_the_point_says_with_its_standard_errors() -> None:
+    point = short_point(flow_of(approached(3e-4, 4e-4)), start_s=6 / 25)
+    mode = nonlinear_mode(Backbone((point.vibration,), "mode", PHI), draws=4000)
+    assert mode.modal_frequency_hz[0] == pytest.approx(point.modal_frequency_hz, rel=1e-12)
+    assert mode.damping_ratio[0] == pytest.approx(point.damping_ratio, rel=1e-12)
+    assert mode.damping_ratio_std[0] == pytest.approx(point.damping_ratio_std, rel=0.2)
+    assert mode.modal_frequency_std_hz[0] == pytest.approx(point.modal_frequency_std_hz, rel=0.2)
+
+
+def test_the_lag_and_the_growth_as_they_were_are_told() -> None:
+    growing = ramp(half_cosine(3e-4, 4e-4, 1.2), 1.2)
+    point = short_point(flow_of(growing), start_s=0.4, stop_s=0.8)
+    assert point.growth_1_s == pytest.approx(np.log(4 / 3) * np.pi / 2 / 1.2, rel=0.1)
+    assert point.force_n > point.vibration.force_n
+    assert point.vibration.phase_lag_deg == pytest.approx(90.0, abs=1e-9)
+
+
+def test_scatter_over_noise_is_what_the_point_claims() -> None:
+    points = [short_point(flow_of(approached(3e-4, 4e-4, seed)), start_s=6 / 25) for seed in range(40)]
+    damping = [point.damping_ratio for point in points]
+    claimed = np.sqrt(np.mean([point.damping_ratio_std**2 for point in points]))
+    assert 0.75 < claimed / np.std(damping) < 2.0
+    assert np.mean(damping) == pytest.approx(damping_ratio(np.array(4e-4)), rel=0.01)
+
+
+def test_too_short_a_point_and_too_large_a_change_are_refused() -> None:
+    flow = flow_of(ramp(half_cosine(1e-4, 2e-3, 2.0), 2.0))
+    with pytest.raises(IdentificationError, match="periods between"):
+        short_point(flow, start_s=1.0, stop_s=1.05)
+    with pytest.raises(IdentificationError, match="amplitude changes"):
+        short_point(flow)
+
+
+def test_a_reversed_force_is_refused_or_shows_as_negative_damping() -> None:
+    record = approached(3e-4, 3e-4)
+    record.samples[0] *= -1.0
+    point = short_point(flow_of(record), start_s=6 / 25)
+    assert point.damping_ratio < 0.0
+    with pytest.raises(IdentificationError, match="polarity"):
+        nonlinear_mode(Backbone((point.vibration,), "mode", PHI))
