@@ -154,7 +154,7 @@ class BackbonePlan(Levels, Plan):
 
 
 def check_loop(loop: PhaseLockedLoop, harmonics: int, bench: Bench) -> None:
-    """Refuse a frequency window that lacks the tested mode or leaves the bench's limits, and harmonics beyond the sample rate."""
+    """Refuse a window without the tested mode or beyond the bench's limits, and harmonics beyond the sample rate."""
     window, allowed = loop.frequency_window_hz, bench.limits.frequency_hz
     linear = bench.specimen.linear_frequency_hz
     if not window[0] < linear < window[1]:

@@ -17,6 +17,7 @@ from identification import (
     continuous_backbone,
 )
 from rig.bench import Bench
+from rig.campaigns.backbone_points import std_objection
 from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.evaluate import WHY, as_complex, as_pairs, head, quantisation_warnings
 from rig.campaigns.plan import Column, Target
@@ -77,7 +78,12 @@ def measure_continuous_backbone(
 
 
 def _ways(
-    bench: Bench, plan: ContinuousBackbonePlan, rows: np.ndarray, passages: Sequence[Passage], flow: SlowFlow, ended: str
+    bench: Bench,
+    plan: ContinuousBackbonePlan,
+    rows: np.ndarray,
+    passages: Sequence[Passage],
+    flow: SlowFlow,
+    ended: str,
 ) -> dict[str, Way]:
     """The good instants of the ways up and down: from the time at the lowest level on, and to that at the end."""
     middle = flow.time_s * bench.sample_rate_hz
@@ -85,7 +91,9 @@ def _ways(
     detuning = np.abs(flow.frequency_hz / flow.modal_frequency_hz - 1.0)
     bad["the lock was lost"] = ~(detuning <= plan.accepted_detuning)
     good = ~np.any(list(bad.values()), axis=0)
-    turn = next((p.first for p in passages if p.kind is SegmentKind.LEVEL_SWEEP and p.level < plan.levels[0]), rows.size)
+    turn = next(
+        (p.first for p in passages if p.kind is SegmentKind.LEVEL_SWEEP and p.level < plan.levels[0]), rows.size
+    )
     out = {}
     for way in WAYS:
         of_way = [p for p in passages if p.kind is not SegmentKind.RAMP and (p.first < turn) == (way == "up")]
@@ -123,7 +131,11 @@ def _measured(
             continue
         flows = [ways[name].flow for name in covered]
         found = continuous_backbone(
-            flows[0], flows[-1], levels_m=[t.level for t in some], bandwidth=plan.bandwidth, specimen=bench.specimen.name
+            flows[0],
+            flows[-1],
+            levels_m=[t.level for t in some],
+            bandwidth=plan.bandwidth,
+            specimen=bench.specimen.name,
         )
         out |= {
             target.number: _point(bench, plan, target, found, index, covered, flow, missing)
@@ -155,7 +167,7 @@ def _point(
     std = {"modal_frequency_hz": alone * float(mode.modal_frequency_std_hz[index])}
     std["damping_ratio"] = alone * float(mode.damping_ratio_std[index])
     reason = f"passed on the way {covered[0]} only ({missing})" if missing else ""
-    reason = reason or _objection(plan, std["modal_frequency_hz"] / frequency, std["damping_ratio"] / abs(damping))
+    reason = reason or std_objection(plan, std["modal_frequency_hz"] / frequency, std["damping_ratio"] / abs(damping))
     near = np.abs(np.log(flow.amplitude_m / target.level)) < plan.bandwidth
     lags = (90.0 - flow.phase_lag_deg[near] + 180.0) % 360.0 - 180.0
     return {
@@ -194,17 +206,6 @@ def _one_way(found: ContinuousBackbone, way: int, index: int) -> dict[str, float
         "stiffness_std": float(found.stiffness_std[way, index]),
         "damping_std_1_s": float(found.damping_std_1_s[way, index]),
     }
-
-
-def _objection(plan: ContinuousBackbonePlan, frequency_std: float, damping_std: float) -> str:
-    """Why a level that was passed both ways is not accepted; empty where it is."""
-    for name, std, accepted in (
-        ("modal frequency", frequency_std, plan.accepted_frequency_std),
-        ("damping", damping_std, plan.accepted_damping_std),
-    ):
-        if not std <= accepted:
-            return f"standard error of the {name} {100.0 * std:.2g} %, accepted up to {100.0 * accepted:g} %"
-    return ""
 
 
 def continuous_backbones_of(

@@ -31,7 +31,9 @@ def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int) -> SlowFlow:
 def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndarray]:
     """By reason, bool[n]: instants within whose window the output, the frequency or a sensor stood at its limit."""
     half = HALF_WINDOW_PERIODS / flow.frequency_hz
-    first, end = (np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size) for side in (-1, 1))
+    first, end = (
+        np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size) for side in (-1, 1)
+    )
     out = {}
     for reason, bit in (
         ("the output stood at its voltage limit", SATURATED),
