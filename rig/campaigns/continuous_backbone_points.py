@@ -169,7 +169,8 @@ def _point(
     reason = f"passed on the way {covered[0]} only ({missing})" if missing else ""
     reason = reason or std_objection(plan, std["modal_frequency_hz"] / frequency, std["damping_ratio"] / abs(damping))
     near = np.abs(np.log(flow.amplitude_m / target.level)) < plan.bandwidth
-    lags = (90.0 - flow.phase_lag_deg[near] + 180.0) % 360.0 - 180.0
+    # The lag itself swings while the level is ramped; this is the one that a settled vibration so far off would have.
+    lags = np.degrees(np.arctan((flow.frequency_hz[near] / frequency - 1.0) / abs(damping)))
     return {
         **head(plan, target),
         "direction": "both" if len(covered) == 2 else covered[0],
