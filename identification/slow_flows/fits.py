@@ -11,14 +11,14 @@ their expectations).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.slow_flows.signals import window_correlations
 
-__all__ = ["LocalFit", "local_fit", "noise_variances"]
+__all__ = ["LocalFit", "as_settled", "local_fit", "noise_variances"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -79,7 +79,8 @@ def local_fit(
     return LocalFit(
         stiffness=float(solution[0]),
         damping=float(solution[degree + 1]),
-        spread=np.column_stack([np.einsum("in,nm,im->i", wanted, noise, wanted) for noise in correlations]),
+        # Where nearly nothing is left of it, rounding may leave less than nothing.
+        spread=np.maximum(np.column_stack([np.sum(wanted @ noise * wanted, axis=1) for noise in correlations]), 0.0),
         moments=np.array([residual @ residual, residual @ correlations[0] @ residual]),
         expected=np.array([[np.trace(part) for part in left], [np.sum(correlations[0] * part) for part in left]]),
     )
@@ -96,3 +97,12 @@ def noise_variances(fits: Sequence[LocalFit]) -> Float:
         if both[0] < 0.0:
             return np.array([0.0, moments[0] / expected[0, 1]])
     return np.array([moments[0] / expected[0, 0], 0.0])
+
+
+def as_settled(fit: LocalFit, residual_s2: float) -> LocalFit:
+    """The fit with the stiffness that a settled point at phase resonance reads from the whole motion of the drive point.
+
+    There ``phi_d^2 F / X = D / (1 + D r / phi_d^2)`` with ``D = i w c``, r the receptance of the other modes, which the fit
+    is free of. ``residual_s2`` is ``r / phi_d^2``.
+    """
+    return replace(fit, stiffness=fit.stiffness * (1.0 + residual_s2 * fit.damping**2))

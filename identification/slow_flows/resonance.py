@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
-from identification.slow_flows.fits import LocalFit, local_fit
+from identification.slow_flows.fits import LocalFit, as_settled, local_fit
 from identification.slow_flows.signals import window_correlations
 from identification.slow_flows.slow_flow import SlowFlow
 
@@ -36,7 +36,8 @@ class Amplitudes:
 
 def fit_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> LocalFit:
     """Stiffness and damping of a slow flow where ``place`` (float[n]) is zero."""
-    return local_fit(flow.dynamic_stiffness, flow.rate_1_s, flow.amplitude_m, flow.phase_periods, place, weight, degree)
+    fit = local_fit(flow.dynamic_stiffness, flow.rate_1_s, flow.amplitude_m, flow.phase_periods, place, weight, degree)
+    return as_settled(fit, flow.residual_m_n / flow.drive_mode_shape**2)
 
 
 def amplitudes_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> Amplitudes:

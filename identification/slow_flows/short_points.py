@@ -13,7 +13,7 @@ from identification.slow_flows.slow_flow import SlowFlow
 __all__ = ["ShortPoint", "short_point"]
 
 _FEWEST_PERIODS = 2.0
-_STEADY = 0.1  # change of the amplitude below which properties are taken to change in proportion to time
+_STEADY = 0.02  # change of the amplitude below which properties are taken to change in proportion to time
 _LARGEST_CHANGE = 0.5
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
-from identification.slow_flows.fits import LocalFit, local_fit, noise_variances
+from identification.slow_flows.fits import LocalFit, as_settled, local_fit, noise_variances
 from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, derivatives
 from identification.validation import finite_array, positive
 
@@ -42,7 +42,7 @@ class SlowFlow:
     harmonics
         complex[n_channels, n, H + 1], peak, in the unit of each channel, against the phase of the oscillator.
     drive_m
-        complex[n], fundamental of the displacement at the drive point.
+        complex[n], fundamental of the tested mode's displacement at the drive point.
     dynamic_stiffness, rate_1_s
         complex[n], ``g = (phi_d^2 F - A) / X`` (1/s^2) and ``b = V / X`` (1/s): growth rate and frequency of the motion.
     stiffness, damping_1_s
@@ -57,6 +57,8 @@ class SlowFlow:
         phi_d, kg^-1/2.
     fit_periods
         Length of the sliding fits.
+    residual_m_n
+        Receptance of the other modes at the drive point, m/N, that was taken out.
     """
 
     channels: tuple[Channel, ...]
@@ -73,6 +75,7 @@ class SlowFlow:
     noise: Float
     drive_mode_shape: float
     fit_periods: float
+    residual_m_n: float
 
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
@@ -173,6 +176,7 @@ def slow_flow(
     fit_periods: float = 6.0,
     points_per_period: int = 2,
     skew_samples: ArrayLike | None = None,
+    residual_m_n: float = 0.0,
 ) -> SlowFlow:
     """Modal properties at every instant of a record.
 
@@ -196,6 +200,10 @@ def slow_flow(
         Instants per period; the window passes too little above one per period for more than two to tell more.
     skew_samples
         float[n_channels], how late each channel is, in samples; none if None.
+    residual_m_n
+        Receptance of all other modes at the drive point near the tested frequency, m/N, as a linear modal analysis has it
+        (real part of `LinearModes.receptance` without the tested mode). At rest near phase resonance it does not matter; a
+        ramp faster than the free decay takes a multiple of the settled force, and without it the damping is off by a percent.
 
     Returns
     -------
@@ -219,12 +227,12 @@ def slow_flow(
     force, drive = find_role(channels, "force"), find_role(channels, "drive")
     at = _instants(theta, harmonics, fit_periods, points_per_period)
     order = MOTION_ORDER[channels[drive].motion]
-    rows = [*range(len(channels)), drive, drive, drive]
-    orders = (*[0] * len(channels), -order, 1 - order, 2 - order)
+    rows = [*range(len(channels)), drive, drive, drive, force, force]
+    orders = (*[0] * len(channels), -order, 1 - order, 2 - order, 1, 2)
     smooth = derivatives(theta, data[rows], rate_hz, delay_s[rows], orders)
     found = amplitudes(theta, smooth, at, harmonics)
     found[: len(channels), :, 0] = amplitudes(theta, data, at, 0)[..., 0].real
-    x, v, a = found[-3:, :, 1]
+    x, v, a = found[-5:-2, :, 1] - residual_m_n * found[[force, -2, -1], :, 1]
     if not np.all(np.abs(x) > 0.0):
         raise IdentificationError("samples: the drive point does not move, nothing can be identified")
     shape = float(drive_mode_shape)
@@ -245,13 +253,14 @@ def slow_flow(
         drive_m=x,
         dynamic_stiffness=stiffness,
         rate_1_s=rate,
-        stiffness=np.array([fit.stiffness for fit in fits]),
+        stiffness=np.array([as_settled(fit, residual_m_n / shape**2).stiffness for fit in fits]),
         damping_1_s=np.array([fit.damping for fit in fits]),
         stiffness_std=errors[:, 0],
         damping_std_1_s=errors[:, 1],
         noise=noise,
         drive_mode_shape=shape,
         fit_periods=fit_periods,
+        residual_m_n=residual_m_n,
     )
 
 

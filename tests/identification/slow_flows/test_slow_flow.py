@@ -92,6 +92,24 @@ def test_the_high_pass_of_the_sensors_does_no_harm() -> None:
     np.testing.assert_allclose(filtered.damping_ratio[some], plain.damping_ratio[some], rtol=0.01)
 
 
+def test_the_residual_of_other_modes_matters_off_resonance_and_is_taken_out() -> None:
+    record = ramp(LEVEL, 2.0, linear=True)
+    turned = record.theta * (1.0 - 0.01)
+    own = 3e-4 * np.exp(1j * turned)
+    rate = 0.99j * modal_rad_s(np.zeros(1))[0]
+    w = modal_rad_s(np.zeros(1))[0]
+    force = (rate**2 + 0.008 * w * rate + w**2) * own / PHI**2
+    residual = 4e-6
+    motion = rate**2 * (own + residual * force)
+    pure = Ramp(turned, np.array([force.real, motion.real, TIP * motion.real]), record.size_m)
+    with_it, without = flow_of(pure, residual_m_n=residual), flow_of(pure)
+    some = inner(with_it)
+    np.testing.assert_allclose(with_it.damping_ratio[some], 0.004, rtol=5e-4)
+    settled = 1.0 / (1.0 / (0.008j * w**2) + residual / PHI**2)
+    np.testing.assert_allclose(with_it.stiffness[some], w**2 + settled.real, rtol=1e-6)
+    assert np.abs(without.damping_ratio[some] / 0.004 - 1.0).min() > 3e-3
+
+
 def test_skew_between_the_channels_is_taken_out() -> None:
     record = ramp(LEVEL, 2.0)
     late = record.samples.copy()
