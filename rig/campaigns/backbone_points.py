@@ -33,7 +33,7 @@ from rig.campaigns.recorded_flow import flagged, recorded_flow
 
 __all__ = ["BACKBONE_COLUMNS", "backbone_of", "measure_backbone_point", "std_objection"]
 
-NEAR = 0.2  # in the logarithm of the amplitude, of what a point of the slow flow is made
+NEAR = 0.1  # in the logarithm of the amplitude, of what a point of the slow flow is made
 
 BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),
