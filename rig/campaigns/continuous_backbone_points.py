@@ -21,7 +21,7 @@ from rig.campaigns.backbone_points import std_objection
 from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.evaluate import WHY, as_complex, as_pairs, head, quantisation_warnings
 from rig.campaigns.plan import Column, Target
-from rig.campaigns.recorded_flow import flagged, recorded_flow
+from rig.campaigns.recorded_flow import AT_VOLTAGE_LIMIT, flagged, recorded_flow
 from rig.campaigns.rounds import Passage
 from rig.sequencer.layout import Outcome, SegmentKind
 
@@ -90,7 +90,8 @@ def _ways(
     bad = flagged(bench, rows, flow)
     detuning = np.abs(flow.frequency_hz / flow.modal_frequency_hz - 1.0)
     bad["the lock was lost"] = ~(detuning <= plan.accepted_detuning)
-    good = ~np.any(list(bad.values()), axis=0)
+    # An amplitude that is kept low spoils no waveform: what was reached is good.
+    good = ~np.any([at for reason, at in bad.items() if reason != AT_VOLTAGE_LIMIT], axis=0)
     turn = next(
         (p.first for p in passages if p.kind is SegmentKind.LEVEL_SWEEP and p.level < plan.levels[0]), rows.size
     )
@@ -102,7 +103,10 @@ def _ways(
             inside |= (middle >= passage.first) & (middle < passage.end)
         why = _why(of_way, ended) or next((reason for reason, at in bad.items() if np.any(at & inside)), "")
         keep = inside & good
-        out[way] = Way(flow.select(keep) if np.count_nonzero(keep) >= FEWEST_INSTANTS else None, why or "not passed")
+        out[way] = Way(
+            flow.select(keep) if np.count_nonzero(keep) >= FEWEST_INSTANTS else None,
+            why or "the level did not come so far",
+        )
     return out
 
 
@@ -125,11 +129,11 @@ def _measured(
         groups.setdefault(covered, []).append(target)
     out: dict[int, dict[str, Any]] = {}
     for covered, some in groups.items():
-        missing = "; ".join(f"way {name}: {ways[name].why}" for name in WAYS if name not in covered)
+        missing = _together({name: ways[name].why for name in WAYS if name not in covered})
         if not covered:
-            out |= {target.number: _failed(plan, target, f"not passed ({missing})") for target in some}
+            out |= {target.number: _failed(plan, target, f"not passed: {missing}") for target in some}
             continue
-        flows = [ways[name].flow for name in covered]
+        flows = [way.flow for way in map(ways.__getitem__, covered) if way.flow is not None]
         found = continuous_backbone(
             flows[0],
             flows[-1],
@@ -142,6 +146,13 @@ def _measured(
             for index, target in enumerate(some)
         }
     return out
+
+
+def _together(reasons: Mapping[str, str]) -> str:
+    """Reasons by way, in one line; one that both share is said once."""
+    if len(reasons) == 2 and len(set(reasons.values())) == 1:
+        return next(iter(reasons.values()))
+    return "; ".join(f"way {name}: {why}" for name, why in reasons.items())
 
 
 def _failed(plan: ContinuousBackbonePlan, target: Target, reason: str) -> dict[str, Any]:

@@ -7,7 +7,9 @@ from rig.bench import Bench
 from rig.campaigns.evaluate import channels_of
 from rig.tick.layout import FREQUENCY_CLAMPED, SATURATED, SENSOR_AT_RANGE
 
-__all__ = ["flagged", "recorded_flow"]
+__all__ = ["AT_VOLTAGE_LIMIT", "flagged", "recorded_flow"]
+
+AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
 
 HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far an instant looks to either side
 
@@ -36,7 +38,7 @@ def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndar
     )
     out = {}
     for reason, bit in (
-        ("the output stood at its voltage limit", SATURATED),
+        (AT_VOLTAGE_LIMIT, SATURATED),
         ("the frequency stood at an end of its window", FREQUENCY_CLAMPED),
         ("a sensor was near its range", SENSOR_AT_RANGE),
     ):

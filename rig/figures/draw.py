@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
-from rig.figures.continuous_backbone import draw_ways
+from rig.figures.continuous_backbone import draw_differences, draw_ways
 from rig.figures.nonlinear_mode import draw_properties
 from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
 from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
@@ -69,9 +69,12 @@ def _draw_backbone(page: "Figure", recording: Recording) -> None:
 
 
 def _draw_continuous_backbone(page: "Figure", recording: Recording) -> None:
-    axes = page.subplots(2, 2)
-    draw_ways(axes[0], list(recording.latest.values()))
-    _draw_history(axes[1, 0], axes[1, 1], recording)
+    page.set_size_inches(9.0, 9.6)
+    axes = page.subplots(3, 2)
+    points = list(recording.latest.values())
+    draw_ways(axes[0], points)
+    draw_differences(axes[1], points)
+    _draw_history(axes[2, 0], axes[2, 1], recording)
     _say_what_it_is(page, recording)
 
 

@@ -263,7 +263,9 @@ def advance(
             reacquire(lock)
         if segment.kind == SETTLE:
             forget_periods(settling)
-    if unreached and is_ramp(segment.kind):
+    if (
+        unreached and is_ramp(segment.kind) and segment.level > progress.level
+    ):  # a falling level comes into reach by itself
         progress.frozen_cycles += cycle - progress.last_cycle
     progress.last_cycle = cycle
     elapsed = cycle - progress.start_cycle
