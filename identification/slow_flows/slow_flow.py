@@ -48,8 +48,8 @@ class SlowFlow:
     stiffness, damping_1_s
         float[n], k (1/s^2) and c (1/s) from least squares over ``fit_periods`` around each instant.
     stiffness_std, damping_std_1_s
-        float[n], their standard errors from what the fits leave over, overlapping windows; what properties bend within twice
-        that length counts as noise.
+        float[n], their standard errors from what longer fits leave over, overlapping windows accounted for; what properties
+        bend within twice that length counts as noise.
     noise
         float[n, 2], variances of real and imaginary part of ``g X``, (m/s^2)^2: the part that averages out as white noise
         of the force does, and the part that averages out faster (`identification.slow_flows.fits`).
