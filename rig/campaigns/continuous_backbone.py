@@ -40,7 +40,7 @@ class ContinuousBackbonePlan(Levels, Plan):
     """Time at the lowest level after the way down: noise counts most there, periods."""
     margin: float = Field(0.05, gt=0, le=1)
     """How far the level goes beyond the lowest and highest of ``levels_m``, relative."""
-    bandwidth: float = Field(0.15, gt=0, le=1)
+    bandwidth: float = Field(0.08, gt=0, le=1)
     """Half width, in the logarithm of the amplitude, of what is taken together for one level."""
     harmonics: int = Field(7, ge=1, le=50)
     """Highest harmonic that is evaluated."""
