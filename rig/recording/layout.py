@@ -46,8 +46,10 @@ def reading(path: Path) -> Iterator[None]:
     """Turn whatever h5py raises on a damaged or vanished file into one ``RecordingError`` that names ``path``."""
     try:
         yield
-    except RecordingError:
-        raise
+    except RecordingError as error:
+        if str(error).startswith(f"{path}: "):
+            raise
+        raise RecordingError(f"{path}: damaged: {error}") from error
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, MemoryError) as error:
         raise RecordingError(f"{path}: damaged: cannot be read ({one_line(error)})") from error
 

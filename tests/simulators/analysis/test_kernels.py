@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from simulators.analysis.balance import Balance, Conditions
+from simulators.analysis.balance import Balance
+from simulators.analysis.conditions import Conditions
 from simulators.analysis.kernels import friction_over_a_period
 from simulators.analysis.series import Series
 from tests.reference.friction import jenkins_over_a_period
@@ -31,7 +32,7 @@ def test_series_go_back_and_forth() -> None:
     np.testing.assert_allclose(series.to_complex(samples @ series.projection.T), harmonics, atol=1e-12)
 
 
-@pytest.mark.parametrize("held", ["force", "voltage"])
+@pytest.mark.parametrize("held", ["force", "force-rms", "response", "voltage"])
 @pytest.mark.parametrize("at", ["lag", "frequency"])
 def test_jacobian_agrees_with_finite_differences(held: str, at: str) -> None:
     balance = Balance(every_site(), 4, 128)

@@ -1,0 +1,55 @@
+"""Gain design: a plant near a mode, laws around it, and what their loop does, as pure functions.
+
+`PlantModel.from_frequency_responses` fits the plant; `hippold_gains`, `exact_phase_law`, `exact_scheduled_law`,
+`frequency_error_law` and `complex_response_law` give gains; `assess` says what they do, `design_phase_law` chooses.
+"""
+
+from controller.tuning.design import Design, Settling, Steps, assess, design_phase_law, worst
+from controller.tuning.exact import complex_response_law, exact_phase_law, exact_scheduled_law, frequency_error_law
+from controller.tuning.hippold import HippoldGains, hippold_gains
+from controller.tuning.laws import (
+    ComplexResponseLaw,
+    ForceLaw,
+    FrequencyErrorLaw,
+    LogForceLaw,
+    LogResponseLaw,
+    PhaseLaw,
+)
+from controller.tuning.loop import ControlLoop, lag_per_frequency
+from controller.tuning.noise import LowPassChoice, low_pass_from_densities, low_pass_from_noise
+from controller.tuning.plant import PlantModel
+from controller.tuning.stability import Margins, closed_loop_poles, margins, unstable_poles
+from controller.tuning.steps import settling_s, step_response
+
+__all__ = [
+    "ComplexResponseLaw",
+    "ControlLoop",
+    "Design",
+    "ForceLaw",
+    "FrequencyErrorLaw",
+    "HippoldGains",
+    "LogForceLaw",
+    "LogResponseLaw",
+    "LowPassChoice",
+    "Margins",
+    "PhaseLaw",
+    "PlantModel",
+    "Settling",
+    "Steps",
+    "assess",
+    "closed_loop_poles",
+    "complex_response_law",
+    "design_phase_law",
+    "exact_phase_law",
+    "exact_scheduled_law",
+    "frequency_error_law",
+    "hippold_gains",
+    "lag_per_frequency",
+    "low_pass_from_densities",
+    "low_pass_from_noise",
+    "margins",
+    "settling_s",
+    "step_response",
+    "unstable_poles",
+    "worst",
+]

@@ -1,0 +1,211 @@
+"""Designed gains with everything that speaks for and against them, as numbers and as arrays to plot."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.tuning.exact import exact_phase_law, frequencies_for
+from controller.tuning.hippold import hippold_gains
+from controller.tuning.laws import ComplexResponseLaw, FrequencyLaw
+from controller.tuning.loop import ControlLoop
+from controller.tuning.plant import PlantModel
+from controller.tuning.stability import Margins, closed_loop_poles, margins, unstable_poles
+from controller.tuning.steps import settling_s, step_response
+
+__all__ = ["Design", "Settling", "Steps", "assess", "design_phase_law", "worst"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+LEVEL_STEP = 0.3  # about what a backbone of ten levels over a decade steps by
+POOR_SENSITIVITY = 3.0
+POOR_FIT = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Step responses as demodulated, one entry per instant."""
+
+    time_s: Real
+    """Instants [n]."""
+    lag_after_target: Real
+    """Lag after a unit step of the wanted lag [n]."""
+    lag_after_frequency_rad: Real
+    """Lag after the rig's frequencies have shifted by D w_0, half the bandwidth [n]; 45 deg if nothing acted."""
+    log_response_after_level: Real
+    """ln|A| after a unit step of the level's logarithm [n]."""
+    lag_after_level_rad: Real
+    """Lag after a unit step of the level's logarithm [n]."""
+
+
+@dataclass(frozen=True)
+class Settling:
+    """Periods until a step has died away; infinite where it does not within the time looked at."""
+
+    frequency_shift: float
+    """Lag within 1 deg after the rig's frequencies have shifted by half the bandwidth."""
+    level_amplitude: float
+    """Response within 1 % after the level has been raised by 30 %."""
+    level_lag: float
+    """Lag within 1 deg after the level has been raised by 30 %."""
+
+    @property
+    def longest(self) -> float:
+        """The longest of them: about the periods that a backbone point waits."""
+        return max(self.frequency_shift, self.level_amplitude, self.level_lag)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Laws on a plant at a lag: margins, poles, step responses, and whether they are fit to be used."""
+
+    loop: ControlLoop
+    """Plant, low-pass and laws."""
+    unstable_poles: int
+    """Closed-loop poles in the right half plane."""
+    poles_rad_s: Complex
+    """Poles of the closed loop within half the frequency [n] (1/s)."""
+    frequency_margins: Margins
+    """Of the frequency law, the amplitude law closed; they mean nothing where the loop is unstable."""
+    amplitude_margins: Margins | None
+    """Of the amplitude law with the frequency held; None where the level is a voltage."""
+    settling: Settling
+    """Periods; infinite where the loop is unstable."""
+    failed: tuple[str, ...]
+    """Assumptions of the gains' design that do not hold."""
+    notes: tuple[str, ...]
+    """What was chosen, and why."""
+    reasons: tuple[str, ...]
+    """Why the gains are not fit to be used; none where they are."""
+    omega_rad_s: Real
+    """Frequencies of a slow change [n] (rad/s)."""
+    frequency_loop_gain: Complex
+    """L of the frequency law at i omega [n]."""
+    amplitude_loop_gain: Complex
+    """L of the amplitude law at i omega and at -i omega [2, n]; 0 where there is none."""
+    steps: Steps | None
+    """Step responses; None where the loop is unstable."""
+
+    @property
+    def suited(self) -> bool:
+        """Whether nothing speaks against the gains."""
+        return not self.reasons
+
+    @property
+    def stable(self) -> bool:
+        """Whether every closed-loop pole decays."""
+        return self.unstable_poles == 0
+
+
+def assess(loop: ControlLoop, *, failed: Sequence[str] = (), notes: Sequence[str] = (), end_s: float = 0.0) -> Design:
+    """Everything about given laws on a known plant; ``end_s`` of the step responses is 600 periods where it is 0."""
+    omega = frequencies_for(loop.plant)
+    gain = loop.frequency_loop_gain(1j * omega)
+    upper, lower = loop.amplitude_loop_gain(1j * omega), loop.amplitude_loop_gain(-1j * omega)
+    both = np.concatenate([-omega[::-1], omega])
+    count = unstable_poles(loop)
+    poles = closed_loop_poles(loop)
+    frequency = margins(omega, gain)
+    amplitude = None if loop.amplitude_law is None else margins(both, np.concatenate([lower[::-1], upper]))
+    period_s = 2.0 * math.pi / loop.omega_rad_s
+    steps = _steps(loop, end_s or 600.0 * period_s) if count == 0 else None
+    return Design(
+        loop=loop,
+        unstable_poles=count,
+        poles_rad_s=poles,
+        frequency_margins=frequency,
+        amplitude_margins=amplitude,
+        settling=_settling(steps, period_s),
+        failed=tuple(failed),
+        notes=tuple(notes),
+        reasons=_reasons(loop, count, poles, frequency, amplitude),
+        omega_rad_s=omega,
+        frequency_loop_gain=gain,
+        amplitude_loop_gain=np.stack([upper, lower]),
+        steps=steps,
+    )
+
+
+def worst(loop: ControlLoop, plants: Sequence[PlantModel]) -> Design:
+    """Laws on the plant of several that they suit least: unstable first, then by the peak of the sensitivity."""
+    if not plants:
+        raise ValueError("plants: none given, allowed is at least one")
+
+    def badness(plant: PlantModel) -> tuple[int, float]:
+        there = replace(loop, plant=plant)
+        omega = frequencies_for(plant)
+        return unstable_poles(there), margins(omega, there.frequency_loop_gain(1j * omega)).sensitivity_peak
+
+    return assess(replace(loop, plant=max(plants, key=badness)))
+
+
+def design_phase_law(plants: Sequence[PlantModel], low_pass_rad_s: float, *, sensitivity_peak: float = 1.6) -> Design:
+    """Phase PI for resonance: closed form where its assumptions hold on the first plant, else on the exact map of all.
+
+    The first plant is the one that was measured; the others are what it becomes over the levels of the test.
+    """
+    closed = hippold_gains(plants[0], low_pass_rad_s)
+    if not closed.failed:
+        loop = ControlLoop(plants[0], low_pass_rad_s, closed.law)
+        design = worst(loop, plants)
+        if design.stable and design.frequency_margins.sensitivity_peak <= sensitivity_peak:
+            return replace(design, notes=("gains in closed form (Hippold et al.)",))
+    law: FrequencyLaw = exact_phase_law(plants, low_pass_rad_s, sensitivity_peak=sensitivity_peak)
+    note = f"largest ki with max |S| <= {sensitivity_peak:g} on the exact map"
+    return replace(worst(ControlLoop(plants[0], low_pass_rad_s, law), plants), failed=closed.failed, notes=(note,))
+
+
+def _steps(loop: ControlLoop, end_s: float) -> Steps:
+    half_bandwidth = loop.plant.damping_ratio * loop.plant.frequency_rad_s
+    time, target = _step(loop, loop.lag_after_target, end_s)
+    _, shifted = _step(loop, loop.lag_after_frequency, end_s)
+    _, response = _step(loop, lambda s: loop.response_after_level(s)[0], end_s)
+    _, lag = _step(loop, lambda s: loop.response_after_level(s)[1], end_s)
+    return Steps(time, target, half_bandwidth * shifted, response, lag)
+
+
+def _step(loop: ControlLoop, transfer: Callable[[Complex], Complex], end_s: float) -> tuple[Real, Real]:
+    """Step response without what is faster than half the frequency, where the plant is the fit's and not the rig's."""
+    return step_response(transfer, end_s, highest_rad_s=0.5 * loop.omega_rad_s)
+
+
+def _settling(steps: Steps | None, period_s: float) -> Settling:
+    if steps is None:
+        return Settling(math.inf, math.inf, math.inf)
+    degree = math.radians(1.0)
+    rise = LEVEL_STEP * (steps.log_response_after_level - steps.log_response_after_level[-1])
+    return Settling(
+        settling_s(steps.time_s, steps.lag_after_frequency_rad, degree) / period_s,
+        settling_s(steps.time_s, rise, 0.01) / period_s,
+        settling_s(steps.time_s, LEVEL_STEP * steps.lag_after_level_rad, degree) / period_s,
+    )
+
+
+def _reasons(
+    loop: ControlLoop, count: int, poles: Complex, frequency: Margins, amplitude: Margins | None
+) -> tuple[str, ...]:
+    out = []
+    where = f"at {loop.omega_rad_s / 2.0 / math.pi:.2f} Hz, {100.0 * loop.plant.damping_ratio:.3g} % damping"
+    if count > 0:
+        growing = poles[poles.real > 0.0]
+        growth = f", growing at {growing.real.max():.3g} 1/s" if growing.size else ""
+        out.append(f"the loop is unstable {where}: {count} pole(s) in the right half plane{growth}")
+    elif frequency.sensitivity_peak > POOR_SENSITIVITY:
+        out.append(
+            f"the frequency loop hardly holds {where}: max |S| = {frequency.sensitivity_peak:.2f}, "
+            f"allowed is {POOR_SENSITIVITY:g}"
+        )
+    elif amplitude is not None and amplitude.sensitivity_peak > POOR_SENSITIVITY:
+        kind = "complex response control" if isinstance(loop.amplitude_law, ComplexResponseLaw) else "amplitude loop"
+        peak = amplitude.sensitivity_peak
+        out.append(f"the {kind} hardly holds {where}: max |S| = {peak:.2f}, allowed is {POOR_SENSITIVITY:g}")
+    if loop.plant.fit_error > POOR_FIT:
+        out.append(
+            f"the plant's model misses its measurement by {100.0 * loop.plant.fit_error:.0f} %, "
+            f"allowed is {100.0 * POOR_FIT:.0f} %: another mode inside the band, or a nonlinear or noisy test"
+        )
+    if loop.plant.coupled_pole_rad_s.real >= 0.0:
+        out.append(f"the plant itself is unstable: coupled pole {loop.plant.coupled_pole_rad_s:.4g} 1/s")
+    return tuple(out)

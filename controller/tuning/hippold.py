@@ -1,0 +1,71 @@
+"""Gains from a linear modal test in closed form (Hippold et al. 2024)."""
+
+import cmath
+import math
+from dataclasses import dataclass
+
+from controller.tuning.laws import PhaseLaw
+from controller.tuning.plant import PlantModel
+
+__all__ = ["HippoldGains", "hippold_gains"]
+
+DETUNED = 0.5  # of the pole's own decay: |w_p - w_0| above it is far
+REACTIVE_DEG = 20.0  # phase of the force behind a voltage that a phase-neutral exciter does not have
+
+
+@dataclass(frozen=True)
+class HippoldGains:
+    """A phase PI that puts the poles of the idealised loop where they are wanted, and what speaks against it."""
+
+    law: PhaseLaw
+    """The gains."""
+    poles_rad_s: tuple[complex, complex, complex]
+    """Poles of the idealised loop (1/s)."""
+    failed: tuple[str, ...]
+    """Assumptions of the closed form that do not hold on this plant; none where it may be used."""
+
+
+def hippold_gains(plant: PlantModel, low_pass_rad_s: float, *, imaginary_part: float = 0.0) -> HippoldGains:
+    """Closed-form gains of the phase PI at phase resonance.
+
+    With ds = D w_0 of the structure, dp the decay of the coupled pole (which is D_p w_p as measured in the coupled plant; a
+    further factor 1 + mu would enter the exciter's mass twice) and db = dp/w_LP, the idealised loop has the poles
+    ``w_LP (lR, lR +- i lI)`` with ``lR = -(1 + db)/3`` for
+
+        ``kp = w_LP (ds/dp)(3 lR^2 + lI^2 - db)``,  ``ki = w_LP^2 (ds/dp)(-lR)(lR^2 + lI^2)``.
+
+    ``imaginary_part`` is lI; 0 is conservative. The idealised loop has the plant ``T(s) = dp/(ds (s + dp))``: one coupled pole,
+    at the frequency of the structure, behind a phase-neutral exciter, no delay.
+    """
+    ds = plant.damping_ratio * plant.frequency_rad_s
+    offset = plant.pole_offset_rad_s()
+    dp = -offset.real
+    if dp <= 0.0:
+        raise ValueError(f"coupled pole = {offset:.4g} 1/s from the mode: allowed is one that decays")
+    db = dp / low_pass_rad_s
+    real, square = -(1.0 + db) / 3.0, imaginary_part**2
+    law = PhaseLaw(
+        low_pass_rad_s * ds / dp * (3.0 * real**2 + square - db),
+        low_pass_rad_s**2 * ds / dp * -real * (real**2 + square),
+    )
+    w = low_pass_rad_s
+    poles = (complex(real * w), complex(real, imaginary_part) * w, complex(real, -imaginary_part) * w)
+    return HippoldGains(law, poles, _failed(plant, offset, low_pass_rad_s))
+
+
+def _failed(plant: PlantModel, offset: complex, low_pass_rad_s: float) -> tuple[str, ...]:
+    out = []
+    resonance = plant.lock_frequency_rad_s()
+    if abs(offset.imag) > DETUNED * abs(offset.real):
+        coupled_hz, mode_hz = (plant.coupled_pole_rad_s.imag / 2.0 / math.pi, resonance / 2.0 / math.pi)
+        out.append(
+            f"coupled pole at {coupled_hz:.2f} Hz, the structure's at {mode_hz:.2f} Hz: {abs(offset.imag):.1f} rad/s apart, "
+            f"with a decay of {-offset.real:.1f} 1/s"
+        )
+    force = complex(plant.force_per_v(1j * resonance))
+    phase_deg = math.degrees(cmath.phase(force))
+    if abs(phase_deg) > REACTIVE_DEG:
+        out.append(f"exciter not phase neutral: force {phase_deg:+.0f} deg from the voltage at resonance")
+    if plant.delay_s * low_pass_rad_s > 0.2:
+        out.append(f"delay of {plant.delay_s * 1e3:.2f} ms is not short beside the low-pass, 1/{low_pass_rad_s:.3g} s")
+    return tuple(out)

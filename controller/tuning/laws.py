@@ -1,0 +1,175 @@
+"""Laws whose gains are designed, linearised about a locked state.
+
+Each is a row or two of the feedback ``v = K(s) (reference - m)`` from the demodulated ``m = (ln|F|, arg F, ln|A|, arg A)``
+to ``v = (ln|U|, arg U, Omega)``, all of them small deviations; arguments are taken against the oscillator's phase.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.tuning.plant import PlantModel
+
+__all__ = [
+    "AmplitudeLaw",
+    "ComplexResponseLaw",
+    "ForceLaw",
+    "FrequencyErrorLaw",
+    "FrequencyLaw",
+    "LogForceLaw",
+    "LogResponseLaw",
+    "PhaseLaw",
+]
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class PhaseLaw:
+    """``Omega = omega_m + kp e + ki int e``, e = wanted minus measured lag in rad."""
+
+    proportional_per_s: float
+    """kp (1/s)."""
+    integral_per_s2: float
+    """ki (1/s^2)."""
+
+    def phase_gain(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """From phase error (rad) to frequency (rad/s)."""
+        del plant, lag_deg
+        return self.proportional_per_s + self.integral_per_s2 / s
+
+
+@dataclass(frozen=True)
+class FrequencyErrorLaw:
+    """``Omega = omega_m + k_p eps + k int eps`` with ``eps = (phi_d^2 Omega/2)(|F|/|A|) sin(e)/|sin phi*|``.
+
+    The error eps is the distance in frequency to the wanted lag: gains are scheduled by the damping that is measured
+    with every sample. With the gain ``proportional`` it is the phase PI whose gains scale with the identified damping.
+    """
+
+    integral_per_s: float
+    """k (1/s)."""
+    proportional: float = 0.0
+    """k_p (1)."""
+    shape_factor: float = 1.0
+    """phi_d^2 as the law takes it, over that of the plant."""
+
+    def phase_gain(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """From phase error (rad) to frequency (rad/s)."""
+        slope = self.shape_factor * frequency_per_lag(plant, lag_deg)
+        return (self.proportional + self.integral_per_s / s) * slope
+
+
+FrequencyLaw = PhaseLaw | FrequencyErrorLaw
+
+
+def frequency_per_lag(plant: PlantModel, lag_deg: float) -> float:
+    """``(phi_d^2 W/2) |F|/|A| / |sin phi*|`` in rad/s per rad: about D w_0/sin^2 phi*."""
+    omega = plant.lock_frequency_rad_s(lag_deg)
+    size = 1.0 / abs(complex(plant.accelerance(1j * omega)))
+    return 0.5 * plant.drive_shape**2 * omega * size / abs(math.sin(math.radians(lag_deg)))
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """The paper's force loop ``U = K3 e_F + K4 int e_F``."""
+
+    k3_v_n: float
+    """K3 (V/N)."""
+    k4_v_n_s: float
+    """K4 (V/(N s))."""
+
+    def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        per_volt = abs(complex(plant.force_per_v(1j * plant.lock_frequency_rad_s(lag_deg))))
+        return _amplitude_row(s, 0, (self.k3_v_n + self.k4_v_n_s / s) * per_volt)
+
+    def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        return self.rows(s, plant, lag_deg)[:, :, 0]
+
+
+@dataclass(frozen=True)
+class LogForceLaw:
+    """``ln U = kp e + ki int e`` with ``e = ln(F*/|F|)``."""
+
+    proportional: float
+    """kp (1)."""
+    integral_per_s: float
+    """ki (1/s)."""
+
+    def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        del plant, lag_deg
+        return _amplitude_row(s, 0, self.proportional + self.integral_per_s / s)
+
+    def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        return self.rows(s, plant, lag_deg)[:, :, 0]
+
+
+@dataclass(frozen=True)
+class LogResponseLaw:
+    """``ln U = kp e + ki int e`` with ``e = ln(A_ref/|A|)``."""
+
+    proportional: float
+    """kp (1)."""
+    integral_per_s: float
+    """ki (1/s)."""
+
+    def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        del plant, lag_deg
+        return _amplitude_row(s, 2, self.proportional + self.integral_per_s / s)
+
+    def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        return self.rows(s, plant, lag_deg)[:, :, 2]
+
+
+@dataclass(frozen=True)
+class ComplexResponseLaw:
+    """``ln U_c = kp E + K int E``, ``E = ln(A_ref/|A|) + i(phi_0 - arg A)``; around it, if wanted, a force loop.
+
+    The force loop is ``d ln A_ref/dt = k_F ln(F* sin psi*/(|F| sin psi))``: active force drives the level.
+    """
+
+    proportional: complex
+    """kp (1)."""
+    integral_per_s: float
+    """K (1/s)."""
+    force_per_s: float = 0.0
+    """k_F (1/s); 0 where the level is that of the response."""
+
+    def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        del plant
+        force = self.force_per_s / s
+        cot = 1.0 / math.tan(math.radians(lag_deg))
+        level = np.stack([force, force * cot, np.ones_like(s), -force * cot], axis=-1)
+        phase = np.zeros_like(level)
+        phase[:, 3] = 1.0
+        return self._turn(s, np.stack([level, phase], axis=1))
+
+    def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        del plant, lag_deg
+        error = np.stack([self.force_per_s / s if self.force_per_s else np.ones_like(s), np.zeros_like(s)], axis=-1)
+        return self._turn(s, error[:, :, None])[:, :, 0]
+
+    def _turn(self, s: Complex, error: Complex) -> Complex:
+        """(kp + K/s) E, real and imaginary part apart [n, 2, ...]."""
+        real, imag = self.proportional.real + self.integral_per_s / s, complex(self.proportional).imag
+        real = real[:, None]
+        return np.stack([real * error[:, 0] - imag * error[:, 1], imag * error[:, 0] + real * error[:, 1]], axis=1)
+
+
+AmplitudeLaw = ForceLaw | LogForceLaw | LogResponseLaw | ComplexResponseLaw
+
+
+def _amplitude_row(s: Complex, measured: int, gain: Complex) -> Complex:
+    out = np.zeros((s.size, 2, 4), np.complex128)
+    out[:, 0, measured] = gain
+    return out

@@ -1,0 +1,141 @@
+"""The linearised loop: slow changes of the output's amplitude, phase and frequency, and what the demodulators make of them.
+
+With ``u = Re U exp(a + i b + i theta)`` and ``theta' = W + Omega``, a slow complex change ``c = a + i(b + delta)``,
+``delta = Omega/s``, of the output leaves a linear plant as ``h c`` with the envelope's transfer function
+``h(s) = H(s + i W)/H(i W)``. Its coefficients are complex; real signals see
+
+    ``P = [h(s) + h*(s)]/2``, ``R = [h(s) - h*(s)]/(2 i)``, ``h*(s) = H(s - i W)/H(-i W)``,
+
+so that ``ln|Y| <- P a - R (b + delta)`` and ``arg Y <- R a + P (b + delta) - delta``. From frequency to lag that is the map
+``T(s) = [P_F(s) - P_A(s)]/s``. Demodulators add their low-pass ``w_LP/(s + w_LP)``, the rig its delay.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from controller.tuning.laws import AmplitudeLaw, ComplexResponseLaw, FrequencyLaw
+from controller.tuning.plant import PlantModel
+
+__all__ = ["ControlLoop", "lag_per_frequency"]
+
+Complex = NDArray[np.complex128]
+
+
+def envelope(response: Callable[[Complex], Complex], s: Complex, omega: float) -> tuple[Complex, Complex]:
+    """P(s) and R(s) of a response H at the frequency omega (rad/s)."""
+    upper = response(s + 1j * omega) / response(np.array([1j * omega]))
+    lower = response(s - 1j * omega) / response(np.array([-1j * omega]))
+    return 0.5 * (upper + lower), -0.5j * (upper - lower)
+
+
+def lag_per_frequency(plant: PlantModel, s: ArrayLike, lag_deg: float = -90.0) -> Complex:
+    """T(s) in s: change of the lag (rad) per change of the oscillator's frequency (rad/s), no low-pass, no delay."""
+    s = np.atleast_1d(np.asarray(s, np.complex128))
+    omega = plant.lock_frequency_rad_s(lag_deg)
+    difference = envelope(plant.force_per_v, s, omega)[0] - envelope(plant.acceleration_per_v, s, omega)[0]
+    return np.asarray(difference / s, np.complex128)
+
+
+@dataclass(frozen=True)
+class ControlLoop:
+    """Plant, demodulator and laws at one lag; everything that follows is of its linearisation."""
+
+    plant: PlantModel
+    low_pass_rad_s: float
+    """w_LP of the demodulators: first-order low-pass, or adaptive filter, which averages to the same."""
+    frequency_law: FrequencyLaw
+    amplitude_law: AmplitudeLaw | None = None
+    """None: the level is the output's amplitude in volts."""
+    lag_deg: float = -90.0
+
+    @cached_property
+    def omega_rad_s(self) -> float:
+        """W: frequency of the locked state."""
+        return self.plant.lock_frequency_rad_s(self.lag_deg)
+
+    def measured(self, s: Complex) -> Complex:
+        """M(s) [n, 4, 3]: from (ln|U|, arg U, Omega) to (ln|F|, arg F, ln|A|, arg A) as demodulated."""
+        rows = []
+        for response in (self.plant.force_per_v, self.plant.acceleration_per_v):
+            p, r = envelope(response, s, self.omega_rad_s)
+            rows += [np.stack([p, -r, -r / s], axis=-1), np.stack([r, p, (p - 1.0) / s], axis=-1)]
+        return np.stack(rows, axis=1) * self._smoothing(s)[:, None, None]
+
+    def _smoothing(self, s: Complex) -> Complex:
+        return np.asarray(self.low_pass_rad_s / (s + self.low_pass_rad_s) * np.exp(-s * self.plant.delay_s))
+
+    def feedback(self, s: Complex) -> Complex:
+        """K(s) [n, 3, 4]: from the measured deviations to (ln|U|, arg U, Omega)."""
+        out = np.zeros((s.size, 3, 4), np.complex128)
+        if self.amplitude_law is not None:
+            out[:, :2] = self.amplitude_law.rows(s, self.plant, self.lag_deg)
+        gain = self.frequency_law.phase_gain(s, self.plant, self.lag_deg)
+        out[:, 2, 1], out[:, 2, 3] = gain, -gain  # the error is the wanted lag less arg F - arg A
+        return out
+
+    def return_difference(self, s: Complex) -> Complex:
+        """I + K M [n, 3, 3]; its determinant vanishes at the poles of the closed loop."""
+        return np.asarray(np.eye(3) + self.feedback(s) @ self.measured(s))
+
+    def determinant(self, s: ArrayLike) -> Complex:
+        """``det(I + K M)``."""
+        return np.asarray(np.linalg.det(self.return_difference(np.atleast_1d(np.asarray(s, np.complex128)))))
+
+    def frequency_loop_gain(self, s: ArrayLike) -> Complex:
+        """L(s) of the frequency law, the amplitude law closed."""
+        matrix = self.return_difference(np.atleast_1d(np.asarray(s, np.complex128)))
+        opened = matrix.copy()
+        opened[:, 2] = [0.0, 0.0, 1.0]
+        return np.asarray(np.linalg.det(matrix) / np.linalg.det(opened) - 1.0)
+
+    def amplitude_loop_gain(self, s: ArrayLike) -> Complex:
+        """L(s) of the amplitude law alone, the frequency held; 0 where there is none.
+
+        That of complex response control has complex coefficients: both signs of the frequency count.
+        """
+        s = np.atleast_1d(np.asarray(s, np.complex128))
+        law = self.amplitude_law
+        if law is None:
+            return np.zeros_like(s)
+        if isinstance(law, ComplexResponseLaw) and law.force_per_s == 0.0:
+            h = self.plant.acceleration_per_v(s + 1j * self.omega_rad_s)
+            h = h / self.plant.acceleration_per_v(1j * self.omega_rad_s)
+            return np.asarray((law.proportional + law.integral_per_s / s) * h * self._smoothing(s))
+        matrix = self.return_difference(s)[:, :2, :2]
+        return np.asarray(np.linalg.det(matrix) - 1.0)
+
+    def lag_after_target(self, s: Complex) -> Complex:
+        """From the wanted lag to the measured one."""
+        gain = self.frequency_law.phase_gain(s, self.plant, self.lag_deg)
+        return self._lag(self._outputs(s, 2, gain))
+
+    def lag_after_frequency(self, s: Complex) -> Complex:
+        """From a shift of the rig's frequencies (rad/s) to the measured lag (rad): the oscillator is that much too low."""
+        return -self._lag(self._outputs(s, 2, np.ones_like(s)))
+
+    def response_after_level(self, s: Complex) -> tuple[Complex, Complex]:
+        """From the logarithm of the level to that of the measured response, and to the lag (rad)."""
+        inputs = np.zeros((s.size, 3), np.complex128)
+        if self.amplitude_law is None:
+            inputs[:, 0] = 1.0
+        else:
+            inputs[:, :2] = self.amplitude_law.level(s, self.plant, self.lag_deg)
+        outputs = self._closed(s, inputs)
+        return outputs[:, 2], self._lag(outputs)
+
+    def _outputs(self, s: Complex, actuator: int, drive: Complex) -> Complex:
+        inputs = np.zeros((s.size, 3), np.complex128)
+        inputs[:, actuator] = drive
+        return self._closed(s, inputs)
+
+    def _closed(self, s: Complex, inputs: Complex) -> Complex:
+        actuators = np.linalg.solve(self.return_difference(s), inputs[:, :, None])
+        return np.asarray((self.measured(s) @ actuators)[:, :, 0])
+
+    @staticmethod
+    def _lag(outputs: Complex) -> Complex:
+        return np.asarray(outputs[:, 1] - outputs[:, 3])

@@ -1,0 +1,91 @@
+"""The low-pass of the demodulators from an open-loop run at the wanted level."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["LowPassChoice", "low_pass_from_densities", "low_pass_from_noise"]
+
+Real = NDArray[np.float64]
+HIGHEST, LOWEST = 1.0 / 5.0, 1.0 / 20.0  # of the frequency: beyond, the average over a period is none; below, it waits
+
+
+@dataclass(frozen=True)
+class LowPassChoice:
+    """A bandwidth, and the noise it was chosen by."""
+
+    low_pass_rad_s: float
+    """w_LP."""
+    lag_std_deg: float
+    """Fluctuation of the lag that it leaves."""
+    quiet: bool
+    """Whether that is within what was asked for; if not, the lowest allowed low-pass was taken."""
+
+
+def low_pass_from_densities(
+    omega_rad_s: float,
+    force_density: float,
+    force_amplitude: float,
+    acceleration_density: float,
+    acceleration_amplitude: float,
+    *,
+    lag_std_deg: float = 0.5,
+) -> LowPassChoice:
+    """Highest w_LP whose lag fluctuates less than ``lag_std_deg``, within w_0/20 and w_0/5.
+
+    One-sided noise densities N_0 (unit^2/Hz) near the frequency and peak amplitudes A; the phase of each has the variance
+    ``N_0 w_LP/(2 A^2)``.
+    """
+    if not min(force_amplitude, acceleration_amplitude, omega_rad_s, lag_std_deg) > 0.0:
+        raise ValueError(
+            f"force_amplitude = {force_amplitude:g}, acceleration_amplitude = {acceleration_amplitude:g}, "
+            f"omega_rad_s = {omega_rad_s:g}, lag_std_deg = {lag_std_deg:g}: allowed are all above 0"
+        )
+    per_w = 0.5 * (force_density / force_amplitude**2 + acceleration_density / acceleration_amplitude**2)
+    wanted = math.radians(lag_std_deg) ** 2 / per_w if per_w > 0.0 else math.inf
+    chosen = min(max(wanted, LOWEST * omega_rad_s), HIGHEST * omega_rad_s)
+    return LowPassChoice(float(chosen), math.degrees(math.sqrt(per_w * chosen)), bool(wanted >= chosen))
+
+
+def low_pass_from_noise(
+    theta_rad: ArrayLike,
+    force_n: ArrayLike,
+    acceleration_m_s2: ArrayLike,
+    sample_rate_hz: float,
+    *,
+    harmonics: int = 7,
+    lag_std_deg: float = 0.5,
+) -> LowPassChoice:
+    """The same from a steady record [n] in open loop, at the lowest level that the test will hold.
+
+    ``theta_rad`` is the oscillator's phase. Harmonics, their linear drift, and the mean are taken out; what is left between 1/2
+    and 3/2 of the frequency is noise. Raises ValueError on fewer than 20 periods.
+    """
+    theta = np.unwrap(np.asarray(theta_rad, float))
+    omega = (theta[-1] - theta[0]) / (theta.size - 1) * sample_rate_hz
+    periods = (theta[-1] - theta[0]) / (2.0 * math.pi)
+    if periods < 20.0:
+        raise ValueError(f"theta_rad: {periods:.1f} periods, allowed are at least 20")
+    drift = np.linspace(-1.0, 1.0, theta.size)
+    waves = [wave(h * theta) for h in range(1, harmonics + 1) for wave in (np.cos, np.sin)]
+    basis = np.stack([np.ones_like(theta), drift, *waves, waves[0] * drift, waves[1] * drift], axis=1)
+    (force_density, force), (acceleration_density, acceleration) = (
+        _density(np.asarray(signal, float), basis, omega, sample_rate_hz) for signal in (force_n, acceleration_m_s2)
+    )
+    return low_pass_from_densities(
+        omega, force_density, force, acceleration_density, acceleration, lag_std_deg=lag_std_deg
+    )
+
+
+def _density(signal: Real, basis: Real, omega: float, sample_rate_hz: float) -> tuple[float, float]:
+    """Mean one-sided noise density around omega (unit^2/Hz), and the amplitude of the fundamental."""
+    coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
+    window = np.hanning(signal.size)
+    spectrum = np.fft.rfft(window * (signal - basis @ coefficients))
+    density = 2.0 * np.abs(spectrum) ** 2 / (sample_rate_hz * np.sum(window**2))
+    frequency = 2.0 * math.pi * np.fft.rfftfreq(signal.size, 1.0 / sample_rate_hz) / omega
+    # The lines that the fit has emptied would make it look quieter than it is.
+    near = (frequency > 0.5) & (frequency < 1.5) & (np.abs(frequency - 1.0) > 4.0 * frequency[1])
+    return float(np.mean(density[near])), float(np.hypot(coefficients[2], coefficients[3]))

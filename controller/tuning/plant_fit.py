@@ -1,0 +1,129 @@
+"""Fit of a plant near a mode to measured frequency responses from voltage."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["fitted"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def fitted(
+    frequency_hz: ArrayLike,
+    force_per_v: ArrayLike,
+    acceleration_per_v: ArrayLike,
+    force_std: ArrayLike | None = None,
+    acceleration_std: ArrayLike | None = None,
+) -> dict[str, Any]:
+    """Fields of a `PlantModel` that the FRFs [n] tell, from a band around one mode.
+
+    The mode is where the accelerance peaks. Started by linear least squares (of the accelerance as Sanathanan and Koerner
+    do, 1963; of the exciter ``1 = alpha H_F + beta H_A``), finished by nonlinear least squares on both FRFs, weighted by the
+    standard deviations [n] or one number each (by default equal parts of each FRF's root mean square). Coefficients are
+    real, so ``H(-i w)`` is the conjugate of ``H(i w)`` by construction.
+
+    Raises
+    ------
+    ValueError
+        On FRFs that are not finite, of unequal length, too few, or that show no resonance of the structure.
+    """
+    from scipy.optimize import least_squares
+
+    frequency, h_f, h_a = _checked(frequency_hz, force_per_v, acceleration_per_v)
+    s: Complex = 2j * np.pi * frequency.astype(np.complex128)
+    weight_f = 1.0 / np.broadcast_to(_rms(h_f) if force_std is None else np.asarray(force_std, float), h_f.shape)
+    weight_a = 1.0 / np.broadcast_to(_rms(h_a) if acceleration_std is None else np.asarray(acceleration_std), h_a.shape)
+    centre, start = _start(s, h_f, h_a)
+
+    def residuals(x: Real) -> Real:
+        model_f, model_a = _model(x, s, centre)
+        error = np.concatenate([(model_f - h_f) * weight_f, (model_a - h_a) * weight_a])
+        return np.concatenate([error.real, error.imag])
+
+    x = least_squares(
+        residuals,
+        start,
+        method="lm",
+        x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
+        max_nfev=4000,
+    ).x
+    model_f, model_a = _model(x, s, centre)
+    return {
+        "frequency_rad_s": centre * math.exp(x[0]),
+        "damping_ratio": math.exp(x[1]),
+        "drive_shape": math.exp(0.5 * x[2]),
+        "residual_per_kg": (float(x[3]), float(x[4])),
+        "force_v_n": tuple(map(float, x[5:9])),
+        "acceleration_v_s2_m": tuple(map(float, x[9:13])),
+        "centre_rad_s": centre,
+        "band_hz": (float(frequency.min()), float(frequency.max())),
+        "fit_error": max(_rms(model_f - h_f) / _rms(h_f), _rms(model_a - h_a) / _rms(h_a)),
+    }
+
+
+def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike) -> tuple[Real, Complex, Complex]:
+    frequency = np.asarray(frequency_hz, float)
+    h_f, h_a = np.asarray(force, np.complex128), np.asarray(acceleration, np.complex128)
+    if frequency.ndim != 1 or h_f.shape != frequency.shape or h_a.shape != frequency.shape:
+        shapes = f"{frequency.shape}, {h_f.shape} and {h_a.shape}"
+        raise ValueError(
+            f"frequency_hz, force_per_v, acceleration_per_v: shapes {shapes}, allowed are three equal rows"
+        )
+    if frequency.size < 20:
+        raise ValueError(f"frequency_hz: {frequency.size} lines, allowed are at least 20 around the mode")
+    if not (np.all(np.isfinite(h_f)) and np.all(np.isfinite(h_a)) and np.all(frequency > 0.0)):
+        raise ValueError(
+            "frequency_hz, force_per_v, acceleration_per_v: allowed are finite numbers, frequencies above 0"
+        )
+    return frequency, h_f, h_a
+
+
+def _rms(values: Complex) -> float:
+    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
+
+
+def _model(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
+    z = s / centre
+    w = math.exp(x[0])
+    accelerance = math.exp(x[2]) * z**2 / (z**2 + 2.0 * math.exp(x[1]) * w * z + w**2) + x[3] + x[4] * z**2
+    alpha = x[5] + z * (x[6] + z * (x[7] + z * x[8]))
+    beta = (x[9] + z * (x[10] + z * (x[11] + z * x[12]))) / z**2
+    force = 1.0 / (alpha + beta * accelerance)
+    return force, accelerance * force
+
+
+def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
+    """Frequency to scale with, and first values of log w, log D, log phi_d^2, residuals, alpha, beta."""
+    y = h_a / h_f
+    centre = float(np.abs(s[np.argmax(np.abs(y))]))
+    z = s / centre
+    weight = np.abs(h_f)
+    for _ in range(12):
+        # (z^2 + c z + k) y = n_0 + n_2 z^2 + n_4 z^4 + damping terms: real unknowns k, c, n_0 ... n_4
+        columns = np.stack([y, z * y, *(-(z**power) for power in range(5))], axis=1) * weight[:, None]
+        k, c, *_ = _real_least_squares(columns, -(z**2) * y * weight)
+        weight = np.abs(h_f) / np.abs(z**2 + c * z + k)
+    if k <= 0.0 or c <= 0.0 or not np.min(np.abs(z)) < math.sqrt(k) < np.max(np.abs(z)):
+        raise ValueError("force_per_v, acceleration_per_v: their ratio shows no damped resonance inside the band")
+    columns = np.stack([z**2 / (z**2 + c * z + k), np.ones_like(z), z**2], axis=1) * np.abs(h_f)[:, None]
+    shape_squared, lower, upper = _real_least_squares(columns, y * np.abs(h_f))
+    if shape_squared <= 0.0:
+        raise ValueError(
+            "force_per_v, acceleration_per_v: the resonance pulls instead of pushing (phi_d^2 < 0); "
+            "check the polarity of force and acceleration"
+        )
+    columns = np.stack([*(h_f * z**power for power in range(4)), *(h_a * z**power for power in range(-2, 2))], axis=1)
+    exciter = _real_least_squares(columns, np.ones_like(z))
+    mode = [0.5 * math.log(k), math.log(0.5 * c / math.sqrt(k)), math.log(shape_squared), lower, upper]
+    return centre, np.concatenate([mode, exciter])
+
+
+def _real_least_squares(columns: Complex, target: Complex) -> Real:
+    """Real x of the complex equations ``columns x = target``, the columns scaled to equal length."""
+    left, right = np.vstack([columns.real, columns.imag]), np.concatenate([target.real, target.imag])
+    scale = np.linalg.norm(left, axis=0)
+    return np.asarray(np.linalg.lstsq(left / scale, right, rcond=None)[0] / scale)

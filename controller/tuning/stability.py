@@ -1,0 +1,135 @@
+"""Stability, margins and poles of a linearised loop with delay, without approximating the delay.
+
+Closed-loop poles are zeros of ``det(I + K M)``, analytic but for the known poles of plant, low-pass and integrators. They
+are counted on a contour by the argument principle, and found by Newton's method from a grid. The region is the half disc of
+radius W/2: beyond it averaging over a period means nothing, and no law of this family has gain there.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.tuning.loop import ControlLoop
+
+__all__ = ["Margins", "closed_loop_poles", "margins", "unstable_poles"]
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+INSET = 2e-4  # of W: closer to the imaginary axis than this, a pole counts as marginal, not as unstable
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How far a loop is from instability."""
+
+    sensitivity_peak: float
+    """max |S|, S = 1/(1 + L)."""
+    gain_margin: float
+    """Smallest factor above 1 on the gains at which the loop becomes unstable; infinite where there is none."""
+    phase_margin_deg: float
+    """Smallest additional phase, of either sign, at which it becomes unstable; 180 where there is none."""
+    crossover_rad_s: float
+    """Highest frequency with |L| = 1; 0 where there is none."""
+
+
+def unstable_poles(loop: ControlLoop) -> int:
+    """Number of closed-loop poles in the right half plane, by the argument principle."""
+    omega = loop.omega_rad_s
+    radius = 0.5 * omega
+    offsets = loop.plant.poles_rad_s - 1j * omega
+    known = 2 * int(np.sum((offsets.real > INSET * omega) & (np.abs(offsets) < radius)))
+    return _windings(loop.determinant, INSET * omega, radius) + known
+
+
+def _windings(function: Callable[[Complex], Complex], inset: float, radius: float) -> int:
+    """Turns of a function's value around 0 along the half disc's border, counter-clockwise."""
+    corner = math.acos(inset / radius)
+    height = radius * math.sin(corner)
+    slow = np.geomspace(inset, height, 400)
+    line = inset + 1j * np.concatenate([slow[::-1], [0.0], -slow])
+    arc = radius * np.exp(1j * np.linspace(-corner, corner, 200))
+    s = np.concatenate([line, arc[1:]])
+    values = function(s)
+    for _ in range(30):
+        turns = np.angle(values[1:] / values[:-1])
+        coarse = np.flatnonzero(np.abs(turns) > 0.5)
+        if coarse.size == 0:
+            break
+        middle = 0.5 * (s[coarse] + s[coarse + 1])
+        s, values = np.insert(s, coarse + 1, middle), np.insert(values, coarse + 1, function(middle))
+    return round(float(np.sum(np.angle(values[1:] / values[:-1]))) / (2.0 * math.pi))
+
+
+def closed_loop_poles(loop: ControlLoop) -> Complex:
+    """Poles of the closed loop (1/s) within half the locked frequency of the origin, slowest first [n].
+
+    A multiple pole is given once.
+    """
+    omega = loop.omega_rad_s
+    offsets = loop.plant.poles_rad_s - 1j * omega
+    near = offsets[np.abs(offsets) < omega]
+    known = np.concatenate([near, near.conj(), np.full(3, -loop.low_pass_rad_s), np.zeros(3)])
+    scale = loop.low_pass_rad_s
+
+    def function(s: Complex) -> Complex:
+        return np.asarray(loop.determinant(s) * np.prod((s[:, None] - known) / scale, axis=1))
+
+    reach = 0.5 * omega
+    grid = np.concatenate([-np.geomspace(1e-3, 1.0, 14) * reach, np.geomspace(1e-2, 1.0, 5) * reach])
+    height = np.concatenate([[0.01], np.linspace(0.05, 1.0, 14)]) * reach
+    start = (grid[:, None] + 1j * height).ravel()
+    s, _ = _newton(function, start, 40, 0.1 * reach, 1e-6 * omega)
+    # A factor that the determinant does not have as a pole is no zero of it: from there its own steps grow.
+    final, first = _newton(loop.determinant, s, 1, 0.1 * reach, 1e-6 * omega)
+    final, last = _newton(loop.determinant, final, 4, 0.1 * reach, 1e-6 * omega)
+    closing = np.abs(last) < np.maximum(0.7 * np.abs(first), 1e-8 * omega)
+    good = np.isfinite(final) & (np.abs(final) < reach) & closing & (np.abs(final - s) < 1e-3 * omega)
+    return _distinct(final[good], known, 1e-3 * omega)
+
+
+def _newton(
+    function: Callable[[Complex], Complex], s: Complex, steps: int, longest: float, width: float
+) -> tuple[Complex, Complex]:
+    """Zeros approached from s [n], and the last steps taken; the derivative by differences over ``width``."""
+    change = np.zeros_like(s)
+    with np.errstate(all="ignore"):
+        for _ in range(steps):
+            slope = (function(s + width) - function(s - width)) / (2.0 * width)
+            change = function(s) / slope
+            change = change * np.minimum(1.0, longest / np.abs(change))
+            s = np.where(np.isfinite(change), s - change, s)
+    return s, change
+
+
+def _distinct(found: Complex, known: Complex, apart: float) -> Complex:
+    """One of each cluster, with conjugates, without those that stand on a known pole (a pole that is not closed over)."""
+    found = np.concatenate([found, found.conj()])
+    out: list[complex] = []
+    for pole in found[np.argsort(-found.real)]:
+        if all(abs(pole - other) > apart for other in out) and np.min(np.abs(pole - known)) > 1e-6 * apart:
+            out.append(complex(pole))
+    return np.array(sorted(out, key=lambda pole: (abs(pole), pole.imag)), np.complex128)
+
+
+def margins(omega: Real, loop_gain: Complex) -> Margins:
+    """Margins of a stable loop from L(i omega) [n] on rising frequencies (of both signs where L is complex)."""
+    sensitivity = 1.0 / np.abs(1.0 + loop_gain)
+    size, angle = np.abs(loop_gain), np.angle(-loop_gain)
+    across = np.flatnonzero(
+        (np.diff(np.sign(angle)) != 0) & (np.abs(np.diff(angle)) < math.pi) & (omega[1:] * omega[:-1] > 0.0)
+    )
+    share = angle[across] / (angle[across] - angle[across + 1])
+    sizes = size[across] + share * (size[across + 1] - size[across])
+    gains = 1.0 / sizes[sizes < 1.0]
+    one = np.flatnonzero((np.diff(np.sign(size - 1.0)) != 0) & (omega[1:] * omega[:-1] > 0.0))
+    part = (1.0 - size[one]) / (size[one + 1] - size[one])
+    unit = loop_gain[one] + part * (loop_gain[one + 1] - loop_gain[one])
+    return Margins(
+        sensitivity_peak=float(sensitivity.max()),
+        gain_margin=float(gains.min(initial=math.inf)),
+        phase_margin_deg=float(np.degrees(np.abs(np.angle(-unit)).min(initial=math.pi))),
+        crossover_rad_s=float(np.abs(omega[one]).max(initial=0.0)),
+    )

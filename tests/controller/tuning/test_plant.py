@@ -1,0 +1,102 @@
+"""The plant near a mode, against the rigs' own modes and frequency responses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controller.tuning import PlantModel
+from tests.controller.tuning.rigs import LINEAR_HZ, plant_of, responses, shipped
+
+NAMES = ["magnet-beam", "friction-beam"]
+RATE = {"sample_rate_hz": 5000.0, "latency_samples": 2.0}
+
+
+def noisy(values, share, seed):
+    draw = np.random.default_rng(seed).normal(size=(2, values.size)) / math.sqrt(2)
+    return values + share * np.sqrt(np.mean(np.abs(values) ** 2)) * (draw[0] + 1j * draw[1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_mode_of_the_structure_is_found_behind_the_exciter(name):
+    plant, modes = plant_of(name), shipped(name).linear_modes
+    k = modes.nearest(LINEAR_HZ[name])
+    assert plant.frequency_rad_s == pytest.approx(2 * math.pi * modes.frequency_hz[k], rel=1e-5)
+    assert plant.damping_ratio == pytest.approx(modes.damping_ratio[k], rel=2e-3)
+    assert plant.drive_shape == pytest.approx(shipped(name).drive_shape(LINEAR_HZ[name]), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_coupled_pole_is_that_of_the_rig(name):
+    modes = shipped(name).coupled_modes
+    k = int(np.argmin(np.abs(modes.frequency_hz - LINEAR_HZ[name])))
+    omega, zeta = 2 * math.pi * modes.frequency_hz[k], modes.damping_ratio[k]
+    pole = omega * complex(-zeta, math.sqrt(1 - zeta**2))
+    assert plant_of(name).coupled_pole_rad_s == pytest.approx(pole, abs=0.02)
+
+
+def test_the_offsets_of_the_coupled_poles_are_the_known_ones():
+    assert plant_of("magnet-beam").pole_offset_rad_s() == pytest.approx(-11.5 + 3.9j, abs=0.1)
+    assert plant_of("friction-beam").pole_offset_rad_s() == pytest.approx(-5.8 - 24.2j, abs=0.1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_a_percent_leaves_the_plant_usable(name, seed):
+    frequency, force, acceleration = responses(name)
+    found = PlantModel.from_frequency_responses(
+        frequency, noisy(force, 0.01, seed), noisy(acceleration, 0.01, seed + 50), **RATE
+    )
+    assert found.pole_offset_rad_s() == pytest.approx(plant_of(name).pole_offset_rad_s(), abs=0.15)
+    assert found.frequency_rad_s == pytest.approx(plant_of(name).frequency_rad_s, rel=3e-4)
+    assert found.damping_ratio == pytest.approx(plant_of(name).damping_ratio, rel=0.05)
+    assert found.fit_error == pytest.approx(0.01, rel=0.2)
+
+
+def test_the_fit_answers_conjugates_at_negative_frequencies():
+    plant, s = plant_of("magnet-beam"), 1j * np.linspace(120.0, 180.0, 7)
+    np.testing.assert_allclose(plant.force_per_v(-s), plant.force_per_v(s).conj(), rtol=1e-12)
+
+
+def test_at_a_lag_the_structure_has_that_lag():
+    plant = plant_of("friction-beam")
+    for lag_deg in (-150.0, -90.0, -30.0):
+        y = complex(plant.accelerance(1j * plant.lock_frequency_rad_s(lag_deg)))
+        assert math.degrees(-np.angle(y)) == pytest.approx(lag_deg, abs=1e-6)
+
+
+def test_another_modal_frequency_moves_the_structure_and_leaves_the_exciter():
+    plant = plant_of("friction-beam")
+    moved = plant.at(0.98 * plant.frequency_rad_s, 0.0133)
+    s = 1j * np.linspace(900.0, 950.0, 5)
+    np.testing.assert_allclose(moved.exciter(s), plant.exciter(s))
+    relation = moved.exciter(s)[0] * moved.force_per_v(s) + moved.exciter(s)[1] * moved.acceleration_per_v(s)
+    np.testing.assert_allclose(relation, 1.0, rtol=1e-12)
+    assert moved.lock_frequency_rad_s() == pytest.approx(0.98 * plant.frequency_rad_s, rel=1e-3)
+
+
+def test_a_plant_survives_being_written_to_a_table():
+    plant = plant_of("magnet-beam")
+    assert PlantModel.from_dict(plant.to_dict()) == plant
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [({"damping_ratio": -0.1}, "damping_ratio"), ({"band_hz": [1.0]}, "band_hz"), ({"mass": 1.0}, "mass: not known")],
+)
+def test_a_table_that_is_no_plant_is_refused(change, named):
+    with pytest.raises(ValueError, match=named):
+        PlantModel.from_dict(plant_of("magnet-beam").to_dict() | change)
+
+
+def test_a_force_sensor_of_wrong_polarity_is_noticed():
+    frequency, force, acceleration = responses("magnet-beam")
+    with pytest.raises(ValueError, match="polarity"):
+        PlantModel.from_frequency_responses(frequency, -force, acceleration, **RATE)
+
+
+def test_a_band_without_the_mode_is_refused():
+    frequency, force, acceleration = responses("magnet-beam")
+    above = frequency > 26.0
+    with pytest.raises(ValueError, match="no damped resonance"):
+        PlantModel.from_frequency_responses(frequency[above], force[above], acceleration[above], **RATE)
