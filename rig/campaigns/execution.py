@@ -87,7 +87,7 @@ class Execution:
         self.measure = KINDS[plan.kind].measure
         self.in_one_go = KINDS[plan.kind].in_one_go
         self.targets = plan.targets()
-        self.done = done
+        self.measured_before = done
         self.numbers = range(len(self.targets)) if numbers is None else numbers
         self.finished = len(done)
         self.accepted = len(done)
@@ -234,7 +234,7 @@ class Execution:
             passages.append(Passage(kind, level, int(entry["first_sample"]) - first, stop - first, code))
         rows = self._rows(first, first + passages[-1].end)
         ended = self._why() if brought_down or cut_short else ""
-        targets = [self.targets[number] for number in sorted(numbers - self.done)]
+        targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         for point in self.measure(self.bench, self.plan, targets, rows, passages, ended):
             warnings = [*point.get("warnings", []), *self._device_warnings(rows)]
             self._report({**point, "warnings": warnings, "first_sample": first, "end_sample": first + rows.size})

@@ -232,7 +232,7 @@ def advance(
     """One sample of the sequencer: sets level, lag and frequency, moves on when a segment is over, ends the run after the last.
 
     ``cycle`` is the number of oscillator periods seen by the inputs so far, with its fraction. ``unreached``: the output stands
-    at its limit and the level of the moment is not reached; a ramp waits then.
+    at its limit and the level of the moment is not reached; a ramp that goes up waits then.
     """
     if progress.finished:
         return
@@ -263,9 +263,7 @@ def advance(
             reacquire(lock)
         if segment.kind == SETTLE:
             forget_periods(settling)
-    if (
-        unreached and is_ramp(segment.kind) and segment.level > progress.level
-    ):  # a falling level comes into reach by itself
+    if unreached and is_ramp(segment.kind) and segment.level > progress.level:
         progress.frozen_cycles += cycle - progress.last_cycle
     progress.last_cycle = cycle
     elapsed = cycle - progress.start_cycle

@@ -164,5 +164,5 @@ def test_levels_are_metres():
 
 
 def test_a_level_whose_margin_leads_beyond_the_limit_is_refused():
-    with pytest.raises(ConfigurationError, match="margin = 0.05"):
+    with pytest.raises(ConfigurationError, match=r"margin = 0\.05"):
         plan_with(levels_m=[1e-4, 5.9e-3]).check(bench_with())
