@@ -7,6 +7,7 @@ import numpy as np
 
 from identification import (
     Backbone,
+    ContinuousBackbone,
     FrequencyResponse,
     FrequencyResponseMatrix,
     IdentificationError,
@@ -18,6 +19,7 @@ from identification.multisine.best_linear_approximation import Estimator
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import backbone_of
+from rig.campaigns.continuous_backbone_points import continuous_backbones_of
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.multisine_points import spectra_of
 from rig.campaigns.stepped_phase import SteppedPhasePlan
@@ -32,6 +34,7 @@ __all__ = [
     "Estimator",
     "backbone",
     "bench_of_recording",
+    "continuous_backbones",
     "frequency_responses",
     "load_backbone",
     "point_rows",
@@ -44,8 +47,16 @@ __all__ = [
 def backbone(recording: Recording) -> Backbone:
     """The accepted points of a backbone recording that its plan asks for, in the order of the plan.
 
+    Of a continuous backbone the means of up and down, which know nothing of what lay between the two (`continuous_backbones`).
+
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
+    if recording.kind == "continuous-backbone":
+        passes = continuous_backbones(recording)
+        points = [point for one in passes for point in one.backbone.points]
+        repeats = [number for number, one in enumerate(passes, 1) for _ in one.backbone.points]
+        first = passes[0].backbone
+        return Backbone(tuple(points), first.specimen, first.drive_mode_shape, repeats=tuple(repeats))
     _expect(recording, "backbone")
     bench = bench_of_recording(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
@@ -55,6 +66,18 @@ def backbone(recording: Recording) -> Backbone:
         bench.specimen.name,
         bench.specimen.drive_mode_shape,
         plan.controller.phase_lag_deg + 180.0,
+    )
+
+
+def continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
+    """The accepted points of a continuous backbone, one per repeat, with what was found on the way up and on the way down.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    """
+    _expect(recording, "continuous-backbone")
+    specimen = bench_of_recording(recording).specimen
+    return continuous_backbones_of(
+        recording.latest.values(), recording.channels, specimen.name, specimen.drive_mode_shape
     )
 
 

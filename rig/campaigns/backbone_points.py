@@ -6,9 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from identification import Backbone, Channel, IdentificationError, PeriodicVibration, nonlinear_mode
+from identification import (
+    Backbone,
+    Channel,
+    IdentificationError,
+    PeriodicVibration,
+    ShortPoint,
+    SlowFlow,
+    nonlinear_mode,
+    short_point,
+)
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.evaluate import (
     as_complex,
     as_pairs,
@@ -19,8 +29,11 @@ from rig.campaigns.evaluate import (
 )
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.quality import PURITY_COLUMNS, lag_scatter_deg, purity, quality_warnings
+from rig.campaigns.recorded_flow import flagged, recorded_flow
 
-__all__ = ["BACKBONE_COLUMNS", "backbone_of", "frequency_scatter", "measure_backbone_point"]
+__all__ = ["BACKBONE_COLUMNS", "backbone_of", "frequency_scatter", "measure_backbone_point", "std_objection"]
+
+NEAR = 0.1  # in the logarithm of the amplitude, of what a point of the slow flow is made
 
 BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),
@@ -37,8 +50,11 @@ def measure_backbone_point(
 ) -> dict[str, Any]:
     """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment.
 
-    A point whose recorded fundamental is too far from the wanted phase is kept, marked as not accepted.
+    A point whose recorded fundamental is too far from the wanted phase is kept, marked as not accepted. By the slow flow the
+    rows begin with the ramp to the point.
     """
+    if plan.evaluation == "slow-flow":
+        return _short_point(bench, plan, target, rows)
     point = head(plan, target)
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
@@ -76,6 +92,76 @@ def measure_backbone_point(
         "drift": None if vibration.drift is None else as_pairs(vibration.drift),
         "warnings": quality_warnings(bench, vibration, rows),
     }
+
+
+def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> dict[str, Any]:
+    """A point from the ramp to it and what follows, settled or not."""
+    point = head(plan, target)
+    try:
+        flow = recorded_flow(bench, rows, plan.harmonics)
+        found = short_point(flow, start_s=_arrival_s(flow))
+        vibration = found.vibration
+    except (IdentificationError, ArithmeticError) as error:
+        return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+    error_deg = (plan.controller.phase_lag_deg + 180.0 - found.phase_lag_deg + 180.0) % 360.0 - 180.0
+    reason = _short_objection(plan, found, error_deg)
+    reason = reason or next((why for why, at in flagged(bench, rows, flow).items() if at.any()), "")
+    turned = np.unwrap(rows["theta_rad"].astype(float))
+    grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz
+    return {
+        **point,
+        "settled": abs(error_deg) <= plan.settle.phase_deg and abs(grown) <= plan.settle.amplitude,
+        "accepted": not reason,
+        "reason": reason,
+        "force_n": vibration.force_n,
+        "frequency_hz": vibration.frequency_hz,
+        "modal_frequency_hz": found.modal_frequency_hz,
+        "modal_frequency_std_hz": found.modal_frequency_std_hz,
+        "damping_ratio": found.damping_ratio,
+        "damping_ratio_std": found.damping_ratio_std,
+        "amplitude_m": vibration.amplitude_m,
+        "phase_error_deg": error_deg,
+        "growth_1_s": found.growth_1_s,
+        "measured_force_n": found.force_n,
+        "voltage_v": float(np.abs(rows["command_v"]).mean()),
+        **purity(vibration),
+        "periods": vibration.periods,
+        "periods_in_all": float(turned[-1] - turned[0]) / (2.0 * math.pi),
+        "harmonics": as_pairs(vibration.harmonics),
+        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
+        "residual_rms": vibration.residual_rms.tolist(),
+        "drift": None,
+        "warnings": quality_warnings(bench, vibration, rows, held=False),
+    }
+
+
+def _arrival_s(flow: SlowFlow) -> float:
+    """When the amplitude came near to where it ended, for good."""
+    away = np.abs(np.log(flow.amplitude_m / flow.amplitude_m[-1])) > NEAR
+    last = int(np.flatnonzero(away)[-1]) + 1 if away.any() else 0
+    return float(flow.time_s[min(last, flow.time_s.size - 1)])
+
+
+def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float) -> str:
+    """Why a point of the slow flow is not accepted; empty where it is."""
+    if abs(error_deg) > plan.accepted_phase_error_deg:
+        return f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
+    return std_objection(
+        plan,
+        found.modal_frequency_std_hz / found.modal_frequency_hz,
+        found.damping_ratio_std / abs(found.damping_ratio),
+    )
+
+
+def std_objection(plan: BackbonePlan | ContinuousBackbonePlan, frequency: float, damping: float) -> str:
+    """Why a point with such relative standard errors is not accepted; empty where it is."""
+    for name, std, accepted in (
+        ("modal frequency", frequency, plan.accepted_frequency_std),
+        ("damping", damping, plan.accepted_damping_std),
+    ):
+        if not std <= accepted:
+            return f"standard error of the {name} {100.0 * std:.2g} %, accepted up to {100.0 * accepted:g} %"
+    return ""
 
 
 def _objection(plan: BackbonePlan, bench: Bench, vibration: PeriodicVibration, hunting: float) -> str:

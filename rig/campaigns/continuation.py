@@ -23,13 +23,14 @@ __all__ = ["FIXED", "VIBRATION", "Continuation", "changed_keys", "identities", "
 VIBRATION: dict[str, tuple[str, ...]] = {
     "backbone": ("controller.phase_lag_deg",),
     "stepped-phase": (),
+    "continuous-backbone": ("controller.phase_lag_deg",),
     "stepped-sine": (),
     "sweep": ("start_hz", "stop_hz", "rate_hz_per_s", "rate_octaves_per_min"),
     "multisine": ("lowest_hz", "highest_hz", "resolution_hz", "grid", "detection_group", "phase_seed"),
 }
 """By kind, what of a plan makes all its points other vibrations where it is changed."""
 
-FIXED: dict[str, tuple[str, ...]] = {"backbone": ("harmonics",)}
+FIXED: dict[str, tuple[str, ...]] = {"backbone": ("harmonics",), "continuous-backbone": ("harmonics",)}
 """By kind, what of a plan may not change: what is made of all points together needs them evaluated alike."""
 
 Identity = tuple[object, ...]

@@ -17,6 +17,7 @@ from rig.campaigns.evaluate import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
 from rig.campaigns.quality import what_was_skipped
+from rig.campaigns.rounds import Passage
 from rig.daq import DAQ
 from rig.errors import RecordingError
 from rig.loop import Loop, LoopStatistics
@@ -85,7 +86,9 @@ class Execution:
         self.journal, self.progress = journal, progress
         self.loop = Loop(daq, tick, paced=realtime)
         self.measure = KINDS[plan.kind].measure
+        self.in_one_go = KINDS[plan.kind].in_one_go
         self.targets = plan.targets()
+        self.measured_before = done
         self.numbers = range(len(self.targets)) if numbers is None else numbers
         self.done = len(done)
         self.finished = self.done
@@ -158,6 +161,10 @@ class Execution:
         self.kept.append((self.tick.sample - rows.size, rows))
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
+            if self.in_one_go and int(segments[self.next_segment]["point"]) >= 0:
+                if not self._finish_round():
+                    break
+                continue
             entry, kind = outcomes[self.next_segment], int(segments[self.next_segment]["kind"])
             code = Outcome(int(entry["outcome"]))
             if code not in OVER and code is not Outcome.SKIPPED:
@@ -167,7 +174,7 @@ class Execution:
                 if code is not Outcome.DONE:
                     self._report(failed_point(self.plan, self.targets[number], entry))
                 elif kind in EVALUATED:
-                    first, end = int(entry["first_sample"]), int(entry["end_sample"])
+                    first, end = self._begin(self.next_segment), int(entry["end_sample"])
                     settling = outcomes[self.next_segment - 1]
                     rows = self._rows(first, end)
                     point = self.measure(self.bench, self.plan, self.targets[number], rows, settling)
@@ -182,13 +189,60 @@ class Execution:
         counted = ((name, int(np.count_nonzero(flags & (1 << bit)))) for bit, name in enumerate(self.daq.counters))
         return [f"{name.replace('_', ' ')} in {count} of {rows.size} samples" for name, count in counted if count]
 
+    def _begin(self, segment: int) -> int:
+        """First sample of the rows that a segment is evaluated with."""
+        points = self.tick.arrays.segments["point"]
+        if self.plan.evaluates_approach:
+            while segment > 0 and points[segment - 1] == points[segment]:
+                segment -= 1
+        return int(self.tick.outcomes[segment]["first_sample"])
+
     def _first_needed(self) -> int:
-        if self.next_segment < self.tick.outcomes.size:
-            entry = self.tick.outcomes[self.next_segment]
-            records = int(self.tick.arrays.segments[self.next_segment]["kind"]) in EVALUATED
-            if records and int(entry["outcome"]) == Outcome.RUNNING:
-                return int(entry["first_sample"])
-        return self.tick.sample
+        outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
+        index = self.next_segment
+        if index >= outcomes.size:
+            return self.tick.sample
+        running = int(outcomes[index]["outcome"]) == Outcome.RUNNING
+        of_a_point = int(segments[index]["point"]) >= 0
+        if self.in_one_go and of_a_point:
+            return self._begin(index) if int(outcomes[index]["outcome"]) != Outcome.PENDING else self.tick.sample
+        if self.plan.evaluates_approach and of_a_point:
+            approached = index > 0 and segments[index - 1]["point"] == segments[index]["point"]
+            return self._begin(index) if running or approached else self.tick.sample
+        records = int(segments[index]["kind"]) in EVALUATED
+        return self._begin(index) if records and running else self.tick.sample
+
+    def _finish_round(self, *, cut_short: bool = False) -> bool:
+        """Evaluate the points that are measured in one go, once all their segments are over or none will follow."""
+        outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
+        numbers = self.plan.together(int(segments[self.next_segment]["point"]))
+        end = self.next_segment
+        while end < segments.size and int(segments[end]["point"]) in numbers:
+            end += 1
+        codes = [Outcome(int(outcome)) for outcome in outcomes["outcome"][self.next_segment : end]]
+        if codes[0] is Outcome.PENDING:
+            return False
+        brought_down = int(self.tick.guard["mode"][0]) != GuardMode.ARMED
+        if not cut_short and (Outcome.RUNNING in codes or (Outcome.PENDING in codes and not brought_down)):
+            return False
+        first = int(outcomes[self.next_segment]["first_sample"])
+        passages = []
+        for code, segment, entry in zip(
+            codes, segments[self.next_segment : end], outcomes[self.next_segment : end], strict=True
+        ):
+            if code in (Outcome.PENDING, Outcome.SKIPPED):
+                continue
+            stop = self.tick.sample if code is Outcome.RUNNING else int(entry["end_sample"])
+            kind, level = SegmentKind(int(segment["kind"])), float(segment["level"])
+            passages.append(Passage(kind, level, int(entry["first_sample"]) - first, stop - first, code))
+        rows = self._rows(first, first + passages[-1].end)
+        ended = self._why() if brought_down or cut_short else ""
+        targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
+        for point in self.measure(self.bench, self.plan, targets, rows, passages, ended):
+            warnings = [*point.get("warnings", []), *self._device_warnings(rows)]
+            self._report({**point, "warnings": warnings, "first_sample": first, "end_sample": first + rows.size})
+        self.next_segment = end
+        return True
 
     def _rows(self, first: int, end: int) -> np.ndarray:
         """The rows of a point; those up to its end are kept no longer."""
@@ -219,6 +273,11 @@ class Execution:
         self.progress.point(point, self.finished, len(self.targets))
 
     def _mark_interrupted(self) -> None:
+        if self.in_one_go:
+            index, segments = self.next_segment, self.tick.arrays.segments
+            if index < segments.size and int(segments[index]["point"]) >= 0:
+                self._finish_round(cut_short=True)
+            return
         for segment, entry in zip(self.tick.arrays.segments, self.tick.outcomes, strict=True):
             if int(entry["outcome"]) == Outcome.INTERRUPTED and int(segment["point"]) >= 0:
                 self._report(failed_point(self.plan, self.targets[int(segment["point"])], entry))
@@ -226,20 +285,23 @@ class Execution:
     def _end(self) -> dict[str, Any]:
         guard = self.tick.guard
         reason = EndReason(int(guard["reason"][0]))
-        text = describe_end(guard, self.bench)
-        if self.loop.failure is not None:
-            text = str(self.loop.failure)
-        elif self.failure is not None:
-            text = f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
         return {
             "completed": reason is EndReason.COMPLETED and self.accepted == len(self.targets) and self.failure is None,
             "reason": reason.name.lower(),
-            "text": text,
+            "text": self._why(),
             "tripped": reason.is_trip,
             "skipped": what_was_skipped(self.reported.values(), len(self.targets) - self.done),
             "loop": _loop_report(self.loop.statistics, int(self.tick.arrays.loop["cycles"][0])),
             "counters": self.daq.counters,
         }
+
+    def _why(self) -> str:
+        """Why the output was brought down, in one sentence."""
+        if self.loop.failure is not None:
+            return str(self.loop.failure)
+        if self.failure is not None:
+            return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
+        return describe_end(self.tick.guard, self.bench)
 
 
 def nothing_left(bench: Bench) -> dict[str, Any]:

@@ -6,6 +6,8 @@ from typing import Any
 
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.backbone_points import BACKBONE_COLUMNS, measure_backbone_point
+from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
+from rig.campaigns.continuous_backbone_points import CONTINUOUS_BACKBONE_COLUMNS, measure_continuous_backbone
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.multisine_points import MULTISINE_COLUMNS, measure_multisine_point
 from rig.campaigns.plan import Column, Plan
@@ -25,15 +27,20 @@ class Campaign:
 
     plan: type[Plan]
     """Model of its plans."""
-    measure: Callable[..., dict[str, Any]]
+    measure: Callable[..., Any]
     """``(bench, plan, target, rows, settling) -> point``: the result of a recorded point, with its own quality."""
     columns: tuple[Column, ...]
     """What is shown of a point."""
+    in_one_go: bool = False
+    """Whether points are measured together: ``(bench, plan, targets, rows, passages, ended) -> points``."""
 
 
 KINDS = {
     "backbone": Campaign(BackbonePlan, measure_backbone_point, BACKBONE_COLUMNS),
     "stepped-phase": Campaign(SteppedPhasePlan, measure_stepped_phase_point, STEPPED_PHASE_COLUMNS),
+    "continuous-backbone": Campaign(
+        ContinuousBackbonePlan, measure_continuous_backbone, CONTINUOUS_BACKBONE_COLUMNS, in_one_go=True
+    ),
     "stepped-sine": Campaign(SteppedSinePlan, measure_stepped_sine_point, STEPPED_SINE_COLUMNS),
     "sweep": Campaign(SweepPlan, measure_sweep, SWEEP_COLUMNS),
     "multisine": Campaign(MultisinePlan, measure_multisine_point, MULTISINE_COLUMNS),

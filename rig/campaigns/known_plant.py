@@ -76,7 +76,8 @@ class KnownPlant(Levels):
         if self.plant is None:
             return
         plant = self.plant.model
-        self._check_stability(plant, law, bench)
+        if law.rest_low_pass_rad_s == 0.0:  # the force at rest is not in the linearised loop
+            self._check_stability(plant, law, bench)
         self._check_reach(plant, law, bench)
 
     def _check_stability(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:

@@ -89,6 +89,15 @@ class Plan(Configured):
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done`` already."""
 
+    @property
+    def evaluates_approach(self) -> bool:
+        """Whether the rows of a point begin with the ramp to it; else with its record."""
+        return False
+
+    def together(self, number: int) -> frozenset[int]:
+        """Numbers of the targets that are measured in one go with this one, itself included."""
+        return frozenset((number,))
+
     def waveforms(self, sample_rate_hz: float) -> np.ndarray | None:
         """Waveforms of unit peak that the segments play, float64[n, period]; None where they play none."""
         return None

@@ -56,10 +56,10 @@ def lag_scatter_deg(rows: np.ndarray) -> float:
     return math.degrees(float(seen.std())) if seen.size else math.nan
 
 
-def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: np.ndarray) -> list[str]:
-    """All that a user should know of a recorded vibration, one line each."""
+def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True) -> list[str]:
+    """All that a user should know of a recorded vibration, one line each. Where it was not ``held`` its lag may swing."""
     out = [*vibration.warnings, *quantisation_warnings(vibration, bench)]
-    scatter = lag_scatter_deg(rows)
+    scatter = lag_scatter_deg(rows) if held else 0.0
     if scatter > SCATTERING_DEG:
         force = bench.channels[bench.index_of("force")]
         bits = vibration.force_n * abs(force.sensitivity_v_per_unit) / force.resolution_v

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from controller import PhaseLockedLoop
 from rig.bench import Bench
-from rig.campaigns.levels import Levels
+from rig.campaigns.known_plant import KnownPlant
 from rig.campaigns.plan import Plan, Target
 from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
@@ -20,7 +20,7 @@ LAGS_DEG = (-175.0, -5.0)  # between, the force feeds the vibration, and a lag t
 MOST_LAGS = 10_000
 
 
-class SteppedPhasePlan(Levels, Plan):
+class SteppedPhasePlan(KnownPlant, Plan):
     """Frequency responses at constant level, stepped through the phase instead of the frequency.
 
     The frequency follows the phase lag that the plan asks for, so that over a fold of the response, where one frequency
@@ -168,6 +168,7 @@ class SteppedPhasePlan(Levels, Plan):
     def check(self, bench: Bench) -> None:
         """Refuse, before anything moves, what the bench cannot do."""
         self.check_levels(bench)
+        self.check_plant(bench, self.controller)
         window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
         linear = bench.specimen.linear_frequency_hz
         if not window[0] < linear < window[1]:

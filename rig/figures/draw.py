@@ -7,6 +7,7 @@ import numpy as np
 
 from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
+from rig.figures.continuous_backbone import draw_differences, draw_ways
 from rig.figures.nonlinear_mode import draw_properties
 from rig.figures.stepped_phase import draw_stepped_phase
 from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
@@ -65,6 +66,20 @@ def _draw_backbone(page: "Figure", recording: Recording) -> None:
         for axis in axes[0]:
             say_why_empty(axis, "no accepted point")
     _draw_history(axes[1, 0], axes[1, 1], recording)
+    _say_what_it_is(page, recording)
+
+
+def _draw_continuous_backbone(page: "Figure", recording: Recording) -> None:
+    page.set_size_inches(9.0, 9.6)
+    axes = page.subplots(3, 2)
+    points = list(recording.latest.values())
+    draw_ways(axes[0], points)
+    draw_differences(axes[1], points)
+    _draw_history(axes[2, 0], axes[2, 1], recording)
+    _say_what_it_is(page, recording)
+
+
+def _say_what_it_is(page: "Figure", recording: Recording) -> None:
     points = recording.latest.values()
     left_out = sum(not point["accepted"] for point in points)
     text = f"{_specimen(recording)}: {recording.kind} test, {len(points)} point{'' if len(points) == 1 else 's'}"
@@ -118,6 +133,7 @@ def _draw_multisine(page: "Figure", recording: Recording) -> None:
 
 _DRAW = {
     "backbone": _draw_backbone,
+    "continuous-backbone": _draw_continuous_backbone,
     "sweep": _draw_sweep,
     "stepped-phase": _draw_stepped_phase,
     "stepped-sine": _draw_stepped_sine,
@@ -156,7 +172,7 @@ def _draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> Non
 
 def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
     """Mark the phase error of every recorded fundamental of a part; returns the largest, deg."""
-    points = [point for point in part.points if "phase_error_deg" in point]
+    points = [point for point in part.points if "phase_error_deg" in point and point["settled"] is not None]
     if not points:
         return 0.0
     seconds = [(start + 0.5 * (point["first_sample"] + point["end_sample"])) / rate for point in points]

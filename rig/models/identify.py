@@ -7,6 +7,7 @@ from typing import Any, cast
 
 from identification import (
     Backbone,
+    ContinuousBackbone,
     Exciter,
     FrequencyResponseMatrix,
     LinearModes,
@@ -24,7 +25,7 @@ from identification import (
 )
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import Estimator, backbone, bench_of_recording, spectra
+from rig.measurements import Estimator, backbone, bench_of_recording, continuous_backbones, spectra
 from rig.models.files import KINDS, load, load_as
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.identify_request import Request
@@ -63,23 +64,29 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
         return stepped_sine_mode([response for path in paths for response in load(path)])
     identified = []
     for path in paths:
-        measured, notes = _backbone(path)
-        found = nonlinear_mode(measured, modes=modes)
-        identified.append(replace(found, notes=(*notes, *found.notes)))
+        runs, notes = _backbones(path)
+        for run in runs:
+            found = (
+                run.nonlinear_mode(modes=modes)
+                if isinstance(run, ContinuousBackbone)
+                else nonlinear_mode(run, modes=modes)
+            )
+            identified.append(replace(found, notes=(*notes, *found.notes)))
     return identified[0] if len(identified) == 1 else combined(identified)
 
 
-def _backbone(path: Path) -> tuple[Backbone, tuple[str, ...]]:
-    """A measured backbone, and what of its plan is not in it."""
+def _backbones(path: Path) -> tuple[Sequence[Backbone | ContinuousBackbone], tuple[str, ...]]:
+    """What was measured, every repeat of a continuous backbone by itself, and what of its plan is not in it."""
     kind = kind_of(path)
     if kind in KINDS and isinstance(measured := load(path), Backbone):
-        return measured, ()
-    if kind != "backbone":
+        return (measured,), ()
+    if kind not in ("backbone", "continuous-backbone"):
         raise RecordingError(
             f"{path}: holds a {kind}; a nonlinear mode comes from backbones, or from stepped sines alone"
         )
     with Recording(path) as recording:
-        return backbone(recording), points_left_out(recording)
+        notes = points_left_out(recording)
+        return (continuous_backbones(recording) if kind != "backbone" else (backbone(recording),)), notes
 
 
 def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:

@@ -13,6 +13,7 @@ from controller.lock.rule import LockRule
 from controller.pll import PhaseLockedLoop
 from rig.bench import Bench, DriverChoice, Limits, SpecimenFacts
 from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.known_plant import PlantFacts
 from rig.campaigns.multisine import MultisinePlan
@@ -34,6 +35,7 @@ MODELS = {
     "Keys of a stepped-phase plan": SteppedPhasePlan,
     "Keys of a sweep plan": SweepPlan,
     "Keys of a multisine plan": MultisinePlan,
+    "Keys of a continuous backbone plan": ContinuousBackbonePlan,
     "Keys of a backbone plan": BackbonePlan,
     "Keys of `[controller]`": PhaseLockedLoop,
     "Keys of `[controller.lock]`": LockRule,
