@@ -2,7 +2,12 @@
 
 from simulators.analysis.errors import NotConvergedError
 from simulators.analysis.frequency_responses import FrequencyResponses, frequency_response
-from simulators.analysis.harmonic_balance import constant_force_response, forced_response, phase_resonance_backbone
+from simulators.analysis.harmonic_balance import (
+    constant_displacement_response,
+    constant_force_response,
+    forced_response,
+    phase_resonance_backbone,
+)
 from simulators.analysis.hysteresis import hysteresis_loops
 from simulators.analysis.responses import HysteresisLoop, PeriodicResponses
 
@@ -11,6 +16,7 @@ __all__ = [
     "HysteresisLoop",
     "NotConvergedError",
     "PeriodicResponses",
+    "constant_displacement_response",
     "constant_force_response",
     "forced_response",
     "frequency_response",

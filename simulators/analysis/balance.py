@@ -2,23 +2,23 @@
 
 Unknowns are the harmonics of the site coordinates, the angular frequency W and the voltage U of ``u = U cos(theta)``.
 With T the transfer of the linear part and F(Z) the site forces (alternating frequency-time), harmonic by harmonic
-``Z = T_zf F(Z) + T_zu U``. Two closing equations hold the level, force or voltage, and lag or frequency: the phase lag
-is itself a path parameter, along which folds of the frequency are passed without arc length.
+``Z = T_zf F(Z) + T_zu U``. Two closing equations (`Conditions`) hold the level, and lag or frequency: the phase lag is
+itself a path parameter, along which folds of the frequency are passed without arc length.
 """
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulators.analysis.condensed import CondensedRig, CondensedStructure
+from simulators.analysis.conditions import Conditions
 from simulators.analysis.errors import NotConvergedError
 from simulators.analysis.series import Series
 from simulators.analysis.site_forces import SiteForces
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["Balance", "Conditions", "Solution"]
+__all__ = ["Balance", "Solution"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -29,29 +29,6 @@ _ITERATIONS = 20
 _HALVINGS = 4
 _LARGEST_FREQUENCY_STEP = 0.05
 """Largest change of the frequency in one iteration, relative."""
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What closes the equations: a level of force or voltage, and a phase lag or a frequency."""
-
-    held: Literal["force", "voltage"]
-    """Peak of the fundamental stinger force (N), or amplitude of the voltage (V)."""
-    level: float
-    """Its value."""
-    at: Literal["lag", "frequency"]
-    """Lag ``arg F_1 - arg A_1`` of the drive-point acceleration behind the force (rad), or frequency (rad/s)."""
-    value: float
-    """Its value."""
-
-    def halfway_to(self, goal: "Conditions") -> "Conditions":
-        """Geometric mean of the levels, arithmetic of lag or frequency."""
-        middle = float(np.sqrt(self.level * goal.level))
-        return replace(self, level=middle, value=0.5 * (self.value + goal.value))
-
-    def __str__(self) -> str:
-        at = f"{np.degrees(self.value):g} deg" if self.at == "lag" else f"{self.value / (2.0 * np.pi):g} Hz"
-        return f"{self.held} {self.level:g} {'N' if self.held == 'force' else 'V'}, {self.at} {at}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +48,23 @@ class Solution:
             return np.asarray(np.linalg.solve(self.jacobian, change), dtype=np.float64)
         except np.linalg.LinAlgError:
             raise NotConvergedError(f"the path has no direction at {self.conditions}") from None
+
+    def stable(self, *, under_voltage: bool = False) -> bool:
+        """Static stability of the fundamental where frequency and level stand still, the loop open.
+
+        The determinant of the equations at a given frequency is positive at rest and changes its sign at every fold.
+        ``under_voltage``: with the voltage in the place of what was held.
+        """
+        if under_voltage:
+            left = self.jacobian[:-2, :-2]
+        else:
+            left = np.delete(np.delete(self.jacobian, -2, axis=0), -2, axis=1)
+        return bool(np.linalg.slogdet(left)[0] > 0.0)
+
+    def held_by_voltage(self) -> float:
+        """``d ln(level) / d ln(U)`` at the lag or frequency that was held: what one loop on the level alone sees."""
+        change = self.tangent(level=1.0)[-1] / self.unknowns[-1]
+        return float(1.0 / change) if change else float("inf")
 
 
 class Balance:
@@ -119,21 +113,7 @@ class Balance:
         value[:-2] = unknowns[:-2] - series.to_real(response[:n]).ravel()
         jacobian[:-2] = -series.to_real(slopes[:n]).reshape(n * series.size, unknowns.size)
         jacobian[:-2, :-2] += np.eye(unknowns.size - 2)
-        force, drive = response[n, 1], response[n + 1, 1]
-        by_force, by_drive = slopes[n, 1] / force, slopes[n + 1, 1] / drive
-        if conditions.at == "lag":
-            # The acceleration is minus W^2 times the displacement.
-            value[-2] = np.angle(-force / drive * np.exp(-1j * conditions.value))
-            jacobian[-2] = np.imag(by_force - by_drive)
-        else:
-            value[-2] = unknowns[-2] / conditions.value - 1.0
-            jacobian[-2, -2] = 1.0 / conditions.value
-        if conditions.held == "force":
-            value[-1] = np.log(abs(force) / conditions.level)
-            jacobian[-1] = np.real(by_force)
-        else:
-            value[-1] = unknowns[-1] / conditions.level - 1.0
-            jacobian[-1, -1] = 1.0 / conditions.level
+        value[-2:], jacobian[-2:] = conditions.equations(unknowns, response[n:], slopes[n:])
         scale = np.append(np.repeat(np.where(sizes[:n] > 0.0, sizes[:n], 1.0), series.size), [1.0, 1.0])
         return value, jacobian, scale
 
@@ -176,8 +156,7 @@ class Balance:
     def linear_start(self, conditions: Conditions, omega_rad_s: float) -> Real:
         """Vibration of the linear part alone at W, at the level asked for."""
         transfer = self.linear.transfer(omega_rad_s, self.series.orders)[0][1, :, -1]
-        force = abs(transfer[self.n_site])
-        voltage = conditions.level if conditions.held == "voltage" else conditions.level / force
+        voltage = conditions.voltage_v(*np.abs(transfer[self.n_site :]))
         harmonics = np.zeros((self.n_site, self.series.orders.size), np.complex128)
         harmonics[:, 1] = voltage * transfer[: self.n_site]
         return np.append(self.series.to_real(harmonics).ravel(), [omega_rad_s, voltage])

@@ -33,10 +33,11 @@ class Evaluation:
             ]
         )
 
-    def __call__(self, solutions: Sequence[Solution], stable: NDArray[np.bool_] | None = None) -> PeriodicResponses:
+    def __call__(self, solutions: Sequence[Solution]) -> PeriodicResponses:
         """One point per solution (at least one), in their order."""
         omega, voltage = np.array([solution.unknowns[-2:] for solution in solutions]).T
-        if isinstance(self.balance.linear, CondensedStructure):
+        imposed = isinstance(self.balance.linear, CondensedStructure)
+        if imposed:
             voltage = np.full(voltage.size, np.nan)
         coordinates, forces, outputs, neglected, beyond = zip(*(self._point(one) for one in solutions), strict=True)
         harmonics = np.transpose(np.array(outputs), (1, 0, 2))
@@ -54,7 +55,9 @@ class Evaluation:
             site_force_harmonics=np.array(forces),
             neglected_share=np.array(neglected),
             flags=flags,
-            stable=stable,
+            stable=np.array([one.stable() for one in solutions]),
+            stable_under_voltage=None if imposed else np.array([one.stable(under_voltage=True) for one in solutions]),
+            level_slope=None if imposed else np.array([one.held_by_voltage() for one in solutions]),
         )
 
     def _point(self, solution: Solution) -> tuple[Complex, Complex, Complex, float, bool]:

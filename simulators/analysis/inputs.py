@@ -25,13 +25,17 @@ def positive(name: str, values: ArrayLike) -> Real:
     return array
 
 
-def levels(forces_n: ArrayLike | None, voltages_v: ArrayLike | None) -> tuple[Literal["force", "voltage"], Real]:
-    """Which of the two is given, and its values."""
-    if forces_n is not None and voltages_v is None:
+def levels(
+    forces_n: ArrayLike | None, voltages_v: ArrayLike | None, amplitudes_m: ArrayLike | None
+) -> tuple[Literal["force", "voltage", "response"], Real]:
+    """Which of the three is given, and its values."""
+    if forces_n is not None and voltages_v is None and amplitudes_m is None:
         return "force", positive("forces_n", forces_n)
-    if voltages_v is not None and forces_n is None:
+    if voltages_v is not None and forces_n is None and amplitudes_m is None:
         return "voltage", positive("voltages_v", voltages_v)
-    raise ValueError("forces_n, voltages_v: both or neither given, allowed is one of them")
+    if amplitudes_m is not None and forces_n is None and voltages_v is None:
+        return "response", positive("amplitudes_m", amplitudes_m)
+    raise ValueError("forces_n, voltages_v, amplitudes_m: several or none given, allowed is one of them")
 
 
 def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Real:

@@ -3,7 +3,8 @@
 import math
 from dataclasses import replace
 
-from simulators.analysis.balance import Balance, Conditions, Solution
+from simulators.analysis.balance import Balance, Solution
+from simulators.analysis.conditions import Conditions
 from simulators.analysis.errors import NotConvergedError
 
 __all__ = ["follow", "from_rest"]

@@ -24,7 +24,7 @@ class PeriodicResponses:
     voltage_v: Real
     """Amplitude U [n] of the voltage; NaN where the force itself was imposed."""
     force_n: Real
-    """Peak of the fundamental of the stinger force [n]."""
+    """Peak of the fundamental of the stinger force [n]; see also `force_rms_n`."""
     amplitude_m: Real
     """Peak of the fundamental of the drive point's displacement [n]."""
     phase_lag_deg: Real
@@ -54,13 +54,24 @@ class PeriodicResponses:
     flags: NDArray[np.int64]
     """`simulators.layout.Flag` bits [n]: site out of its range, sensor or output clipped (neither clips here)."""
     stable: NDArray[np.bool_] | None = None
-    """Under constant force and frequency, by the folds of the curve [n]; None where it was not looked at."""
+    """Under constant frequency and level, of what was held, by the folds of the curve [n]."""
+    stable_under_voltage: NDArray[np.bool_] | None = None
+    """The same under constant voltage [n]; None where the force itself was imposed."""
+    level_slope: Real | None = None
+    """``d ln(level) / d ln(U)`` [n] of the level held, at the lag or frequency held; None where the force was imposed.
+
+    A loop that adjusts the voltage by the level sees this slope: where it is negative, no gain of the usual sign holds."""
 
     @property
     def frequency_shift(self) -> float:
         """Modal frequency at the largest amplitude over that at the smallest, minus one."""
         smallest, largest = int(np.argmin(self.amplitude_m)), int(np.argmax(self.amplitude_m))
         return float(self.modal_frequency_hz[largest] / self.modal_frequency_hz[smallest] - 1.0)
+
+    @property
+    def force_rms_n(self) -> Real:
+        """RMS of all harmonics of the stinger force from the first on [n]."""
+        return np.asarray(np.sqrt(0.5 * np.sum(np.abs(self.force_harmonics_n[:, 1:]) ** 2, axis=1)))
 
     def force_harmonic_ratio(self, harmonic: int) -> Real:
         """``|F_h / F_1|`` [n]; `ValueError` beyond the harmonics there are."""

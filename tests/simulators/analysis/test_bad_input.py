@@ -25,7 +25,7 @@ BAD: list[tuple[Callable[..., Any], dict[str, Any], str]] = [
     (phase_resonance_backbone, {"forces_n": [np.nan]}, "forces_n = nan: allowed is above 0"),
     (phase_resonance_backbone, {"forces_n": []}, r"forces_n: shape \(0,\), allowed is one row"),
     (phase_resonance_backbone, {"voltages_v": [-1.0]}, "voltages_v = -1: allowed is above 0"),
-    (phase_resonance_backbone, {}, "forces_n, voltages_v: both or neither given, allowed is one of them"),
+    (phase_resonance_backbone, {}, "forces_n, voltages_v, amplitudes_m: several or none given, allowed is one"),
     (phase_resonance_backbone, {"forces_n": [0.1], "phase_lag_deg": 90.0}, "phase_lag_deg = 90: allowed is -179 to -1"),
     (phase_resonance_backbone, {"forces_n": [0.1], "harmonics": 0}, "harmonics = 0: allowed is at least 1"),
     (phase_resonance_backbone, {"forces_n": [0.1], "samples": 32}, "samples = 32: allowed is at least 64 for 15"),

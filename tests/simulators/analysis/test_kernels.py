@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from simulators.analysis.balance import Balance, Conditions
+from simulators.analysis.balance import Balance
+from simulators.analysis.conditions import Conditions
 from simulators.analysis.kernels import friction_over_a_period
 from simulators.analysis.series import Series
 from tests.reference.friction import jenkins_over_a_period

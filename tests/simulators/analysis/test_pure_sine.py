@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from simulators.analysis import phase_resonance_backbone
-from simulators.analysis.balance import Balance, Conditions
+from simulators.analysis.balance import Balance
+from simulators.analysis.conditions import Conditions
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.analysis.rigs import every_site
 from tests.simulators.references import EquationsOfMotion, ideal

@@ -1,0 +1,179 @@
+"""Sections of a force surface at one lag, and curves at constant force through them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.frequency_responses import FrequencyResponse
+from identification.validation import positive
+
+__all__ = ["ConstantForceCurve", "Section", "cut"]
+
+Float = NDArray[np.float64]
+
+_LEAST_FOR_CUBIC = 4
+_LAG_STEP_DEG = 0.5
+"""Half step of the differences that tell where the frequency falls with the lag."""
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """What the levels of a surface say at one lag: frequency (rad/s) and ``ln |F|`` over ``ln X``, each [n_levels]."""
+
+    lag: float
+    log_amplitude: Float
+    omega: Float
+    log_force: Float
+    covariance: Float
+    """Of W and ``ln |F|`` of every level [n_levels, 2, 2]; levels are independent."""
+
+    def thinned(self) -> "Section":
+        """Every second level and the last."""
+        keep = np.arange(self.omega.size) % 2 == 0
+        keep[-1:] = True
+        arrays = ("log_amplitude", "omega", "log_force", "covariance")
+        return replace(self, **{name: getattr(self, name)[keep] for name in arrays})
+
+    def slopes(self, log_amplitude: float) -> Float:
+        """``d(W, ln |F|) / d ln X`` [2] at one amplitude."""
+        values = np.column_stack([self.omega, self.log_force])
+        return np.asarray(_interpolant(self.log_amplitude, values)(log_amplitude, 1))
+
+    def amplitudes_at(self, log_force: float) -> Float:
+        """All ``ln X`` of a force, within the levels."""
+        if self.omega.size < 2:
+            return np.empty(0)
+        roots = _interpolant(self.log_amplitude, self.log_force).solve(log_force, extrapolate=False)
+        return np.asarray(roots[np.isfinite(roots)], dtype=np.float64)
+
+    def omega_at(self, log_amplitude: float) -> float:
+        """W (rad/s) at one amplitude."""
+        return float(_interpolant(self.log_amplitude, self.omega)(log_amplitude))
+
+    def variances(self, log_amplitude: float) -> tuple[float, float]:
+        """Variances of W and of ``ln X`` at constant force, from those of the levels."""
+        shares = _interpolant(self.log_amplitude, np.eye(self.omega.size))(log_amplitude)
+        by_amplitude, force_slope = self.slopes(log_amplitude)
+        # at constant force d ln X = -d ln|F| / slope, and W moves along
+        change = np.array([[1.0, -by_amplitude / force_slope], [0.0, -1.0 / force_slope]])
+        covariance = change @ np.einsum("l,lij->ij", shares**2, self.covariance) @ change.T
+        return float(covariance[0, 0]), float(covariance[1, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantForceCurve:
+    """A frequency response at constant force cut from a force surface; points in the order of the lag."""
+
+    response: FrequencyResponse
+    """Frequency, force and displacement at the drive point [n], the phase of the displacement zero."""
+    frequency_std_hz: Float
+    """Standard error [n] from the scatter of the measured points about the fits of their levels."""
+    amplitude_std_m: Float
+    """The same of the displacement [n]."""
+    frequency_change_hz: Float
+    """Change [n] if every second level is left out; NaN where too few remain. An upper bound of what the
+    interpolation between levels costs, in practice by far."""
+    amplitude_change: Float
+    """The same of the displacement [n], relative."""
+    stable: NDArray[np.bool_]
+    """Whether constant force and frequency hold the point [n]: the frequency grows with the lag."""
+    notes: tuple[str, ...] = ()
+    """Where the curve ends and why."""
+
+
+def cut(section_at: Callable[[float], Section], force_n: float, lags_deg: Float, specimen: str) -> ConstantForceCurve:
+    """The curve at ``force_n`` through the sections at ``lags_deg``; `IdentificationError` where there is none."""
+    target = float(np.log(positive("force_n", force_n, "N")))
+    sections = [section_at(float(lag)) for lag in lags_deg]
+    amplitude, several = _followed(sections, target, int(np.argmin(np.abs(lags_deg - 90.0))))
+    on = np.flatnonzero(np.isfinite(amplitude))
+    if not on.size:
+        raise IdentificationError(f"force_n: is {force_n:g} N, {_reach(sections)}")
+    sections, lags_deg, missing, amplitude = [sections[k] for k in on], lags_deg[on], _left(lags_deg, on), amplitude[on]
+    omega = np.array([one.omega_at(u) for one, u in zip(sections, amplitude, strict=True)])
+    variances = np.array([one.variances(u) for one, u in zip(sections, amplitude, strict=True)])
+    thinned = [one.thinned() for one in sections]
+    fewer = np.array([_nearest(one.amplitudes_at(target), u) for one, u in zip(thinned, amplitude, strict=True)])
+    moved = [one.omega_at(u) if np.isfinite(u) else np.nan for one, u in zip(thinned, fewer, strict=True)]
+    force = force_n * np.exp(1j * np.radians(lags_deg))
+    frequency, displacement = omega / (2.0 * np.pi), np.exp(amplitude)
+    label = f"{force_n:g} N"
+    return ConstantForceCurve(
+        FrequencyResponse(frequency, force, displacement, "displacement", "force", force_n, label, specimen),
+        frequency_std_hz=np.sqrt(variances[:, 0]) / (2.0 * np.pi),
+        amplitude_std_m=np.sqrt(variances[:, 1]) * displacement,
+        frequency_change_hz=np.abs(np.array(moved) - omega) / (2.0 * np.pi),
+        amplitude_change=np.abs(np.expm1(fewer - amplitude)),
+        stable=_rising(section_at, target, lags_deg, amplitude),
+        notes=(*missing, *several),
+    )
+
+
+def _followed(sections: list[Section], target: float, first: int) -> tuple[Float, tuple[str, ...]]:
+    """``ln X`` at every lag, nearest to that of the lag before, from resonance outwards; and what else there was."""
+    roots = [section.amplitudes_at(target) for section in sections]
+    amplitude = np.full(len(sections), np.nan)
+    for order in (range(first, len(sections)), range(first - 1, -1, -1)):
+        known = amplitude[first]
+        for k in order:
+            amplitude[k] = _nearest(roots[k], known)
+            known = amplitude[k] if np.isfinite(amplitude[k]) else known
+    extra = [np.degrees(section.lag) for section, found in zip(sections, roots, strict=True) if found.size > 1]
+    if not extra:
+        return amplitude, ()
+    return amplitude, (f"lags {min(extra):.0f} to {max(extra):.0f} deg: the force has several amplitudes, one is followed",)
+
+
+def _nearest(roots: Float, known: float) -> float:
+    """The root nearest to ``known``, the largest without it; NaN without any."""
+    if not roots.size:
+        return float("nan")
+    return float(roots[np.argmin(np.abs(roots - known))] if np.isfinite(known) else np.max(roots))
+
+
+def _rising(section_at: Callable[[float], Section], target: float, lags_deg: Float, amplitude: Float) -> Any:
+    """Whether the frequency grows with the lag along the curve [n], by differences about every point."""
+    rising = np.ones(lags_deg.size, dtype=np.bool_)
+    for k, (lag, known) in enumerate(zip(lags_deg, amplitude, strict=True)):
+        ends = []
+        for at in (lag - _LAG_STEP_DEG, lag, lag + _LAG_STEP_DEG):
+            section = section_at(float(at))
+            u = _nearest(section.amplitudes_at(target), known)
+            if np.isfinite(u):
+                ends.append(section.omega_at(u))
+        rising[k] = len(ends) < 2 or ends[-1] > ends[0]
+    return rising
+
+
+def _left(lags_deg: Float, on: NDArray[np.int64]) -> tuple[str, ...]:
+    """What is said of lags at which the force meets no level."""
+    off = np.delete(lags_deg, on)
+    if not off.size:
+        return ()
+    return (
+        f"{off.size} of {lags_deg.size} lags left out ({off.min():g} to {off.max():g} deg): the force meets no measured level "
+        f"there",
+    )
+
+
+def _reach(sections: list[Section]) -> str:
+    """The forces that the levels hold at the lag that was measured best."""
+    best = max(sections, key=lambda one: one.omega.size)
+    if best.omega.size < 2:
+        return "fewer than two levels were measured at any of the lags"
+    forces = np.exp(best.log_force)
+    return f"levels at lag {np.degrees(best.lag):.0f} deg hold {forces.min():.4g} to {forces.max():.4g} N"
+
+
+def _interpolant(x: Float, values: Float) -> Any:
+    """Piecewise polynomial through ``values`` [n, ...] over rising ``x``: a cubic spline, a line where there are few."""
+    from scipy.interpolate import CubicSpline, PPoly
+
+    if x.size >= _LEAST_FOR_CUBIC:
+        return CubicSpline(x, values, extrapolate=False)
+    step = np.diff(x).reshape(-1, *(1,) * (values.ndim - 1))
+    return PPoly(np.stack([np.diff(values, axis=0) / step, values[:-1]]), x, extrapolate=False)

@@ -1,0 +1,156 @@
+"""The force surface of a response-controlled test, and frequency responses at constant force cut from it.
+
+A test that holds the displacement amplitude X of the drive point has no folds: at every level the structure answers as a
+linear one. The levels together are a surface, the harmonic force over frequency and amplitude, and its contours are
+the frequency responses at constant force, turning points and unstable branches included, though no loop ever held
+them (Karaagacli & Ozguven, Mech. Syst. Signal Process. 2021, harmonic force surfaces from response-controlled tests).
+
+Here the surface is spanned by amplitude and phase lag, not by amplitude and frequency: at one lag the frequency and
+``ln |F|`` are smooth and single-valued in ``ln X``, also where the resonance moves by many of its widths between two
+levels. Levels are fitted one by one (`levels`); in between the two are interpolated at the same lag.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.errors import IdentificationError
+from identification.frequency_responses import FrequencyResponse
+from identification.response_control.curves import ConstantForceCurve, Section, cut
+from identification.response_control.levels import LevelFit, LevelPoints, fit_level
+
+__all__ = ["ForceSurface", "force_surface"]
+
+Float = NDArray[np.float64]
+
+LEAST_LEVELS = 3
+_SAME_LEVEL = 1e-6
+_LAGS_DEG = np.arange(30.0, 150.5, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceSurface:
+    """Force and frequency over response level and phase lag, as fitted level by level; built by `force_surface`."""
+
+    levels: tuple[LevelFit, ...]
+    """Smallest amplitude first."""
+    specimen: str = ""
+
+    @property
+    def amplitude_m(self) -> Float:
+        """float[n_levels]: peak of the displacement at the drive point, m."""
+        return np.array([level.amplitude_m for level in self.levels])
+
+    @property
+    def fit_residual(self) -> Float:
+        """float[n_levels]: RMS of what the fit of each level leaves, relative."""
+        return np.array([level.residual for level in self.levels])
+
+    def section(self, phase_lag_deg: float) -> Section:
+        """Frequency and force of the levels that were measured at a lag of the displacement behind the force."""
+        lag = float(np.radians(phase_lag_deg))
+        found = [(level.amplitude_m, *level.at_lag(lag)) for level in self.levels]
+        known = [one for one in found if np.isfinite(one[1])]
+        amplitude, omega, stiffness = (np.array([one[i] for one in known], dtype=np.float64) for i in range(3))
+        covariance = np.array([one[3] for one in known]).reshape(-1, 2, 2)
+        return Section(lag, np.log(amplitude), omega, stiffness + np.log(amplitude), covariance)
+
+    def at_lag(self, phase_lag_deg: float = 90.0) -> FrequencyResponse:
+        """One point per level at one lag, by default phase resonance: a backbone, for `single_point_mode`."""
+        section = self.section(phase_lag_deg)
+        if not section.omega.size:
+            raise IdentificationError(f"phase_lag_deg: is {phase_lag_deg:g}, no level was measured there")
+        force = np.exp(section.log_force + 1j * section.lag)
+        amplitude = np.exp(section.log_amplitude)
+        frequency = section.omega / (2.0 * np.pi)
+        level, label = float(np.max(amplitude)), f"lag {phase_lag_deg:g} deg"
+        return FrequencyResponse(frequency, force, amplitude, "displacement", "none", level, label, self.specimen)
+
+    def constant_force(self, force_n: float, phase_lags_deg: ArrayLike | None = None) -> ConstantForceCurve:
+        """Frequency response at a constant fundamental force, from below to above resonance.
+
+        Parameters
+        ----------
+        force_n
+            Peak of the fundamental of the force.
+        phase_lags_deg
+            Lags of the displacement behind the force [n], rising, between 0 and 180. Default: 30 to 150 by 1.
+
+        Raises
+        ------
+        IdentificationError
+            On values that are not allowed, and where the force meets no measured level at any of the lags.
+        """
+        lags = np.atleast_1d(np.asarray(_LAGS_DEG if phase_lags_deg is None else phase_lags_deg, dtype=np.float64))
+        if lags.ndim != 1 or not np.all((lags > 0.0) & (lags < 180.0)) or np.any(np.diff(lags) <= 0.0):
+            raise IdentificationError("phase_lags_deg: allowed are rising lags between 0 and 180")
+        return cut(self.section, float(force_n), lags, self.specimen)
+
+
+def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
+    """Force surface of the response-controlled levels of a test.
+
+    Parameters
+    ----------
+    responses
+        Measured levels at the drive point, by frequency or by lag, in any order; levels of the same nominal value are
+        taken together (up and down). Those not response-controlled are refused. Amplitudes that missed their level are
+        brought to it along the slope of the surface at the same lag.
+
+    Raises
+    ------
+    IdentificationError
+        On fewer than three levels, levels of fewer than four points or on one side of resonance only.
+    """
+    for response in responses:
+        if response.controlled != "response":
+            raise IdentificationError(f"responses: '{response.label}' held {response.controlled}, must hold the response")
+    points = _by_level(responses)
+    if len(points) < LEAST_LEVELS:
+        raise IdentificationError(f"responses: {len(points)} levels, needs at least {LEAST_LEVELS}")
+    specimen = responses[0].specimen
+    raw = ForceSurface(_fits(points), specimen)
+    ordered = sorted(points, key=lambda one: float(np.median(one.amplitude_m)))
+    return ForceSurface(_fits([_at_level(raw, one) for one in ordered]), specimen)
+
+
+def _by_level(responses: Sequence[FrequencyResponse]) -> list[LevelPoints]:
+    """Points of every level, those of equal levels together."""
+    groups: list[list[FrequencyResponse]] = []
+    for response in sorted(responses, key=lambda one: one.level):
+        if groups and response.level <= groups[-1][0].level * (1.0 + _SAME_LEVEL):
+            groups[-1].append(response)
+        else:
+            groups.append([response])
+    return [
+        LevelPoints(
+            2.0 * np.pi * np.concatenate([one.frequency_hz for one in group]),
+            np.concatenate([one.force / one.displacement_m for one in group]),
+            np.concatenate([one.amplitude_m for one in group]),
+        )
+        for group in groups
+    ]
+
+
+def _fits(points: Sequence[LevelPoints]) -> tuple[LevelFit, ...]:
+    fits = [fit_level(one, f"level {1e3 * float(np.median(one.amplitude_m)):.4g} mm") for one in points]
+    fits.sort(key=lambda fit: fit.amplitude_m)
+    for lower, upper in zip(fits, fits[1:], strict=False):
+        if upper.amplitude_m <= lower.amplitude_m * (1.0 + _SAME_LEVEL):
+            raise IdentificationError(f"responses: two levels have the same amplitude of {upper.amplitude_m:g} m")
+    return tuple(fits)
+
+
+def _at_level(surface: ForceSurface, points: LevelPoints) -> LevelPoints:
+    """Points with their deviations from the level's amplitude taken out, each along its own lag."""
+    level = float(np.log(np.median(points.amplitude_m)))
+    off = np.log(points.amplitude_m) - level
+    moves = np.zeros((2, off.size))
+    for k in np.flatnonzero(np.abs(off) > 0.0):
+        section = surface.section(float(np.degrees(np.angle(points.stiffness[k]))))
+        if section.omega.size > 1:
+            moves[:, k] = section.slopes(level)
+    # the slope of ln|F| less that of ln X is that of ln|S|
+    return points.moved(moves[0] * off, np.where(moves[0] == 0.0, 0.0, moves[1] - 1.0) * off)
