@@ -7,6 +7,7 @@ import numpy as np
 
 from identification import (
     Backbone,
+    ForceSurface,
     FrequencyResponse,
     FrequencyResponseMatrix,
     IdentificationError,
@@ -14,6 +15,7 @@ from identification import (
     Transient,
     best_linear_approximation,
 )
+from identification import force_surface as surface_of
 from identification.multisine.best_linear_approximation import Estimator
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
@@ -27,9 +29,11 @@ from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
 __all__ = [
+    "STEPPED",
     "Estimator",
     "backbone",
     "bench_of_recording",
+    "force_surface",
     "frequency_responses",
     "load_backbone",
     "point_rows",
@@ -37,6 +41,9 @@ __all__ = [
     "spectra",
     "sweeps",
 ]
+
+STEPPED = ("stepped-sine", "response-controlled")
+"""Kinds of recordings that hold frequency responses, one per level."""
 
 
 def backbone(recording: Recording) -> Backbone:
@@ -57,14 +64,24 @@ def backbone(recording: Recording) -> Backbone:
 
 
 def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a stepped-sine recording: the fundamentals of force and drive, one response per level.
+    """The accepted points of a stepped-sine or response-controlled recording: fundamentals of force and drive.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    One response per level and pass. Raises `RecordingError` for a recording of another kind,
+    `identification.IdentificationError` without any point.
     """
-    _expect(recording, "stepped-sine")
+    _expect(recording, *STEPPED)
     return frequency_responses_of(
         recording.latest.values(), recording.channels, bench_of_recording(recording).specimen.name
     )
+
+
+def force_surface(recording: Recording) -> ForceSurface:
+    """The force over frequency and displacement, from the held displacements of a response-controlled or stepped-sine recording.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` for other levels and for
+    fewer than three.
+    """
+    return surface_of(frequency_responses(recording))
 
 
 def sweeps(recording: Recording) -> dict[int, Transient]:
@@ -130,9 +147,9 @@ def load_backbone(path: Path) -> Backbone:
         return backbone(recording)
 
 
-def _expect(recording: Recording, kind: str) -> None:
-    if recording.kind != kind:
-        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {kind}")
+def _expect(recording: Recording, *kinds: str) -> None:
+    if recording.kind not in kinds:
+        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {' or a '.join(kinds)}")
 
 
 def bench_of_recording(recording: Recording) -> Bench:

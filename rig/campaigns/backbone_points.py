@@ -20,7 +20,7 @@ from rig.campaigns.evaluate import (
 )
 from rig.campaigns.plan import Column, Target
 
-__all__ = ["BACKBONE_COLUMNS", "backbone_of", "measure_backbone_point"]
+__all__ = ["BACKBONE_COLUMNS", "backbone_of", "frequency_scatter", "measure_backbone_point"]
 
 BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),
@@ -48,7 +48,7 @@ def measure_backbone_point(
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     error_deg = vibration.phase_error_deg
-    hunting = _frequency_scatter(rows["theta_rad"])
+    hunting = frequency_scatter(rows["theta_rad"])
     reason = _objection(plan, bench, vibration, hunting)
     damping = float(mode.damping_ratio[0])
     scatter = rows["phase_error_rad"][np.isfinite(rows["phase_error_rad"])].astype(float)
@@ -92,7 +92,7 @@ def _objection(plan: BackbonePlan, bench: Bench, vibration: PeriodicVibration, h
     return drift_objection(bench, vibration, plan.accepted_drift)
 
 
-def _frequency_scatter(theta_rad: np.ndarray) -> float:
+def frequency_scatter(theta_rad: np.ndarray) -> float:
     """Standard deviation of the frequency of single periods, relative to its mean."""
     turned = np.unwrap(theta_rad.astype(float))
     turns = (turned - turned[0]) / (2.0 * math.pi)

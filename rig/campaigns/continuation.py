@@ -22,6 +22,7 @@ __all__ = ["FIXED", "VIBRATION", "Continuation", "changed_keys", "identities", "
 
 VIBRATION: dict[str, tuple[str, ...]] = {
     "backbone": ("controller.phase_lag_deg",),
+    "response-controlled": (),
     "stepped-sine": (),
     "sweep": ("start_hz", "stop_hz", "rate_hz_per_s", "rate_octaves_per_min"),
     "multisine": ("lowest_hz", "highest_hz", "resolution_hz", "grid", "detection_group", "phase_seed"),

@@ -9,6 +9,8 @@ from rig.campaigns.backbone_points import BACKBONE_COLUMNS, measure_backbone_poi
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.multisine_points import MULTISINE_COLUMNS, measure_multisine_point
 from rig.campaigns.plan import Column, Plan
+from rig.campaigns.response_controlled import ResponseControlledPlan
+from rig.campaigns.response_controlled_points import RESPONSE_CONTROLLED_COLUMNS, measure_response_controlled_point
 from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS, measure_stepped_sine_point
 from rig.campaigns.sweep import SweepPlan
@@ -31,6 +33,9 @@ class Campaign:
 
 KINDS = {
     "backbone": Campaign(BackbonePlan, measure_backbone_point, BACKBONE_COLUMNS),
+    "response-controlled": Campaign(
+        ResponseControlledPlan, measure_response_controlled_point, RESPONSE_CONTROLLED_COLUMNS
+    ),
     "stepped-sine": Campaign(SteppedSinePlan, measure_stepped_sine_point, STEPPED_SINE_COLUMNS),
     "sweep": Campaign(SweepPlan, measure_sweep, SWEEP_COLUMNS),
     "multisine": Campaign(MultisinePlan, measure_multisine_point, MULTISINE_COLUMNS),
