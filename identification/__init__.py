@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
     from identification.prediction.sweeps import predict_sweep
     from identification.prediction.uncertainty import ResponseBand, response_band
+    from identification.response_control.curves import ConstantForceCurve
+    from identification.response_control.force_surface import ForceSurface, force_surface
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -63,10 +65,12 @@ __all__ = [
     "BackboneMapping",
     "Channel",
     "Comparison",
+    "ConstantForceCurve",
     "DistortionLevels",
     "Exciter",
     "ExtrapolationError",
     "ForceDropOut",
+    "ForceSurface",
     "FrequencyResponse",
     "FrequencyResponseMapping",
     "FrequencyResponseMatrix",
@@ -106,6 +110,7 @@ __all__ = [
     "error_table",
     "extrapolated_to_zero",
     "force_drop_out",
+    "force_surface",
     "frequency_response",
     "identify_exciter",
     "linear_modes",
@@ -138,10 +143,12 @@ _MODULE_OF = {
     "BackboneMapping": "mapping.backbone",
     "Channel": "channels",
     "Comparison": "prediction.comparison",
+    "ConstantForceCurve": "response_control.curves",
     "DistortionLevels": "multisine.distortion",
     "Exciter": "prediction.exciter",
     "ExtrapolationError": "prediction.properties",
     "ForceDropOut": "signals.sweeps",
+    "ForceSurface": "response_control.force_surface",
     "FrequencyResponse": "frequency_responses",
     "FrequencyResponseMapping": "mapping.stepped_sine",
     "FrequencyResponseMatrix": "linear.response_matrix",
@@ -181,6 +188,7 @@ _MODULE_OF = {
     "error_table": "prediction.comparison",
     "extrapolated_to_zero": "linear.extrapolation",
     "force_drop_out": "signals.sweeps",
+    "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
     "identify_exciter": "prediction.exciter_fit",
     "linear_modes": "linear.modal_analysis",

@@ -12,6 +12,7 @@ levels. Levels are fitted one by one (`levels`); in between the two are interpol
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.response_control.curves import ConstantForceCurve, Section, cut
-from identification.response_control.levels import LevelFit, LevelPoints, fit_level
+from identification.response_control.levels import LevelFit, LevelPoints, best_degree, check_level, fit_level
 
 __all__ = ["ForceSurface", "force_surface"]
 
@@ -68,6 +69,25 @@ class ForceSurface:
         level, label = float(np.max(amplitude)), f"lag {phase_lag_deg:g} deg"
         return FrequencyResponse(frequency, force, amplitude, "displacement", "none", level, label, self.specimen)
 
+    def next_level_m(self) -> float:
+        """Displacement at which one more level tells most: in the gap whose ends their neighbours foretell worst.
+
+        Where the force has kinks over the amplitude, half of the levels evenly spaced and the rest by this do better than
+        all of them evenly spaced.
+        """
+        worst, where = 0.0, float("nan")
+        for section in (self.section(lag) for lag in _LAGS_DEG[:: _LAGS_DEG.size // 8]):
+            if section.omega.size < LEAST_LEVELS:
+                continue
+            doubts, x = section.doubts(), section.log_amplitude
+            scores = (doubts[:-1] + doubts[1:]) * np.diff(x)
+            gap = int(np.argmax(scores))
+            if scores[gap] >= worst:
+                worst, where = float(scores[gap]), float(np.exp(0.5 * (x[gap] + x[gap + 1])))
+        if not np.isfinite(where):
+            raise IdentificationError(f"levels: no lag was measured at {LEAST_LEVELS} of them")
+        return where
+
     def constant_force(self, force_n: float, phase_lags_deg: ArrayLike | None = None) -> ConstantForceCurve:
         """Frequency response at a constant fundamental force, from below to above resonance.
 
@@ -106,7 +126,9 @@ def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
     """
     for response in responses:
         if response.controlled != "response":
-            raise IdentificationError(f"responses: '{response.label}' held {response.controlled}, must hold the response")
+            raise IdentificationError(
+                f"responses: '{response.label}' held {response.controlled}, must hold the response"
+            )
     points = _by_level(responses)
     if len(points) < LEAST_LEVELS:
         raise IdentificationError(f"responses: {len(points)} levels, needs at least {LEAST_LEVELS}")
@@ -135,9 +157,12 @@ def _by_level(responses: Sequence[FrequencyResponse]) -> list[LevelPoints]:
 
 
 def _fits(points: Sequence[LevelPoints]) -> tuple[LevelFit, ...]:
-    fits = [fit_level(one, f"level {1e3 * float(np.median(one.amplitude_m)):.4g} mm") for one in points]
+    for one in points:
+        check_level(one, f"level {1e3 * float(np.median(one.amplitude_m)):.4g} mm")
+    degree = best_degree(points)
+    fits = [fit_level(one, degree) for one in points]
     fits.sort(key=lambda fit: fit.amplitude_m)
-    for lower, upper in zip(fits, fits[1:], strict=False):
+    for lower, upper in pairwise(fits):
         if upper.amplitude_m <= lower.amplitude_m * (1.0 + _SAME_LEVEL):
             raise IdentificationError(f"responses: two levels have the same amplitude of {upper.amplitude_m:g} m")
     return tuple(fits)
@@ -148,9 +173,9 @@ def _at_level(surface: ForceSurface, points: LevelPoints) -> LevelPoints:
     level = float(np.log(np.median(points.amplitude_m)))
     off = np.log(points.amplitude_m) - level
     moves = np.zeros((2, off.size))
-    for k in np.flatnonzero(np.abs(off) > 0.0):
+    for k in np.flatnonzero(np.abs(off) > _SAME_LEVEL):
         section = surface.section(float(np.degrees(np.angle(points.stiffness[k]))))
         if section.omega.size > 1:
-            moves[:, k] = section.slopes(level)
+            moves[:, k] = section.slopes(float(np.clip(level, *section.log_amplitude[[0, -1]])))
     # the slope of ln|F| less that of ln X is that of ln|S|
     return points.moved(moves[0] * off, np.where(moves[0] == 0.0, 0.0, moves[1] - 1.0) * off)

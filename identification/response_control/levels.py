@@ -3,24 +3,32 @@
 Where the amplitude of the response is held, the dynamic stiffness ``S = F / X`` of a nonlinear structure is that of a
 quasi-linear one: ``phi_d^2 S = w^2 - W^2 + 2 i W w z`` with w and z of that amplitude, and a small share of the other
 modes. Over the half-power range all of it is a polynomial of low degree in W, linear in its coefficients; the degree is
-that with the smallest leave-one-out error. Equations are weighted by ``1 / |S|``: noise in proportion to the force.
+that with the smallest leave-one-out error over all levels. Equations are weighted by ``1 / |S|``: noise in proportion
+to the force.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 
-__all__ = ["HIGHEST_DEGREE", "LevelFit", "LevelPoints", "fit_level"]
+__all__ = ["LevelFit", "LevelPoints", "best_degree", "check_level", "fit_level"]
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HIGHEST_DEGREE = 4
 _LEAST_POINTS = 4
+_SPARE_POINTS = 2
+"""Points beyond the degree that are left to tell the scatter from: one more than coefficients."""
+_GRID = 201
+_NEWTON = 2
+"""Steps from the grid's lag to the exact one."""
 _MARGIN = 0.02
 """How far a lag may lie beyond the measured points, over half their range of frequency: noise moves the ends."""
 
@@ -48,65 +56,94 @@ class LevelFit:
     coefficients: Complex
     """[degree + 1], lowest power first."""
     covariance: Float
-    """Covariance of their real parts, and alike of their imaginary parts [degree + 1, degree + 1]."""
+    """Covariance of their real and of their imaginary parts [2, degree + 1, degree + 1], over the scatter of each.
+
+    They differ: a wrong amplitude moves the resonance, and with it the real part."""
     residual: float
     """RMS of what the fit leaves, relative."""
 
+    @cached_property
+    def _lags(self) -> tuple[Float, Float]:
+        """Grid of x, and the lags there, rising."""
+        x = np.linspace(-1.0 - _MARGIN, 1.0 + _MARGIN, _GRID)
+        lags = np.unwrap(np.angle(np.polynomial.polynomial.polyval(x, self.coefficients)))
+        return x, np.maximum.accumulate(lags)
+
     def at_lag(self, lag_rad: float) -> tuple[float, float, Float]:
         """W, ``ln |S|`` and their covariance [2, 2] where the displacement lags by ``lag_rad``; NaN out of the points."""
-        turned = self.coefficients * np.exp(-1j * lag_rad)
-        roots = np.polynomial.polynomial.polyroots(np.trim_zeros(turned.imag, "b"))
-        x = np.real(roots[np.abs(roots.imag) < 1e-9 * (1.0 + np.abs(roots.real))])
-        x = x[np.abs(x) <= 1.0 + _MARGIN]
-        x = x[np.polynomial.polynomial.polyval(x, turned.real) > 0.0]
-        if not x.size:
+        x, lags = self._lags
+        if not lags[0] <= lag_rad <= lags[-1]:
             return np.nan, np.nan, np.full((2, 2), np.nan)
-        at = float(x[np.argmin(np.abs(x))])
-        value = float(np.polynomial.polynomial.polyval(at, turned.real))
-        slope = complex(np.polynomial.polynomial.polyval(at, np.polynomial.polynomial.polyder(turned)))
-        powers = at ** np.arange(turned.size)
-        variance = float(powers @ self.covariance @ powers)
+        at, powers = float(np.interp(lag_rad, lags, x)), np.arange(self.coefficients.size)
+        turned = self.coefficients * np.exp(-1j * lag_rad)
+        for _ in range(_NEWTON):
+            slope = complex(turned[1:] @ (powers[1:] * at ** powers[:-1]))
+            at -= float(np.imag(turned @ at**powers)) / slope.imag
+        value, at_powers = float(np.real(turned @ at**powers)), at**powers
+        turn = np.array([[np.cos(lag_rad), np.sin(lag_rad)], [-np.sin(lag_rad), np.cos(lag_rad)]])
+        scatter = turn @ np.diag(at_powers @ self.covariance @ at_powers) @ turn.T
         # Im(dS + S' dx) = 0 in the turned plane; ln|S| changes by the real part over |S|.
-        by_imaginary = np.array([-self.half_range / slope.imag, -slope.real / slope.imag / value])
-        by_real = np.array([0.0, 1.0 / value])
-        covariance = variance * (np.outer(by_imaginary, by_imaginary) + np.outer(by_real, by_real))
-        return self.centre + at * self.half_range, float(np.log(value)), covariance
+        change = np.array([[0.0, -self.half_range / slope.imag], [1.0 / value, -slope.real / slope.imag / value]])
+        return self.centre + at * self.half_range, float(np.log(value)), change @ scatter @ change.T
 
 
-def fit_level(points: LevelPoints, name: str) -> LevelFit:
-    """Polynomial of one level; raises `IdentificationError` with too few points, at one frequency, without resonance."""
-    omega, stiffness = points.omega, points.stiffness
+def check_level(points: LevelPoints, name: str) -> None:
+    """Raise `IdentificationError` with too few points, at one frequency, on one side of resonance."""
+    omega = points.omega
     if omega.size < _LEAST_POINTS:
         raise IdentificationError(f"{name}: {omega.size} points, needs at least {_LEAST_POINTS}")
-    centre, half_range = 0.5 * (omega.max() + omega.min()), 0.5 * float(np.ptp(omega))
-    if not half_range > 1e-9 * centre:
-        raise IdentificationError(f"{name}: all points at {centre / (2.0 * np.pi):g} Hz, needs several frequencies")
-    weight = 1.0 / np.abs(stiffness)
-    powers = np.vander((omega - centre) / half_range, HIGHEST_DEGREE + 1, increasing=True) * weight[:, None]
-    fits = [_fitted(powers[:, : degree + 1], stiffness * weight) for degree in _degrees(omega.size)]
-    _, coefficients, covariance, residual = min(fits, key=lambda fit: fit[0])
-    lags = np.angle(stiffness)
-    if not np.any(lags >= 0.5 * np.pi) or not np.any((lags > 0.0) & (lags <= 0.5 * np.pi)):
+    if not np.ptp(omega) > 1e-9 * omega.max():
+        raise IdentificationError(f"{name}: all points at {omega[0] / (2.0 * np.pi):g} Hz, needs several frequencies")
+    lags = np.degrees(np.angle(points.stiffness))
+    if not np.any(lags >= 90.0) or not np.any((lags > 0.0) & (lags <= 90.0)):
         raise IdentificationError(
-            f"{name}: lags {np.degrees(lags.min()):.0f} to {np.degrees(lags.max()):.0f} deg of the displacement behind the "
-            f"force do not enclose 90; measure on both sides of resonance, or check the polarity"
+            f"{name}: lags {lags.min():.0f} to {lags.max():.0f} deg of the displacement behind the force do not enclose "
+            f"90; measure on both sides of resonance, or check the polarity"
         )
+
+
+def best_degree(levels: Sequence[LevelPoints]) -> int:
+    """The degree with the smallest leave-one-out error over all levels; their points allow for at least one."""
+    highest = min(HIGHEST_DEGREE, min(one.omega.size for one in levels) - _SPARE_POINTS)
+    errors = [sum(_scaled(one, degree).left_out ** 2 for one in levels) for degree in range(1, highest + 1)]
+    return 1 + int(np.argmin(errors))
+
+
+def fit_level(points: LevelPoints, degree: int) -> LevelFit:
+    """Polynomial of one level."""
+    fit = _scaled(points, degree)
     amplitude = float(np.median(points.amplitude_m))
-    return LevelFit(amplitude, float(centre), half_range, coefficients, covariance, residual)
+    return LevelFit(amplitude, *_centre(points.omega), fit.coefficients, fit.covariance, fit.residual)
 
 
-def _degrees(n: int) -> Sequence[int]:
-    return range(1, min(HIGHEST_DEGREE, n - 3) + 1)
+class _Fit(NamedTuple):
+    """Leave-one-out error, coefficients, covariance and residual, relative."""
+
+    left_out: float
+    coefficients: Complex
+    covariance: Float
+    residual: float
 
 
-def _fitted(design: Float, unit: Complex) -> tuple[float, Complex, Float, float]:
-    """Leave-one-out error, coefficients, covariance and residual of one degree."""
+def _centre(omega: Float) -> tuple[float, float]:
+    return 0.5 * float(omega.max() + omega.min()), 0.5 * float(np.ptp(omega))
+
+
+def _scaled(points: LevelPoints, degree: int) -> _Fit:
+    centre, half_range = _centre(points.omega)
+    weight = 1.0 / np.abs(points.stiffness)
+    powers = np.vander((points.omega - centre) / half_range, degree + 1, increasing=True)
+    return _fitted(powers * weight[:, None], points.stiffness * weight)
+
+
+def _fitted(design: Float, unit: Complex) -> _Fit:
+    n, m = design.shape
     orthogonal, triangle = np.linalg.qr(design)
-    coefficients = np.linalg.solve(triangle.astype(np.complex128), orthogonal.T @ unit)
+    inverse = np.linalg.inv(triangle)
+    coefficients = np.asarray(inverse @ (orthogonal.T @ unit), dtype=np.complex128)
     left = unit - design @ coefficients
     leverage = np.sum(orthogonal**2, axis=1)
     left_out = float(np.linalg.norm(left / np.maximum(1.0 - leverage, 1e-12)))
-    n, m = design.shape
-    variance = float(np.sum(np.abs(left) ** 2)) / (2.0 * (n - m))
-    inverse = np.linalg.inv(triangle)
-    return left_out, coefficients, variance * (inverse @ inverse.T), float(np.linalg.norm(left) / np.sqrt(n))
+    scatter = np.array([np.sum(left.real**2), np.sum(left.imag**2)]) / (n - m)
+    covariance = np.asarray(np.multiply.outer(scatter, inverse @ inverse.T), dtype=np.float64)
+    return _Fit(left_out, coefficients, covariance, float(np.linalg.norm(left) / np.sqrt(n)))

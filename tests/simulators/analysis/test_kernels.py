@@ -32,7 +32,7 @@ def test_series_go_back_and_forth() -> None:
     np.testing.assert_allclose(series.to_complex(samples @ series.projection.T), harmonics, atol=1e-12)
 
 
-@pytest.mark.parametrize("held", ["force", "voltage"])
+@pytest.mark.parametrize("held", ["force", "force-rms", "response", "voltage"])
 @pytest.mark.parametrize("at", ["lag", "frequency"])
 def test_jacobian_agrees_with_finite_differences(held: str, at: str) -> None:
     balance = Balance(every_site(), 4, 128)
