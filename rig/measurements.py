@@ -76,10 +76,10 @@ def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
 
 
 def force_surface(recording: Recording) -> ForceSurface:
-    """The force over frequency and displacement, from the held displacements of a response-controlled or stepped-sine recording.
+    """The force over frequency and displacement, from the levels of a response-controlled or stepped-sine recording.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` for other levels and for
-    fewer than three.
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` for levels other
+    than held displacements, and for fewer than three.
     """
     return surface_of(frequency_responses(recording))
 

@@ -104,9 +104,8 @@ def frequency_responses_of(
             )
     if not passes:
         raise IdentificationError("points: none of the recording was accepted")
-    names = [_label(*one[:3], unit=one[3], others=list(passes)) for one in passes]
     out = []
-    for (level, _, _, unit), label, accepted in zip(passes, names, passes.values(), strict=True):
+    for (level, direction, repeat, unit), accepted in passes.items():
         frequency_hz = np.array([point["frequency_hz"] for point in accepted])
         fundamentals = np.array([as_complex(point["harmonics"])[:, 1] for point in accepted])
         to_displacement = -1.0 / (2.0 * np.pi * frequency_hz) ** 2
@@ -114,20 +113,21 @@ def frequency_responses_of(
             FrequencyResponse(
                 frequency_hz=frequency_hz,
                 force=fundamentals[:, force],
-                response=fundamentals[:, drive] * (to_displacement if unit == "m" else 1.0),
+                response=np.asarray(
+                    fundamentals[:, drive] * to_displacement if unit == "m" else fundamentals[:, drive]
+                ),
                 kind="displacement" if unit == "m" else "acceleration",
                 controlled=CONTROLLED[unit],
                 level=level,
-                label=label,
+                label=_label(level, unit, direction, repeat, [one for one in passes if one[0] == level]),
                 specimen=specimen,
             )
         )
     return tuple(out)
 
 
-def _label(level: float, direction: str, repeat: int, unit: str, others: Sequence[tuple[Any, ...]]) -> str:
-    """The level, and of its direction and repeat what tells it from others."""
+def _label(level: float, unit: str, direction: str, repeat: int, alike: Sequence[tuple[Any, ...]]) -> str:
+    """The level, and of direction and repeat what tells it from the others of its level."""
     size = f"{1e3 * level:.4g} mm" if unit == "m" else f"{level:g} {unit}"
-    same = [other for other in others if other[0] == level]
-    size += f" {direction}" if len({other[1] for other in same}) > 1 else ""
-    return size + (f" {repeat}" if len({other[2] for other in same}) > 1 else "")
+    size += f" {direction}" if len({other[1] for other in alike}) > 1 else ""
+    return size + (f" {repeat}" if len({other[2] for other in alike}) > 1 else "")

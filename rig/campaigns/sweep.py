@@ -18,11 +18,11 @@ LONGEST_S = 86400.0
 
 
 class SweepPlan(TonePlan):
-    """Sweeps, one per level. With levels in volts the force is whatever shaker and structure make of the voltage; in newtons
-    or metres a loop holds the level as well as it can.
+    """Sweeps, one per level, of constant voltage or held force or displacement.
 
-    From rest the level is reached at the first frequency by a half-cosine ramp and held for ``hold_periods``; then the
-    frequency moves, linearly or logarithmically in time. Every row is recorded.
+    With levels in volts the force is whatever shaker and structure make of the voltage; in newtons or metres a loop holds
+    the level as well as it can. From rest the level is reached at the first frequency by a half-cosine ramp and held for
+    ``hold_periods``; then the frequency moves, linearly or logarithmically in time. Every row is recorded.
     """
 
     kind: Literal["sweep"] = "sweep"

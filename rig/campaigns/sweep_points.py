@@ -76,7 +76,7 @@ def _held(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, trans
 def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transient) -> np.ndarray:
     """float[n]: what was held, over the transient's instants: the force, its RMS over two periods, or the displacement."""
     if plan.amplitude_law is AmplitudeLaw.FORCE:
-        return np.abs(transient.force)
+        return np.asarray(np.abs(transient.force))
     roles = [channel.role for channel in bench.channels]
     if plan.amplitude_law is AmplitudeLaw.RESPONSE:
         acceleration = np.abs(transient.fundamentals[roles.index("drive")])
@@ -88,7 +88,7 @@ def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transien
     ends = np.clip(np.add.outer((-1.0, 1.0), instants), turns[0], turns[-1])
     samples = np.interp(ends, turns, np.arange(turns.size))
     mean, square = (np.diff(np.interp(ends, turns, one), axis=0)[0] / np.diff(samples, axis=0)[0] for one in sums)
-    return np.sqrt(np.maximum(square - mean**2, 0.0))
+    return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0)))
 
 
 def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
