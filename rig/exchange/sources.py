@@ -56,6 +56,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
 _RESULTS: dict[str, Callable[[Recording], list[Any]]] = {
     "backbone": lambda recording: [backbone(recording)],
     "stepped-sine": lambda recording: [frequency_responses(recording)],
+    "response-controlled": lambda recording: [frequency_responses(recording)],
     "multisine": lambda recording: list(response_matrices(recording).values()),
     "sweep": lambda recording: list(sweeps(recording).values()),
 }

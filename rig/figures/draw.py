@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
+from identification import ForceSurface, IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
+from rig.figures.force_surface import draw_force_surface
 from rig.figures.nonlinear_mode import draw_properties
 from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
 from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
-from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
+from rig.measurements import backbone, force_surface, frequency_responses, point_rows, spectra, sweeps
 from rig.models.files import KINDS, load
 from rig.recording.arrays import kind_of
 from rig.recording.parts import Part
@@ -94,6 +95,20 @@ def _draw_stepped_sine(page: "Figure", recording: Recording) -> None:
     draw_stepped_sine(page, responses, title=f"{_specimen(recording)}: stepped sine, {len(responses)} levels")
 
 
+def _draw_response_controlled(page: "Figure", recording: Recording) -> None:
+    """Every level, and the surface through them where there are enough."""
+    page.set_size_inches(11.0, 7.0)
+    responses = frequency_responses(recording)
+    try:
+        surface: ForceSurface | None = force_surface(recording)
+    except IdentificationError:
+        surface = None
+    points = recording.latest.values()
+    left_out = sum(not point["accepted"] for point in points)
+    text = f"{_specimen(recording)}: response-controlled test, {len(points)} points"
+    draw_force_surface(page, responses, surface, text=text + (f", {left_out} not accepted" if left_out else ""))
+
+
 def _draw_multisine(page: "Figure", recording: Recording) -> None:
     """The highest level of a recording."""
     level, at_level = max(spectra(recording).items())
@@ -105,6 +120,7 @@ def _draw_multisine(page: "Figure", recording: Recording) -> None:
 _DRAW = {
     "backbone": _draw_backbone,
     "sweep": _draw_sweep,
+    "response-controlled": _draw_response_controlled,
     "stepped-sine": _draw_stepped_sine,
     "multisine": _draw_multisine,
 }

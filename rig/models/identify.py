@@ -8,6 +8,7 @@ from typing import Any, cast
 from identification import (
     Backbone,
     Exciter,
+    FrequencyResponse,
     FrequencyResponseMatrix,
     LinearModes,
     ModalAnalysis,
@@ -24,8 +25,9 @@ from identification import (
 )
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import Estimator, backbone, bench_of_recording, spectra
+from rig.measurements import STEPPED, Estimator, backbone, bench_of_recording, frequency_responses, spectra
 from rig.models.files import KINDS, load, load_as
+from rig.models.force_surface import MeasuredSurface
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.identify_request import Request
 from rig.models.linear_modes import LINEAR_MODES
@@ -54,19 +56,49 @@ def modes_in(path: Path) -> LinearModes:
 
 
 def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
-    """From one or several backbones, or from imported stepped sines."""
+    """From one or several backbones, or from stepped sines: imported, or response-controlled."""
     kinds = {kind_of(path): path for path in paths}
     modes = None if request.modes is None else modes_in(request.modes)
-    if set(kinds) == {FREQUENCY_RESPONSES.name}:
+    if set(kinds) <= {FREQUENCY_RESPONSES.name, *STEPPED}:
         if modes is not None:
             raise ConfigurationError("--modes: stepped sines of one sensor have no use for mode shapes; leave it out")
-        return stepped_sine_mode([response for path in paths for response in load(path)])
+        stepped, missing = _stepped(paths)
+        found = stepped_sine_mode(stepped)
+        return replace(found, notes=(*missing, *found.notes))
     identified = []
     for path in paths:
         measured, notes = _backbone(path)
         found = nonlinear_mode(measured, modes=modes)
         identified.append(replace(found, notes=(*notes, *found.notes)))
     return identified[0] if len(identified) == 1 else combined(identified)
+
+
+def _stepped(paths: Sequence[Path]) -> tuple[list[FrequencyResponse], tuple[str, ...]]:
+    """Stepped sines, recorded or imported, and what of the recordings' plans is not in them."""
+    measured: list[FrequencyResponse] = []
+    notes: tuple[str, ...] = ()
+    for path in paths:
+        kind = kind_of(path)
+        if kind == FREQUENCY_RESPONSES.name:
+            measured += load(path)
+        elif kind in STEPPED:
+            with Recording(path) as recording:
+                measured += frequency_responses(recording)
+                notes += points_left_out(recording)
+        else:
+            raise RecordingError(
+                f"{path}: holds a {kind}; a force surface comes from response-controlled or stepped sines"
+            )
+    return measured, notes
+
+
+def _force_surface(paths: Sequence[Path], request: Request) -> MeasuredSurface:
+    """From levels of held displacement, those of all files together."""
+    measured, missing = _stepped(paths)
+    one_specimen(**{response.label: response.specimen for response in measured})
+    found = MeasuredSurface(tuple(measured), missing)
+    found.surface  # noqa: B018  refused here, not when the file is read
+    return found
 
 
 def _backbone(path: Path) -> tuple[Backbone, tuple[str, ...]]:
@@ -158,5 +190,6 @@ def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
 _MODELS: dict[str, Callable[[Sequence[Path], Request], Any]] = {
     "nonlinear-mode": _nonlinear_mode,
     "linear": _linear,
+    "force-surface": _force_surface,
     "exciter": _exciter,
 }
