@@ -1,7 +1,7 @@
 """Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -86,8 +86,15 @@ def _draw_sweep(page: "Figure", recording: Recording) -> None:
         np.vstack([rows["inputs"].T, rows["output_v"]]),
         float(recording.configuration["bench"]["sample_rate_hz"]),
         drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"].get("off_resonance_hz")),
-        title=f"{_specimen(recording)}: sweep at {point['level']:g} V, uncontrolled",
+        title=f"{_specimen(recording)}: sweep at {point['level']:g} {point['level_unit']}, {_held(point)}",
     )
+
+
+def _held(point: dict[str, Any]) -> str:
+    """What was controlled in a sweep, and how well."""
+    if "held_least" not in point:
+        return "uncontrolled"
+    return f"held within {100.0 * point['held_least']:.1f} to {100.0 * point['held_most']:.1f} %"
 
 
 def _draw_stepped_sine(page: "Figure", recording: Recording) -> None:

@@ -1,20 +1,18 @@
 """Frequency responses at constant force cut from a force surface, as predictions."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from identification import (
     ConstantForceCurve,
     FrequencyResponse,
-    PredictionError,
     Predictions,
     ResponseBand,
     SteadyPrediction,
     compare,
 )
-from identification.prediction.comparison import Over
 from rig.errors import ConfigurationError, RecordingError
 from rig.models.force_surface import MeasuredSurface
 
@@ -29,7 +27,9 @@ _INTERVAL = 1.96
 def surface_predictions(
     measured: MeasuredSurface, request: "PredictionRequest", references: Sequence[FrequencyResponse]
 ) -> Predictions:
-    """Curves at the forces asked for, and at those of ``references``, with their errors.
+    """Curves at the forces asked for, and at those of ``references``, with their errors over the phase.
+
+    Over the frequency they would not do: where the lowest level ends a curve, points of the branch beyond have no counterpart.
 
     Raises `ConfigurationError` for what a force surface cannot answer, `RecordingError` for references that did not hold
     the force's fundamental, `identification.IdentificationError` for forces beyond the measured levels.
@@ -48,7 +48,7 @@ def surface_predictions(
         curve = measured.surface.constant_force(force_n)
         steady.append(_as_prediction(curve, measured))
         bands.append(_band(curve))
-        errors.append(_error(steady[-1], reference, request))
+        errors.append(None if reference is None else compare(steady[-1], reference, over="phase").error)
     others = {one.specimen for one in references} - {"", measured.surface.specimen}
     strangers = [f"the model is of {measured.surface.specimen}, a reference of {other}" for other in sorted(others)]
     return Predictions(
@@ -76,12 +76,6 @@ def _check(request: "PredictionRequest") -> None:
             f"{name}: means nothing to a force surface, which answers --frequency-response and --reference, at constant "
             "fundamental force between its measured levels"
         )
-
-
-def _error(
-    curve: SteadyPrediction, reference: FrequencyResponse | None, request: "PredictionRequest"
-) -> PredictionError | None:
-    return None if reference is None else compare(curve, reference, over=cast(Over, request.over)).error
 
 
 def _as_prediction(curve: ConstantForceCurve, measured: MeasuredSurface) -> SteadyPrediction:
