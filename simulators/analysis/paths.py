@@ -53,4 +53,6 @@ def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -
 def _far(now: Conditions, goal: Conditions) -> bool:
     """Whether a step is to be halved before it is tried."""
     ratio = abs(math.log(goal.level / now.level))
-    return ratio > math.log(_LARGEST_LEVEL_RATIO) or (goal.at == "lag" and abs(goal.value - now.value) > _LARGEST_LAG_STEP)
+    return ratio > math.log(_LARGEST_LEVEL_RATIO) or (
+        goal.at == "lag" and abs(goal.value - now.value) > _LARGEST_LAG_STEP
+    )
