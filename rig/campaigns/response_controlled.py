@@ -15,7 +15,6 @@ from rig.sequencer.segments import Segment, SettleRule
 
 __all__ = ["ResponseControlledPlan"]
 
-LAGS_DEG = tuple(float(lag) for lag in range(-150, -29, 10))
 LEAST_SINE_LAG_DEG = 5.0
 
 
@@ -30,7 +29,7 @@ class ResponseControlledPlan(Levels, Plan):
     """Kind of campaign."""
     controller: PhaseLockedLoop
     """The phase-locked loop, and the loop that holds the displacement."""
-    phase_lags_deg: tuple[float, ...] = LAGS_DEG
+    phase_lags_deg: tuple[float, ...]
     """Lags of the drive-point acceleration behind the force, deg; -90 is phase resonance."""
     direction: Literal["up", "down", "up-down"] = "up"
     """Order of the lags at each level; up: rising frequency."""

@@ -15,6 +15,7 @@ from rig.bench import Bench, DriverChoice, Limits, SpecimenFacts
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.response_controlled import ResponseControlledPlan
 from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.sweep import SweepPlan
 from rig.daq import Channel
@@ -28,7 +29,8 @@ from tests.docs.tables import PAGE, PARTS, table_of, table_under
 
 MODELS = {
     "Keys of a stepped-sine plan": SteppedSinePlan,
-    "Keys of `[demodulation]`": OpenLoop,
+    "Keys of `[controller]` in open loop": OpenLoop,
+    "Keys of a response-controlled plan": ResponseControlledPlan,
     "Keys of a sweep plan": SweepPlan,
     "Keys of a multisine plan": MultisinePlan,
     "Keys of a backbone plan": BackbonePlan,
