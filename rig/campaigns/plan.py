@@ -38,7 +38,7 @@ class Target(Configured):
 class Column(NamedTuple):
     """A quantity of a point as it is shown: key in the point, heading, unit, format, and what it is multiplied with.
 
-    ``plain``: in a line of its own unit's company it needs no name.
+    ``plain``: in a line of its own unit's company it needs no name. ``optional``: shown only where there is a value.
     """
 
     key: str
@@ -47,6 +47,7 @@ class Column(NamedTuple):
     pattern: str
     scale: float = 1.0
     plain: bool = False
+    optional: bool = False
 
 
 class Plan(Configured):

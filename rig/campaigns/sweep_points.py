@@ -22,10 +22,10 @@ SWEEP_COLUMNS = (
     Column("minimum_ratio", "smallest", "%", ".2f", 100.0),
     Column("minimum_frequency_hz", "at", "Hz", ".3f"),
     Column("overshoot_ratio", "then up to", "%", ".1f", 100.0),
+    Column("held_least", "held from", "%", ".1f", 100.0, optional=True),
+    Column("held_most", "to", "%", ".1f", 100.0, optional=True),
     Column("peak_m", "peak", "mm", ".4f", 1e3),
     Column("peak_frequency_hz", "at", "Hz", ".3f"),
-    Column("held_least", "held from", "%", ".1f", 100.0),
-    Column("held_most", "to", "%", ".1f", 100.0),
 )
 
 

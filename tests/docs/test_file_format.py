@@ -17,6 +17,8 @@ from tests.docs.pages import ROOT
 SMALL = {"bench": "magnet-beam", "levels_v": [0.4]}
 PLANS = {
     "backbone": load_plan("magnet-beam/backbone").model_dump(mode="json") | {"levels_v": [0.8], "record_periods": 8},
+    "response-controlled": load_plan("magnet-beam/response-controlled").model_dump(mode="json")
+    | {"levels_m": [5e-4], "phase_lags_deg": [-90.0]},
     "stepped-sine": SMALL | {"kind": "stepped-sine", "frequencies_hz": [23.0]},
     "sweep": SMALL | {"kind": "sweep", "start_hz": 22.0, "stop_hz": 26.0, "rate_hz_per_s": 4.0},
     "multisine": {

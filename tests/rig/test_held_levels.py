@@ -68,6 +68,17 @@ def test_points_that_missed_their_level_are_not_accepted_and_say_by_how_much():
             run.force_surface()
 
 
+def test_levels_are_added_to_a_recording_and_make_a_surface_with_those_before(tmp_path):
+    few = load_plan("magnet-beam/response-controlled").model_copy(
+        update={"levels_m": LEVELS_M[:2], "phase_lags_deg": (-130.0, -100.0, -80.0, -50.0), "record_periods": 5}
+    )
+    rig.run(few, output=tmp_path / "held.h5").close()
+    with rig.resume(tmp_path / "held.h5", plan=few.model_copy(update={"levels_m": LEVELS_M[:3]})) as run:
+        assert run.complete
+        assert [len(part.points) for part in run.recording.parts] == [8, 4]
+        np.testing.assert_allclose(run.force_surface().amplitude_m, LEVELS_M[:3], rtol=0.002)
+
+
 def test_a_stepped_sine_at_constant_force_falls_off_the_curve_at_its_turning_point(truth):
     plan = plan_from(
         TONE | {"kind": "stepped-sine", "levels_n": [FORCE_N], "frequencies_hz": [24.45, 24.53, 24.63]}, "up"
