@@ -3,14 +3,21 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from identification import Backbone, FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra, Transient
+from identification import (
+    Backbone,
+    ForceSurface,
+    FrequencyResponse,
+    FrequencyResponseMatrix,
+    PeriodicSpectra,
+    Transient,
+)
 from rig.bench import Bench, load_bench
 from rig.campaigns.execution import Progress
 from rig.campaigns.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.runner import carry_out, take_up
 from rig.errors import ConfigurationError
-from rig.measurements import Estimator, backbone, frequency_responses, response_matrices, spectra, sweeps
+from rig.measurements import Estimator, backbone, force_surface, frequency_responses, response_matrices, spectra, sweeps
 from rig.recording.reader import Recording
 
 __all__ = ["Run", "resume", "run"]
@@ -33,8 +40,12 @@ class Run:
         return backbone(self.recording)
 
     def frequency_responses(self) -> tuple[FrequencyResponse, ...]:
-        """The accepted points of a stepped-sine or stepped-phase test, one frequency response per level."""
+        """The accepted points of a stepped sine, stepped phase or response-controlled test, one response per level and pass."""
         return frequency_responses(self.recording)
+
+    def force_surface(self) -> ForceSurface:
+        """The force over frequency and displacement, from held displacements: curves at constant force are cut from it."""
+        return force_surface(self.recording)
 
     def sweeps(self) -> dict[int, Transient]:
         """Fundamentals over time of every sweep, by the number of its point."""

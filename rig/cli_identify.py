@@ -15,7 +15,9 @@ def identify(
         list[Path], typer.Argument(help="Recordings, or imported measurements. Several are taken together.")
     ],
     output: Output,
-    model: Annotated[str, typer.Option(help="Kind of model: nonlinear-mode, linear or exciter.")] = "nonlinear-mode",
+    model: Annotated[
+        str, typer.Option(help="Kind of model: nonlinear-mode, linear, force-surface or exciter.")
+    ] = "nonlinear-mode",
     modes: Annotated[Path | None, typer.Option(help="Linear model whose mode shapes the nonlinear mode uses.")] = None,
     estimator: Annotated[str, typer.Option(help="Of a linear model's responses: instrument, H1 or H2.")] = "instrument",
     band: Annotated[
@@ -56,7 +58,7 @@ def identify(
 
 
 def predict(
-    model: Annotated[Path, typer.Argument(help="Nonlinear-mode model.")],
+    model: Annotated[Path, typer.Argument(help="Nonlinear mode or force surface.")],
     output: Output,
     frequency_response: Annotated[
         list[float] | None,

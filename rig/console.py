@@ -63,7 +63,8 @@ class RunProgress:
         self._finished = number_done
         head = f"point {number_done:>3}/{total}  {point['level']:>7.4g} {point['level_unit']}"
         if any(column.key in point for column in self._columns[-1:]):  # the last is a result, whatever comes first
-            shown = "  ".join(_in_a_line(column, point) for column in self._columns if column.in_line)
+            columns = [c for c in self._columns if c.in_line and not (c.optional and point.get(c.key) is None)]
+            shown = "  ".join(_in_a_line(column, point) for column in columns)
             line = f"{head}  {shown}"
             if "settle_periods" in point:
                 line += f"  settled in {number(point['settle_periods'], '.0f'):>4} periods"

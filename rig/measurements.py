@@ -8,6 +8,7 @@ import numpy as np
 from identification import (
     Backbone,
     ContinuousBackbone,
+    ForceSurface,
     FrequencyResponse,
     FrequencyResponseMatrix,
     IdentificationError,
@@ -15,6 +16,7 @@ from identification import (
     Transient,
     best_linear_approximation,
 )
+from identification import force_surface as surface_of
 from identification.multisine.best_linear_approximation import Estimator
 from rig.bench import Bench
 from rig.campaigns.backbone import BackbonePlan
@@ -22,8 +24,6 @@ from rig.campaigns.backbone_points import backbone_of
 from rig.campaigns.continuous_backbone_points import continuous_backbones_of
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.multisine_points import spectra_of
-from rig.campaigns.stepped_phase import SteppedPhasePlan
-from rig.campaigns.stepped_phase_points import constant_level_responses
 from rig.campaigns.stepped_sine_points import frequency_responses_of
 from rig.campaigns.sweep_points import transient_of
 from rig.configuration import validated
@@ -31,10 +31,12 @@ from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
 __all__ = [
+    "STEPPED",
     "Estimator",
     "backbone",
     "bench_of_recording",
     "continuous_backbones",
+    "force_surface",
     "frequency_responses",
     "load_backbone",
     "point_rows",
@@ -42,6 +44,9 @@ __all__ = [
     "spectra",
     "sweeps",
 ]
+
+STEPPED = ("stepped-sine", "stepped-phase", "response-controlled")
+"""Kinds of recordings that hold frequency responses, one per level."""
 
 
 def backbone(recording: Recording) -> Backbone:
@@ -82,23 +87,24 @@ def continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]
 
 
 def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a stepped-sine or stepped-phase recording: fundamentals of force and drive, a response per level.
+    """The accepted points of a stepped-sine, stepped-phase or response-controlled recording: fundamentals of force and drive.
 
-    In the order of measurement, which for stepped phase is that along the branch; one response per pass where there are
-    several. Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    One response per level and pass, in the order of measurement, which for stepped phase is that along the branch. Raises
+    `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
-    if recording.kind == "stepped-phase":
-        plan = validated(SteppedPhasePlan, recording.configuration["plan"], "plan of the recording")
-        return constant_level_responses(
-            recording.latest.values(),
-            recording.channels,
-            bench_of_recording(recording).specimen.name,
-            plan.amplitude_law,
-        )
-    _expect(recording, "stepped-sine")
+    _expect(recording, *STEPPED)
     return frequency_responses_of(
         recording.latest.values(), recording.channels, bench_of_recording(recording).specimen.name
     )
+
+
+def force_surface(recording: Recording) -> ForceSurface:
+    """The force over frequency and displacement, from the levels of a response-controlled or stepped-sine recording.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` for levels other
+    than held displacements, and for fewer than three.
+    """
+    return surface_of(frequency_responses(recording))
 
 
 def sweeps(recording: Recording) -> dict[int, Transient]:
@@ -164,9 +170,9 @@ def load_backbone(path: Path) -> Backbone:
         return backbone(recording)
 
 
-def _expect(recording: Recording, kind: str) -> None:
-    if recording.kind != kind:
-        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {kind}")
+def _expect(recording: Recording, *kinds: str) -> None:
+    if recording.kind not in kinds:
+        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {' or a '.join(kinds)}")
 
 
 def bench_of_recording(recording: Recording) -> Bench:

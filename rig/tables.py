@@ -57,7 +57,11 @@ def print_summary(summary: dict[str, Any]) -> None:
 
 
 def _print_points(kind: str, points: Sequence[dict[str, Any]]) -> None:
-    columns = CAMPAIGNS[kind].columns
+    columns = [
+        column
+        for column in CAMPAIGNS[kind].columns
+        if not column.optional or any(point[column.key] is not None for point in points)
+    ]
     print_table(
         ("level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality"),
         [

@@ -24,6 +24,7 @@ VIBRATION: dict[str, tuple[str, ...]] = {
     "backbone": ("controller.phase_lag_deg",),
     "stepped-phase": (),
     "continuous-backbone": ("controller.phase_lag_deg",),
+    "response-controlled": (),
     "stepped-sine": (),
     "sweep": ("start_hz", "stop_hz", "rate_hz_per_s", "rate_octaves_per_min"),
     "multisine": ("lowest_hz", "highest_hz", "resolution_hz", "grid", "detection_group", "phase_seed"),

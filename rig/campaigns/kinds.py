@@ -11,6 +11,8 @@ from rig.campaigns.continuous_backbone_points import CONTINUOUS_BACKBONE_COLUMNS
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.multisine_points import MULTISINE_COLUMNS, measure_multisine_point
 from rig.campaigns.plan import Column, Plan
+from rig.campaigns.response_controlled import ResponseControlledPlan
+from rig.campaigns.response_controlled_points import RESPONSE_CONTROLLED_COLUMNS, measure_response_controlled_point
 from rig.campaigns.stepped_phase import SteppedPhasePlan
 from rig.campaigns.stepped_phase_points import STEPPED_PHASE_COLUMNS, measure_stepped_phase_point
 from rig.campaigns.stepped_sine import SteppedSinePlan
@@ -40,6 +42,9 @@ KINDS = {
     "stepped-phase": Campaign(SteppedPhasePlan, measure_stepped_phase_point, STEPPED_PHASE_COLUMNS),
     "continuous-backbone": Campaign(
         ContinuousBackbonePlan, measure_continuous_backbone, CONTINUOUS_BACKBONE_COLUMNS, in_one_go=True
+    ),
+    "response-controlled": Campaign(
+        ResponseControlledPlan, measure_response_controlled_point, RESPONSE_CONTROLLED_COLUMNS
     ),
     "stepped-sine": Campaign(SteppedSinePlan, measure_stepped_sine_point, STEPPED_SINE_COLUMNS),
     "sweep": Campaign(SweepPlan, measure_sweep, SWEEP_COLUMNS),

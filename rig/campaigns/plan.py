@@ -39,7 +39,7 @@ class Column(NamedTuple):
     """A quantity of a point as it is shown: key in the point, heading, unit, format, and what it is multiplied with.
 
     ``plain``: in a line of its own unit's company it needs no name. ``in_line``: whether it is shown while the test runs, too,
-    and not in tables alone.
+    and not in tables alone. ``optional``: shown only where there is a value.
     """
 
     key: str
@@ -49,6 +49,7 @@ class Column(NamedTuple):
     scale: float = 1.0
     plain: bool = False
     in_line: bool = True
+    optional: bool = False
 
 
 class Plan(Configured):

@@ -1,18 +1,16 @@
 """From the recorded rows of a stepped-phase point to its result, and from the results to frequency responses in memory."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from controller import AmplitudeLaw
-from identification import Backbone, FrequencyResponse, IdentificationError, PeriodicVibration, nonlinear_mode
+from identification import Backbone, IdentificationError, PeriodicVibration, nonlinear_mode
 from identification.frequency_responses import Controlled
 from rig.bench import Bench
 from rig.campaigns.backbone_points import frequency_scatter
 from rig.campaigns.evaluate import (
-    as_complex,
     as_pairs,
     drift_objection,
     head,
@@ -23,7 +21,7 @@ from rig.campaigns.evaluate import (
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.stepped_phase import SteppedPhasePlan
 
-__all__ = ["STEPPED_PHASE_COLUMNS", "constant_level_responses", "measure_stepped_phase_point"]
+__all__ = ["STEPPED_PHASE_COLUMNS", "measure_stepped_phase_point"]
 
 STEPPED_PHASE_COLUMNS = (
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),
@@ -138,40 +136,3 @@ def _objection(
             f"accepted up to {100.0 * plan.accepted_frequency_scatter:g} %"
         )
     return drift_objection(bench, vibration, plan.accepted_drift)
-
-
-def constant_level_responses(
-    points: Iterable[Mapping[str, Any]], channels: Sequence[Mapping[str, Any]], specimen: str, law: AmplitudeLaw
-) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a recording in the order of measurement, one frequency response per pass through the lags.
-
-    The level of a response whose RMS force was held is the peak of the sine with that RMS. Raises `IdentificationError`
-    without any point.
-    """
-    roles = [channel["role"] for channel in channels]
-    force, drive = roles.index("force"), roles.index("drive")
-    passes: dict[tuple[float, int, str], list[Mapping[str, Any]]] = {}
-    for point in points:
-        if point["accepted"]:
-            passes.setdefault((point["level"], point["repeat"], point["direction"]), []).append(point)
-    if not passes:
-        raise IdentificationError("points: none of the recording was accepted")
-    several = len(passes) > len({level for level, _, _ in passes})
-    out = []
-    for (level, repeat, direction), accepted in passes.items():
-        fundamentals = np.array([as_complex(point["harmonics"])[:, 1] for point in accepted])
-        frequency_hz = np.array([point["frequency_hz"] for point in accepted])
-        in_metres = law is AmplitudeLaw.RESPONSE
-        out.append(
-            FrequencyResponse(
-                frequency_hz=frequency_hz,
-                force=fundamentals[:, force],
-                response=fundamentals[:, drive] / ((2j * np.pi * frequency_hz) ** 2 if in_metres else 1.0),
-                kind="displacement" if in_metres else "acceleration",
-                controlled=CONTROLLED[law],
-                level=level * (math.sqrt(2.0) if law is AmplitudeLaw.FORCE_RMS else 1.0),
-                label=f"{level:.4g} {accepted[0]['level_unit']}" + (f", {direction} {repeat}" if several else ""),
-                specimen=specimen,
-            )
-        )
-    return tuple(out)

@@ -1,10 +1,12 @@
-"""The stepped-sine campaign in open loop: voltage and frequency given, step by step, settle, record whole periods."""
+"""The stepped-sine campaign: frequencies given, step by step, at a given voltage or a held force or displacement."""
 
+from functools import partial
 from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from controller import AmplitudeLaw
 from rig.bench import Bench
 from rig.campaigns.plan import Target, TonePlan
 from rig.errors import ConfigurationError
@@ -15,11 +17,11 @@ __all__ = ["SteppedSinePlan"]
 
 
 class SteppedSinePlan(TonePlan):
-    """Vibrations at given voltages and frequencies; a single frequency makes it a sine test.
+    """Vibrations at given frequencies and levels; a single frequency makes it a sine test.
 
     Every point is approached by a half-cosine ramp of frequency and level, settled by the amplitudes of force and response in
-    ``settle``, and recorded over whole periods. Where two responses exist at one frequency, the direction decides which
-    is found; the unstable one never is.
+    ``settle``, and recorded over whole periods. Where two responses exist at one frequency and voltage or force, the
+    direction decides which is found; the unstable one never is. A held displacement has one force at every frequency.
     """
 
     kind: Literal["stepped-sine"] = "stepped-sine"
@@ -44,6 +46,9 @@ class SteppedSinePlan(TonePlan):
     """When a point counts as settled; its phase error is not asked for."""
     accepted_drift: float = Field(0.05, gt=0, le=1)
     """Largest change of the fundamental of force or drive over a record, relative, with which a point is accepted."""
+    accepted_level_error: float = Field(0.01, gt=0, le=1)
+    """Largest deviation of a recorded force or displacement from its level, relative, with which a point is accepted; of no
+    meaning with levels in volts."""
     on_failure: Literal["skip", "stop"] = "skip"
     """What follows when a point does not settle or is disturbed: the next point, or a ramp-down."""
 
@@ -88,7 +93,6 @@ class SteppedSinePlan(TonePlan):
         Points that are done are passed through on the way to the others of their level: where two responses exist, the way
         decides which is found.
         """
-        failure = OnFailure[self.on_failure.upper()]
         targets = self.targets()
         last_of_level = {target.level: target.number for target in targets if target.number not in done}
         out: list[Segment] = []
@@ -97,19 +101,29 @@ class SteppedSinePlan(TonePlan):
             if target.number > last_of_level.get(target.level, -1):
                 continue
             tone = Excitation(target.frequency_hz or 0.0)
-            number, level = -1 if target.number in done else target.number, target.level
-            if before is not None and before.level != level:
-                out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.ramp_periods, excitation=out[-1].excitation))
-                out.append(Segment(SegmentKind.RAMP, number, 0.0, 1.0, excitation=tone))
-            out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods, excitation=tone))
+            number = -1 if target.number in done else target.number
+            if before is not None and before.level != target.level:
+                rest = partial(Segment, SegmentKind.RAMP, level=0.0, amplitude_law=AmplitudeLaw.VOLTAGE)
+                out.append(rest(point=-1, periods=self.ramp_periods, excitation=out[-1].excitation))
+                out.append(rest(point=number, periods=1.0, excitation=tone))
+            if before is None or before.level != target.level:
+                out += self.start_segments(excitation=tone)
+            out += self._at(target, number, tone)
             before = target
-            if target.number in done:
-                continue
-            longest = self.settle.longest_periods
-            out.append(Segment(SegmentKind.SETTLE, number, level, longest, failure, excitation=tone))
-            periods = self.record_periods + 1.0
-            out.append(Segment(SegmentKind.RECORD, number, level, periods, failure, excitation=tone))
         return tuple(out)
+
+    def _at(self, target: Target, number: int, tone: Excitation) -> list[Segment]:
+        """The segments of a point, or the ramp through one that is done (-1)."""
+        at = partial(Segment, point=number, level=target.level, excitation=tone)
+        ramp = at(
+            kind=SegmentKind.RAMP, periods=self.ramp_periods, geometric=self.amplitude_law is AmplitudeLaw.RESPONSE
+        )
+        if number < 0:
+            return [ramp]
+        failure = OnFailure[self.on_failure.upper()]
+        settle = at(kind=SegmentKind.SETTLE, periods=self.settle.longest_periods, on_failure=failure)
+        record = at(kind=SegmentKind.RECORD, periods=self.record_periods + 1.0, on_failure=failure)
+        return [ramp, settle, record]
 
     def check(self, bench: Bench) -> None:
         """Refuse levels and frequencies beyond the bench's limits."""

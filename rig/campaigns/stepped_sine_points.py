@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from identification import FrequencyResponse, IdentificationError
+from controller import AmplitudeLaw
+from identification import FrequencyResponse, IdentificationError, PeriodicVibration
+from identification.frequency_responses import Controlled
 from rig.bench import Bench
 from rig.campaigns.evaluate import (
     as_complex,
@@ -19,7 +21,10 @@ from rig.campaigns.plan import Column, Target
 from rig.campaigns.quality import PURITY_COLUMNS, purity, quality_warnings
 from rig.campaigns.stepped_sine import SteppedSinePlan
 
-__all__ = ["STEPPED_SINE_COLUMNS", "frequency_responses_of", "measure_stepped_sine_point"]
+__all__ = ["STEPPED_SINE_COLUMNS", "frequency_responses_of", "level_objection", "measure_stepped_sine_point"]
+
+CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
+"""What was held, by the unit of the levels."""
 
 STEPPED_SINE_COLUMNS = (
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
@@ -40,7 +45,11 @@ def measure_stepped_sine_point(
         vibration = recorded_vibration(bench, rows, plan.harmonics)
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+    level_error = _level_error(plan, target, vibration)
     reason = drift_objection(bench, vibration, plan.accepted_drift)
+    if level_error is not None and abs(level_error) > plan.accepted_level_error:
+        held = "displacement" if plan.amplitude_law is AmplitudeLaw.RESPONSE else "force"
+        reason = level_objection(held, level_error, plan.accepted_level_error)
     return {
         **point,
         "settled": True,
@@ -49,6 +58,7 @@ def measure_stepped_sine_point(
         "frequency_hz": vibration.frequency_hz,
         "force_n": vibration.force_n,
         "amplitude_m": vibration.amplitude_m,
+        "level_error": level_error,
         "phase_lag_deg": vibration.phase_lag_deg,
         "voltage_v": float(np.abs(rows["command_v"]).mean()),
         **purity(vibration),
@@ -62,31 +72,64 @@ def measure_stepped_sine_point(
     }
 
 
+def _level_error(plan: SteppedSinePlan, target: Target, vibration: PeriodicVibration) -> float | None:
+    """Relative deviation of what was held from its level; None where nothing was."""
+    harmonics = np.abs(vibration.harmonics[[channel.role for channel in vibration.channels].index("force"), 1:])
+    held = {
+        AmplitudeLaw.FORCE: vibration.force_n,
+        AmplitudeLaw.FORCE_RMS: float(np.sqrt(0.5 * np.sum(harmonics**2))),
+        AmplitudeLaw.RESPONSE: vibration.amplitude_m,
+    }
+    return held[plan.amplitude_law] / target.level - 1.0 if plan.amplitude_law in held else None
+
+
+def level_objection(held: str, error: float, accepted: float) -> str:
+    """Why a point is not accepted whose force or displacement is not what was asked for."""
+    return f"the {held} is {100.0 * error:+.2f} % off its level, accepted up to {100.0 * accepted:g} %"
+
+
 def frequency_responses_of(
     points: Iterable[Mapping[str, Any]], channels: Sequence[Mapping[str, Any]], specimen: str
 ) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a recording, one frequency response per level; raises `IdentificationError` without any."""
+    """The accepted points of a recording, one frequency response per level and pass.
+
+    A held RMS of the force is ``controlled = "none"``: no fundamental is constant. Raises `IdentificationError` where no point
+    was accepted.
+    """
     roles = [channel["role"] for channel in channels]
     force, drive = roles.index("force"), roles.index("drive")
-    levels: dict[float, list[Mapping[str, Any]]] = {}
+    passes: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for point in points:
         if point["accepted"]:
-            levels.setdefault(point["level"], []).append(point)
-    if not levels:
+            passes.setdefault(tuple(point[key] for key in ("level", "direction", "repeat", "level_unit")), []).append(
+                point
+            )
+    if not passes:
         raise IdentificationError("points: none of the recording was accepted")
     out = []
-    for level, accepted in levels.items():
+    for (level, direction, repeat, unit), accepted in passes.items():
+        frequency_hz = np.array([point["frequency_hz"] for point in accepted])
         fundamentals = np.array([as_complex(point["harmonics"])[:, 1] for point in accepted])
+        to_displacement = -1.0 / (2.0 * np.pi * frequency_hz) ** 2
         out.append(
             FrequencyResponse(
-                frequency_hz=np.array([point["frequency_hz"] for point in accepted]),
+                frequency_hz=frequency_hz,
                 force=fundamentals[:, force],
-                response=fundamentals[:, drive],
-                kind="acceleration",
-                controlled="voltage",
+                response=np.asarray(
+                    fundamentals[:, drive] * to_displacement if unit == "m" else fundamentals[:, drive]
+                ),
+                kind="displacement" if unit == "m" else "acceleration",
+                controlled=CONTROLLED[unit],
                 level=level,
-                label=f"{level:g} V",
+                label=_label(level, unit, direction, repeat, [one for one in passes if one[0] == level]),
                 specimen=specimen,
             )
         )
     return tuple(out)
+
+
+def _label(level: float, unit: str, direction: str, repeat: int, alike: Sequence[tuple[Any, ...]]) -> str:
+    """The level, and of direction and repeat what tells it from the others of its level."""
+    size = f"{1e3 * level:.4g} mm" if unit == "m" else f"{level:g} {unit}"
+    size += f" {direction}" if len({other[1] for other in alike}) > 1 else ""
+    return size + (f" {repeat}" if len({other[2] for other in alike}) > 1 else "")

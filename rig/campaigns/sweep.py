@@ -1,10 +1,11 @@
-"""The sweep campaign in open loop: a tone of constant voltage whose frequency goes from one end to the other."""
+"""The sweep campaign: a tone whose frequency goes from one end to the other, of constant voltage or at a held level."""
 
 import math
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from controller import AmplitudeLaw
 from rig.bench import Bench
 from rig.campaigns.plan import Target, TonePlan
 from rig.sequencer.layout import SegmentKind
@@ -17,10 +18,11 @@ LONGEST_S = 86400.0
 
 
 class SweepPlan(TonePlan):
-    """Uncontrolled sweeps, one per level: the force is whatever shaker and structure make of the voltage.
+    """Sweeps, one per level, of constant voltage or held force or displacement.
 
-    From rest the level is reached at the first frequency by a half-cosine ramp and held for ``hold_periods``; then the
-    frequency moves, linearly or logarithmically in time. Every row is recorded.
+    With levels in volts the force is whatever shaker and structure make of the voltage; in newtons or metres a loop holds
+    the level as well as it can. From rest the level is reached at the first frequency by a half-cosine ramp and held for
+    ``hold_periods``; then the frequency moves, linearly or logarithmically in time. Every row is recorded.
     """
 
     kind: Literal["sweep"] = "sweep"
@@ -93,16 +95,18 @@ class SweepPlan(TonePlan):
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that make all sweeps but those ``done`` already; each begins from rest."""
         start, stop = Excitation(self.start_hz), Excitation(self.stop_hz)
+        volts = AmplitudeLaw.VOLTAGE
         out: list[Segment] = []
         for target in self.targets():
             if target.number in done:
                 continue
             number, level = target.number, target.level
-            out.append(Segment(SegmentKind.RAMP, number, 0.0, 1.0, excitation=start))
+            out.append(Segment(SegmentKind.RAMP, number, 0.0, 1.0, excitation=start, amplitude_law=volts))
+            out += self.start_segments(excitation=start)
             out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods, excitation=start))
             out.append(Segment(SegmentKind.HOLD, number, level, self.hold_periods, excitation=start))
             out.append(Segment(SegmentKind.SWEEP, number, level, 0.0, excitation=self._sweep))
-            out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.ramp_periods, excitation=stop))
+            out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.ramp_periods, excitation=stop, amplitude_law=volts))
         return tuple(out)
 
     def check(self, bench: Bench) -> None:

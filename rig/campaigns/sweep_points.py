@@ -5,19 +5,25 @@ from typing import Any
 
 import numpy as np
 
+from controller import AmplitudeLaw
 from identification import IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
 from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.sweep import SweepPlan
+from rig.tick.layout import SATURATED
 
 __all__ = ["SWEEP_COLUMNS", "measure_sweep", "transient_of"]
+
+NOT_HELD = 0.05  # of its level: a deviation that is said
 
 SWEEP_COLUMNS = (
     Column("off_resonance_n", "force off resonance", "N", ".4f"),
     Column("minimum_ratio", "smallest", "%", ".2f", 100.0),
     Column("minimum_frequency_hz", "at", "Hz", ".3f"),
     Column("overshoot_ratio", "then up to", "%", ".1f", 100.0),
+    Column("held_least", "held from", "%", ".1f", 100.0, optional=True),
+    Column("held_most", "to", "%", ".1f", 100.0, optional=True),
     Column("peak_m", "peak", "mm", ".4f", 1e3),
     Column("peak_frequency_hz", "at", "Hz", ".3f"),
 )
@@ -27,7 +33,8 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
     """The result of a recorded sweep: a transient vibration, that nothing was asked to settle in."""
     point = head(plan, target)
     try:
-        drop_out = force_drop_out(transient_of(bench, rows), off_resonance_hz=plan.off_resonance_hz)
+        transient = transient_of(bench, rows)
+        drop_out = force_drop_out(transient, off_resonance_hz=plan.off_resonance_hz)
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     return {
@@ -39,8 +46,49 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
         "minimum_ratio": drop_out.minimum_ratio,
         "overshoot_ratio": drop_out.overshoot_ratio,
         "duration_s": rows.size / bench.sample_rate_hz,
-        "warnings": [],
+        **_held(bench, plan, target, rows, transient),
     }
+
+
+def _held(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, transient: Transient) -> dict[str, Any]:
+    """Least and largest of what a loop held, over its level; where that was; and what stood in its way."""
+    if plan.amplitude_law is AmplitudeLaw.VOLTAGE:
+        return {"warnings": []}
+    held = _course(bench, plan, rows, transient) / target.level
+    least, most = int(np.argmin(held)), int(np.argmax(held))
+    share = float(np.mean((rows["flags"] & SATURATED) != 0))
+    warnings = [f"the output stood at its limit in {100.0 * share:.2g} % of the sweep"] if share else []
+    for name, place in (("fell to", least), ("rose to", most)):
+        if abs(held[place] - 1.0) > NOT_HELD:
+            where = f"{100.0 * held[place]:.1f} % of its level at {transient.frequency_hz[place]:.3f} Hz"
+            warnings.append(f"the {'displacement' if plan.level_unit == 'm' else 'force'} {name} {where}")
+    return {
+        "held_least": float(held[least]),
+        "held_least_frequency_hz": float(transient.frequency_hz[least]),
+        "held_most": float(held[most]),
+        "held_most_frequency_hz": float(transient.frequency_hz[most]),
+        "held_rms_error": float(np.sqrt(np.mean((held - 1.0) ** 2))),
+        "saturated_share": share,
+        "warnings": warnings,
+    }
+
+
+def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transient) -> np.ndarray:
+    """float[n]: what was held, over the transient's instants: the force, its RMS over two periods, or the displacement."""
+    if plan.amplitude_law is AmplitudeLaw.FORCE:
+        return np.asarray(np.abs(transient.force))
+    roles = [channel.role for channel in bench.channels]
+    if plan.amplitude_law is AmplitudeLaw.RESPONSE:
+        acceleration = np.abs(transient.fundamentals[roles.index("drive")])
+        return np.asarray(acceleration / (2.0 * np.pi * transient.frequency_hz) ** 2)
+    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * np.pi)
+    force = rows["inputs"][:, roles.index("force")].astype(float)
+    sums = np.cumsum([force, force**2], axis=1)
+    instants = np.interp(transient.time_s * bench.sample_rate_hz, np.arange(turns.size), turns)
+    ends = np.clip(np.add.outer((-1.0, 1.0), instants), turns[0], turns[-1])
+    samples = np.interp(ends, turns, np.arange(turns.size))
+    mean, square = (np.diff(np.interp(ends, turns, one), axis=0)[0] / np.diff(samples, axis=0)[0] for one in sums)
+    return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0)))
 
 
 def transient_of(bench: Bench, rows: np.ndarray) -> Transient:

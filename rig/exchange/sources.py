@@ -13,6 +13,7 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.exchange.time_data import TimeData
 from rig.measurements import backbone, bench_of_recording, frequency_responses, point_rows, response_matrices, sweeps
 from rig.models.files import load
+from rig.models.force_surface import MeasuredSurface
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
@@ -48,6 +49,8 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     if data == "time" or points:
         raise RecordingError(f"{path}: holds a {kind}; samples of points are in recordings")
     found = load(path)
+    if isinstance(found, MeasuredSurface):
+        return [found.responses]
     if isinstance(found, ModalAnalysis):
         return [found.modes] if found.responses is None else [found.modes, found.responses]
     return [found]
@@ -58,6 +61,7 @@ _RESULTS: dict[str, Callable[[Recording], list[Any]]] = {
     "stepped-phase": lambda recording: [frequency_responses(recording)],
     "continuous-backbone": lambda recording: [backbone(recording)],
     "stepped-sine": lambda recording: [frequency_responses(recording)],
+    "response-controlled": lambda recording: [frequency_responses(recording)],
     "multisine": lambda recording: list(response_matrices(recording).values()),
     "sweep": lambda recording: list(sweeps(recording).values()),
 }

@@ -1,18 +1,19 @@
 """Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification import IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
+from identification import ForceSurface, IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
 from rig.errors import RecordingError
 from rig.figures.continuous_backbone import draw_differences, draw_ways
+from rig.figures.force_surface import draw_force_surface
 from rig.figures.nonlinear_mode import draw_properties
 from rig.figures.stepped_phase import draw_stepped_phase
 from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
 from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
-from rig.measurements import backbone, frequency_responses, point_rows, spectra, sweeps
+from rig.measurements import backbone, force_surface, frequency_responses, point_rows, spectra, sweeps
 from rig.models.files import KINDS, load
 from rig.recording.arrays import kind_of
 from rig.recording.parts import Part
@@ -101,8 +102,15 @@ def _draw_sweep(page: "Figure", recording: Recording) -> None:
         np.vstack([rows["inputs"].T, rows["output_v"]]),
         float(recording.configuration["bench"]["sample_rate_hz"]),
         drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"].get("off_resonance_hz")),
-        title=f"{_specimen(recording)}: sweep at {point['level']:g} V, uncontrolled",
+        title=f"{_specimen(recording)}: sweep at {point['level']:g} {point['level_unit']}, {_held(point)}",
     )
+
+
+def _held(point: dict[str, Any]) -> str:
+    """What was controlled in a sweep, and how well."""
+    if "held_least" not in point:
+        return "uncontrolled"
+    return f"held within {100.0 * point['held_least']:.1f} to {100.0 * point['held_most']:.1f} %"
 
 
 def _draw_stepped_sine(page: "Figure", recording: Recording) -> None:
@@ -123,6 +131,20 @@ def _draw_stepped_phase(page: "Figure", recording: Recording) -> None:
     )
 
 
+def _draw_response_controlled(page: "Figure", recording: Recording) -> None:
+    """Every level, and the surface through them where there are enough."""
+    page.set_size_inches(11.0, 7.0)
+    responses = frequency_responses(recording)
+    try:
+        surface: ForceSurface | None = force_surface(recording)
+    except IdentificationError:
+        surface = None
+    points = recording.latest.values()
+    left_out = sum(not point["accepted"] for point in points)
+    text = f"{_specimen(recording)}: response-controlled test, {len(points)} points"
+    draw_force_surface(page, responses, surface, text=text + (f", {left_out} not accepted" if left_out else ""))
+
+
 def _draw_multisine(page: "Figure", recording: Recording) -> None:
     """The highest level of a recording."""
     level, at_level = max(spectra(recording).items())
@@ -136,6 +158,7 @@ _DRAW = {
     "continuous-backbone": _draw_continuous_backbone,
     "sweep": _draw_sweep,
     "stepped-phase": _draw_stepped_phase,
+    "response-controlled": _draw_response_controlled,
     "stepped-sine": _draw_stepped_sine,
     "multisine": _draw_multisine,
 }

@@ -28,6 +28,7 @@ __all__ = ["draw_multisine", "draw_stepped_sine", "draw_sweep"]
 Float = NDArray[np.float64]
 
 _ODD = "#4f9d69"
+_JUMP = 1.5  # times the amplitude of the point before
 _SYMBOL = {"m/s2": "m/s²", "m/s^2": "m/s²"}
 
 
@@ -137,11 +138,13 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
         colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.9)
         style: dict[str, Any] = {"marker": ".", "ms": 4, "color": colour}
         label = item.label or f"{item.level:g} {item.level_unit}"
-        force.semilogy(item.frequency_hz, item.force_n, label=label, **style)
-        amplitude.semilogy(item.frequency_hz, item.amplitude_m * (1e6 if micro else 1e3), **style)
-        lag.plot(item.frequency_hz, item.phase_lag_deg, **style)
         acceleration = item.amplitude_m * (2.0 * np.pi * item.frequency_hz) ** 2
-        accelerance.semilogy(item.frequency_hz, acceleration / item.force_n, **style)
+        _stepped(force, item, item.force_n, label=label, **style)
+        _stepped(amplitude, item, item.amplitude_m * (1e6 if micro else 1e3), **style)
+        _stepped(lag, item, item.phase_lag_deg, **style)
+        _stepped(accelerance, item, acceleration / item.force_n, **style)
+    for axis in (force, amplitude, accelerance):
+        axis.set(yscale="log")
     force.set(ylabel="force, N")
     amplitude.set(ylabel=f"displacement amplitude, {'µm' if micro else 'mm'}")
     lag.set(ylabel="phase lag of displacement, deg", xlabel="frequency, Hz")
@@ -149,6 +152,16 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
     accelerance.set(ylabel="accelerance, 1/kg", xlabel="frequency, Hz")
     page.legend(fontsize=8, loc="outside right upper")
     _heading(page, title)
+
+
+def _stepped(axis: "Axes", measured: FrequencyResponse, values: Float, **style: Any) -> None:
+    """Points in the order of measurement; where the amplitude jumps from one to the next, their link is dotted."""
+    frequency_hz, amplitude_m = measured.frequency_hz, measured.amplitude_m
+    jumps = np.flatnonzero(np.abs(np.diff(np.log(amplitude_m))) > np.log(_JUMP)) + 1
+    gaps = np.full(jumps.size, np.nan)
+    axis.plot(np.insert(frequency_hz, jumps, gaps), np.insert(values, jumps, gaps), **style)
+    for k in jumps:
+        axis.plot(frequency_hz[k - 1 : k + 1], values[k - 1 : k + 1], ":", lw=0.8, color=style["color"])
 
 
 def draw_multisine(

@@ -6,6 +6,7 @@ from typing import Any
 from identification import LinearModes, ModalAnalysis
 from rig.errors import RecordingError
 from rig.models.exciter import EXCITER
+from rig.models.force_surface import FORCE_SURFACE
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.kind import Kind
 from rig.models.linear_modes import LINEAR_MODES
@@ -17,7 +18,16 @@ from rig.recording.arrays import kind_of, read_arrays, write_arrays
 
 __all__ = ["KINDS", "load", "load_as", "save"]
 
-_ALL = (NONLINEAR_MODE, LINEAR_MODES, EXCITER, FREQUENCY_RESPONSES, RESPONSE_MATRIX, MEASURED_BACKBONE, PREDICTIONS)
+_ALL = (
+    NONLINEAR_MODE,
+    LINEAR_MODES,
+    EXCITER,
+    FORCE_SURFACE,
+    FREQUENCY_RESPONSES,
+    RESPONSE_MATRIX,
+    MEASURED_BACKBONE,
+    PREDICTIONS,
+)
 KINDS = {kind.name: kind for kind in _ALL}
 """Every kind of file that is no recording, by its name in the file."""
 

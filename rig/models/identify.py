@@ -9,6 +9,7 @@ from identification import (
     Backbone,
     ContinuousBackbone,
     Exciter,
+    FrequencyResponse,
     FrequencyResponseMatrix,
     LinearModes,
     ModalAnalysis,
@@ -25,8 +26,17 @@ from identification import (
 )
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import Estimator, backbone, bench_of_recording, continuous_backbones, spectra
+from rig.measurements import (
+    STEPPED,
+    Estimator,
+    backbone,
+    bench_of_recording,
+    continuous_backbones,
+    frequency_responses,
+    spectra,
+)
 from rig.models.files import KINDS, load, load_as
+from rig.models.force_surface import MeasuredSurface
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.identify_request import Request
 from rig.models.linear_modes import LINEAR_MODES
@@ -55,13 +65,15 @@ def modes_in(path: Path) -> LinearModes:
 
 
 def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
-    """From one or several backbones, or from imported stepped sines."""
+    """From one or several backbones, or from stepped sines: imported, or response-controlled."""
     kinds = {kind_of(path): path for path in paths}
     modes = None if request.modes is None else modes_in(request.modes)
-    if set(kinds) == {FREQUENCY_RESPONSES.name}:
+    if set(kinds) <= {FREQUENCY_RESPONSES.name, *STEPPED}:
         if modes is not None:
             raise ConfigurationError("--modes: stepped sines of one sensor have no use for mode shapes; leave it out")
-        return stepped_sine_mode([response for path in paths for response in load(path)])
+        stepped, missing = _stepped(paths)
+        found = stepped_sine_mode(stepped)
+        return replace(found, notes=(*missing, *found.notes))
     identified = []
     for path in paths:
         runs, notes = _backbones(path)
@@ -73,6 +85,34 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
             )
             identified.append(replace(found, notes=(*notes, *found.notes)))
     return identified[0] if len(identified) == 1 else combined(identified)
+
+
+def _stepped(paths: Sequence[Path]) -> tuple[list[FrequencyResponse], tuple[str, ...]]:
+    """Stepped sines, recorded or imported, and what of the recordings' plans is not in them."""
+    measured: list[FrequencyResponse] = []
+    notes: tuple[str, ...] = ()
+    for path in paths:
+        kind = kind_of(path)
+        if kind == FREQUENCY_RESPONSES.name:
+            measured += load(path)
+        elif kind in STEPPED:
+            with Recording(path) as recording:
+                measured += frequency_responses(recording)
+                notes += points_left_out(recording)
+        else:
+            raise RecordingError(
+                f"{path}: holds a {kind}; a force surface comes from response-controlled or stepped sines"
+            )
+    return measured, notes
+
+
+def _force_surface(paths: Sequence[Path], request: Request) -> MeasuredSurface:
+    """From levels of held displacement, those of all files together."""
+    measured, missing = _stepped(paths)
+    one_specimen(**{response.label: response.specimen for response in measured})
+    found = MeasuredSurface(tuple(measured), missing)
+    found.surface  # noqa: B018  refused here, not when the file is read
+    return found
 
 
 def _backbones(path: Path) -> tuple[Sequence[Backbone | ContinuousBackbone], tuple[str, ...]]:
@@ -165,5 +205,6 @@ def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
 _MODELS: dict[str, Callable[[Sequence[Path], Request], Any]] = {
     "nonlinear-mode": _nonlinear_mode,
     "linear": _linear,
+    "force-surface": _force_surface,
     "exciter": _exciter,
 }

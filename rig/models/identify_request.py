@@ -13,6 +13,7 @@ __all__ = ["Request"]
 _OPTIONS: dict[str, tuple[str, ...]] = {
     "nonlinear-mode": ("--modes",),
     "linear": ("--estimator", "--band", "--count"),
+    "force-surface": (),
     "exciter": ("--band", "--resistance", "--amplifier-gain", "--stinger-stiffness"),
 }
 
@@ -22,7 +23,7 @@ class Request:
     """What is to be identified, and how."""
 
     kind: str = "nonlinear-mode"
-    """``nonlinear-mode``, ``linear`` or ``exciter``."""
+    """``nonlinear-mode``, ``linear``, ``force-surface`` or ``exciter``."""
     modes: Path | None = None
     """Linear model whose mode shapes a nonlinear mode uses."""
     estimator: str = "instrument"

@@ -24,12 +24,14 @@ from identification.prediction.comparison import Over
 from identification.prediction.frequency_response import HeldForce
 from identification.prediction.properties import FLAGGED_BEYOND
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import frequency_responses
+from rig.measurements import STEPPED, frequency_responses
 from rig.models.exciter import EXCITER
 from rig.models.files import load_as
+from rig.models.force_surface import FORCE_SURFACE
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.identify import modes_in
 from rig.models.nonlinear_mode import NONLINEAR_MODE
+from rig.models.predict_surface import surface_predictions
 from rig.models.predict_sweeps import CROSSINGS, SweepModels, Swept, planned_sweeps, recorded_sweeps
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -94,12 +96,15 @@ class PredictionRequest:
 
 
 def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
-    """Predictions of a nonlinear-mode model, and their errors where there is something to compare with.
+    """Predictions of a nonlinear mode or a force surface, and their errors where there is something to compare with.
 
     Raises `RecordingError` for files that hold something else, `ConfigurationError` for plans that cannot be predicted,
     `identification.IdentificationError` where the model cannot answer, in particular beyond twice the largest amplitude
     that it was identified with.
     """
+    if kind_of(model) == FORCE_SURFACE.name:
+        references = [measured for path in request.references for measured in _stepped_sines(path)]
+        return surface_predictions(load_as(FORCE_SURFACE, model), request, references)
     mode = cast(NonlinearMode, load_as(NONLINEAR_MODE, model))
     modes = None if request.modes is None else modes_in(request.modes)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
@@ -171,7 +176,7 @@ def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
     kind = kind_of(path)
     if kind == FREQUENCY_RESPONSES.name:
         return cast(tuple[FrequencyResponse, ...], load_as(FREQUENCY_RESPONSES, path))
-    if kind != "stepped-sine":
+    if kind not in STEPPED:
         raise RecordingError(
             f"{path}: is a file of kind {kind}; a reference is a stepped-sine recording or imported stepped sines"
         )

@@ -17,6 +17,7 @@ from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.known_plant import PlantFacts
 from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.response_controlled import ResponseControlledPlan
 from rig.campaigns.stepped_phase import SteppedPhasePlan
 from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.sweep import SweepPlan
@@ -33,6 +34,7 @@ MODELS = {
     "Keys of a stepped-sine plan": SteppedSinePlan,
     "Keys of `[controller]` in open loop": OpenLoop,
     "Keys of a stepped-phase plan": SteppedPhasePlan,
+    "Keys of a response-controlled plan": ResponseControlledPlan,
     "Keys of a sweep plan": SweepPlan,
     "Keys of a multisine plan": MultisinePlan,
     "Keys of a continuous backbone plan": ContinuousBackbonePlan,

@@ -116,3 +116,16 @@ def test_a_multisine_shows_lines_noise_and_frequency_response(page: Figure, grid
     assert ("odd, not excited" in lines(page.axes[2])) == (grid == "odd-random")
     for text in ("a beam: multisine", "frequency response, 1/kg", "amplitude, mean of 3 × 4 periods"):
         assert text in texts
+
+
+def test_points_of_a_stepped_sine_that_a_jump_parts_are_joined_by_dots(page: Figure) -> None:
+    frequency = np.array([24.0, 24.1, 24.2, 24.3])
+    motion = 1e-3 * np.array([1.0, 1.2, 0.3, 0.25]) + 0j
+    measured = FrequencyResponse(frequency, np.full(4, 0.5 + 0j), motion, "displacement", "force", 0.5, "0.5 N", "beam")
+    draw_stepped_sine(page, [measured])
+    assert "0.5 N" in rendered(page)
+    for axis in page.axes:
+        dots = [np.asarray(line.get_xdata()) for line in axis.get_lines() if line.get_linestyle() == ":"]
+        np.testing.assert_array_equal(dots, [[24.1, 24.2]])
+    drawn = np.asarray(page.axes[1].get_lines()[0].get_ydata())
+    np.testing.assert_allclose(drawn, [1.0, 1.2, np.nan, 0.3, 0.25])

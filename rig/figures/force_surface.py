@@ -1,0 +1,128 @@
+"""Figure of a response-controlled test: quasi-linear responses level by level, and curves at constant force cut from them."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
+from identification.response_control.levels import LevelFit
+from rig.figures.style import REJECTED, engineering, title
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_force_surface"]
+
+_CURVES = 4
+_SECTIONS_DEG = (30.0, 90.0, 150.0)
+_MOST_NAMED = 8
+_ROOM = 1.4
+
+
+def draw_force_surface(
+    page: "Figure", responses: Sequence[FrequencyResponse], surface: ForceSurface | None, *, text: str = ""
+) -> None:
+    """Receptance and lag of every level on the left, constant-force curves and the force over the displacement on the right.
+
+    ``page`` is an empty figure, about 11 by 7 inches; without a ``surface`` its right half is left out.
+    """
+    from matplotlib import colormaps
+
+    columns = 1 if surface is None else 2
+    axes = page.subplots(2, columns, squeeze=False)
+    unit = engineering(np.concatenate([response.amplitude_m for response in responses]))[1]
+    scale = {"mm": 1e3, "µm": 1e6}[unit]
+    levels = sorted({response.level for response in responses})
+    for response in responses:
+        colour = colormaps["viridis"](levels.index(response.level) / max(1, len(levels) - 1) * 0.9)
+        _points(axes[0, 0], axes[1, 0], response, scale, colour, _name(response, levels, scale, unit))
+    fits = () if surface is None else surface.levels
+    for index, fit in enumerate(fits):
+        colour = colormaps["viridis"](index / max(1, len(fits) - 1) * 0.9)
+        _fit(axes[0, 0], axes[1, 0], fit, scale, colour)
+    axes[0, 0].set(ylabel=f"receptance, {unit}/N", yscale="log")
+    axes[0, 0].set_ylim(top=_ROOM * axes[0, 0].get_ylim()[1])
+    axes[0, 0].legend(fontsize=7, ncols=2, title="displacement held")
+    axes[1, 0].set(xlabel="frequency, Hz", ylabel="phase lag of displacement, deg")
+    axes[1, 0].axhline(90.0, color=REJECTED, lw=0.8)
+    if surface is not None:
+        _curves(axes[0, 1], surface, scale, unit)
+        _sections(axes[1, 1], surface, scale, unit)
+    specimen = responses[0].specimen or "specimen"
+    title(page, text or f"{specimen}: response-controlled test, {len(levels)} levels")
+
+
+def _name(response: FrequencyResponse, levels: list[float], scale: float, unit: str) -> str | None:
+    """Of many levels the first and the last alone are named, the shades lie between."""
+    if len(levels) > _MOST_NAMED and response.level not in (levels[0], levels[-1]):
+        return None
+    return f"{scale * response.level:.4g} {unit}"
+
+
+def _points(
+    size: "Axes", lag: "Axes", response: FrequencyResponse, scale: float, colour: Any, name: str | None
+) -> None:
+    receptance = scale * response.amplitude_m / response.force_n
+    size.plot(response.frequency_hz, receptance, ".", color=colour, ms=4, label=name)
+    lag.plot(response.frequency_hz, response.phase_lag_deg, ".", color=colour, ms=4)
+
+
+def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: Any) -> None:
+    """What the surface takes for the response of a level."""
+    x = np.linspace(-1.0, 1.0, 81)
+    frequency_hz = (fit.centre + x * fit.half_range) / (2.0 * np.pi)
+    stiffness = np.polynomial.polynomial.polyval(x, fit.coefficients)
+    size.plot(frequency_hz, scale / np.abs(stiffness), color=colour, lw=0.9)
+    lag.plot(frequency_hz, np.degrees(np.angle(stiffness)), color=colour, lw=0.9)
+
+
+def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
+    """Amplitude over frequency at forces within the surface; unstable parts dotted."""
+    from matplotlib import colormaps
+
+    found = _within(surface)
+    for index, curve in enumerate(found):
+        response, colour = curve.response, colormaps["plasma"](0.85 * index / max(1, len(found) - 1))
+        for which, line in ((curve.stable, "-"), (~curve.stable, ":")):
+            near = which | np.concatenate([which[1:], [False]])
+            shown = np.where(near, scale * response.amplitude_m, np.nan)
+            axis.plot(response.frequency_hz, shown, line, color=colour, label=response.label if line == "-" else None)
+    resonance = surface.at_lag(90.0)
+    axis.plot(resonance.frequency_hz, scale * resonance.amplitude_m, "--", color=REJECTED, lw=0.9, label="resonance")
+    if any(not curve.stable.all() for curve in found):
+        axis.plot([], [], ":", color=REJECTED, label="unstable at constant force")
+    axis.set(xlabel="frequency, Hz", ylabel=f"displacement amplitude, {unit}")
+    axis.legend(fontsize=7, title="constant force, cut from the surface")
+
+
+def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
+    """Curves at forces that the levels enclose from lag 30 to 150 deg, or, where they do not, at resonance."""
+    resonance = surface.at_lag(90.0).force_n
+    try:
+        lowest = max(float(surface.at_lag(lag).force_n[0]) for lag in (_SECTIONS_DEG[0], _SECTIONS_DEG[-1]))
+    except IdentificationError:
+        lowest = float(resonance[0])
+    highest = float(resonance[-1])
+    if not lowest < highest:
+        lowest = float(resonance[0])
+    out = []
+    for force in np.geomspace(1.02 * lowest, 0.98 * highest, _CURVES):
+        try:
+            out.append(surface.constant_force(float(f"{force:.2g}")))
+        except IdentificationError:  # rounded out of what was measured
+            continue
+    return out
+
+
+def _sections(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
+    """Force over displacement at three lags: every level a point."""
+    for lag, marker in zip(_SECTIONS_DEG, ("v", "o", "^"), strict=True):
+        try:
+            section = surface.at_lag(lag)
+        except IdentificationError:
+            continue
+        axis.plot(scale * section.amplitude_m, section.force_n, marker + "-", ms=3, lw=0.9, label=f"lag {lag:g} deg")
+    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel="force, N", xscale="log", yscale="log")
+    axis.legend(fontsize=7)
