@@ -8,9 +8,7 @@ import numpy as np
 
 from identification import (
     Backbone,
-    Channel,
     IdentificationError,
-    PeriodicVibration,
     ShortPoint,
     SlowFlow,
     nonlinear_mode,
@@ -19,7 +17,14 @@ from identification import (
 from rig.bench import Bench
 from rig.campaigns.alien_force import alien_force
 from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.evaluate import as_complex, head, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.evaluate import (
+    channels_from,
+    head,
+    not_evaluated,
+    recorded_vibration,
+    vibration_from,
+    within_periods,
+)
 from rig.campaigns.objections import alien_objection, first_of, phase_objection, std_objection
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.quality import PURITY_COLUMNS, of_a_record, of_a_vibration
@@ -142,21 +147,8 @@ def backbone_of(
     accepted = [point for point in points if point["accepted"]]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
-    kinds = tuple(Channel(c["name"], c["role"], c["unit"]) for c in channels)
-    vibrations = tuple(
-        PeriodicVibration(
-            kinds,
-            point["frequency_hz"],
-            as_complex(point["harmonics"]),
-            point["periods"],
-            np.asarray(point["residual_rms"], float),
-            None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
-            None if point["drift"] is None else as_complex(point["drift"]),
-            phase_lag_target_deg=phase_lag_target_deg,
-            warnings=tuple(point["warnings"]),
-        )
-        for point in accepted
-    )
+    kinds = channels_from(channels)
+    vibrations = tuple(vibration_from(point, kinds, phase_lag_target_deg) for point in accepted)
     return Backbone(
         vibrations,
         specimen,

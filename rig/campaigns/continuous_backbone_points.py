@@ -11,7 +11,6 @@ from identification import (
     Channel,
     ContinuousBackbone,
     IdentificationError,
-    PeriodicVibration,
     SlowFlow,
     continuous_backbone,
 )
@@ -19,7 +18,7 @@ from rig.bench import Bench
 from rig.campaigns.alien_force import alien_force
 from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.continuous_ways import WAYS, Way, both_ways, rows_near
-from rig.campaigns.evaluate import as_complex, head, not_evaluated
+from rig.campaigns.evaluate import channels_from, head, not_evaluated, vibration_from
 from rig.campaigns.objections import alien_objection, first_of, std_objection
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.quality import PURITY_COLUMNS, of_a_vibration
@@ -177,7 +176,7 @@ def continuous_backbones_of(
     drive_mode_shape: float | None,
 ) -> tuple[ContinuousBackbone, ...]:
     """The accepted points of a recording, one continuous backbone per repeat; raises `IdentificationError` without any."""
-    kinds = tuple(Channel(c["name"], c["role"], c["unit"]) for c in channels)
+    kinds = channels_from(channels)
     repeats: dict[int, list[Mapping[str, Any]]] = {}
     for point in points:
         if point["accepted"]:
@@ -193,18 +192,7 @@ def _from_points(
     def both(name: str) -> np.ndarray:
         return np.array([[point[way][name] for point in points] for way in WAYS])
 
-    vibrations = tuple(
-        PeriodicVibration(
-            channels,
-            point["frequency_hz"],
-            as_complex(point["harmonics"]),
-            point["periods"],
-            np.asarray(point["residual_rms"], float),
-            None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
-            warnings=tuple(point["warnings"]),
-        )
-        for point in points
-    )
+    vibrations = tuple(vibration_from(point, channels) for point in points)
     return ContinuousBackbone(
         backbone=Backbone(vibrations, specimen, drive_mode_shape),
         amplitude_m=np.array([point["amplitude_m"] for point in points]),

@@ -18,7 +18,7 @@ __all__ = ["WAYS", "Way", "both_ways", "rows_near"]
 
 WAYS = ("up", "down")
 FEWEST_INSTANTS = 16
-PIECE_PERIODS = FEWEST_PERIODS + 4.0
+PIECE_PERIODS = FEWEST_PERIODS + 6.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def _why(passages: Sequence[Passage], ended: str) -> str:
 
 
 def rows_near(bench: Bench, rows: np.ndarray, way: Way, level_m: float) -> np.ndarray:
-    """The rows of some 16 periods about the instant at which a way came nearest to an amplitude."""
+    """The rows of some 20 periods about the instant at which a way came nearest to an amplitude."""
     if way.flow is None:
         return rows[:0]
     nearest = int(np.argmin(np.abs(np.log(way.flow.amplitude_m / level_m))))

@@ -1,6 +1,7 @@
 """What the evaluation of all campaigns shares: head of a point, mark of a failed one, periodic vibrations, quality."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, cast
 
@@ -15,6 +16,7 @@ __all__ = [
     "VOLTAGE",
     "as_complex",
     "as_pairs",
+    "channels_from",
     "channels_of",
     "failed_point",
     "frequency_scatter",
@@ -23,6 +25,7 @@ __all__ = [
     "quantisation_warnings",
     "recorded_vibration",
     "skew_turn",
+    "vibration_from",
     "within_periods",
 ]
 
@@ -106,6 +109,28 @@ def recorded_vibration(
         phase_lag_target_deg=phase_lag_target_deg,
     )
     return _without_skew(vibration, bench)
+
+
+def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:
+    """A recording's table of channels as measurements know them."""
+    return tuple(Channel(row["name"], row["role"], row["unit"]) for row in rows)
+
+
+def vibration_from(
+    point: Mapping[str, Any], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
+) -> PeriodicVibration:
+    """The vibration that a recorded point holds."""
+    return PeriodicVibration(
+        channels,
+        point["frequency_hz"],
+        as_complex(point["harmonics"]),
+        point["periods"],
+        np.asarray(point["residual_rms"], float),
+        None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
+        None if point.get("drift") is None else as_complex(point["drift"]),
+        phase_lag_target_deg=phase_lag_target_deg,
+        warnings=tuple(point["warnings"]),
+    )
 
 
 def within_periods(theta_rad: np.ndarray, periods: int) -> slice:

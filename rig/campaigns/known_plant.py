@@ -98,12 +98,11 @@ class KnownPlant(Levels):
             return
         growth = [max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0) for loop in unstable]
         worst = unstable[growth.index(max(growth))]
-        steadier = (part for part in MORE_DAMPING if not any(map(unstable_poles, _damped(unstable, part))))
-        enough = next(steadier, None)
+        enough = next((part for part in MORE_DAMPING if _steady(unstable, part)), None)
         raise ConfigurationError(
             f"controller: these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
             f"{100.0 * plant.damping_ratio:.3g} % damping)"
-            + ("" if len(loops) == 1 else f" at a lag of {', '.join(f'{loop.lag_deg:g}' for loop in unstable)} deg")
+            + _where([loop.lag_deg for loop in unstable])
             + (f", growing at {max(growth):.3g} 1/s" if max(growth) > 0.0 else "")
             + ("" if enough is None else f"; with {100.0 * enough * plant.damping_ratio:.3g} % they would be stable")
             + "; rig tune finds gains, without [plant] nothing is checked"
@@ -114,16 +113,29 @@ class KnownPlant(Levels):
         for index, level in enumerate(self.levels):
             volts, lag = max((voltage_for(plant, level, self.level_unit, lag), lag) for lag in lags_deg)
             if volts > limit:
-                where = "" if len(lags_deg) == 1 else f" at a lag of {lag:g} deg"
                 raise ConfigurationError(
-                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: needs {volts:.3g} V{where} on the known plant "
-                    f"([plant], {100.0 * plant.damping_ratio:.3g} % damping), the bench {bench.name} allows {limit:g} V"
+                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: needs {volts:.3g} V{_where([lag])} on "
+                    f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping), "
+                    f"the bench {bench.name} allows {limit:g} V"
                 )
 
 
-def _damped(loops: Sequence[ControlLoop], part: float) -> list[ControlLoop]:
-    """The same loops with so many times the damping."""
-    return [replace(loop, plant=loop.plant.at(damping_ratio=part * loop.plant.damping_ratio)) for loop in loops]
+def _where(lags_deg: Sequence[float]) -> str:
+    """The lags that are meant; nothing where that is resonance alone."""
+    if list(lags_deg) == [-90.0]:
+        return ""
+    if len(lags_deg) > 3:
+        return f" at {len(lags_deg)} lags from {lags_deg[0]:g} to {lags_deg[-1]:g} deg"
+    return f" at a lag of {', '.join(f'{lag:g}' for lag in lags_deg)} deg"
+
+
+def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
+    """Whether all the loops are stable with so many times the damping; not where a lag is none of that plant's."""
+    damped = (replace(loop, plant=loop.plant.at(damping_ratio=part * loop.plant.damping_ratio)) for loop in loops)
+    try:
+        return not any(map(unstable_poles, damped))
+    except ValueError:
+        return False
 
 
 def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> float:
