@@ -46,9 +46,7 @@ def test_a_sweep_at_held_force_holds_it_but_where_it_jumps(name):
     part = {"levels_n": (level,), "start_hz": first, "stop_hz": last}
     with rig.run(load_plan(name).model_copy(update=part), seed=3) as run:
         (point,) = run.recording.latest.values()
-    truth = constant_force_response(
-        VirtualRig.shipped(name.split("/")[0]), level, list(np.linspace(-150.0, -30.0, 25))
-    )
+    truth = constant_force_response(VirtualRig.shipped(name.split("/")[0]), level, list(np.linspace(-150.0, -30.0, 25)))
     assert least < point["held_least"] <= point["held_most"] < most
     if truth.stable.all():
         assert point["peak_m"] == pytest.approx(truth.amplitude_m.max(), rel=0.01)
