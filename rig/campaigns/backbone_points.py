@@ -8,30 +8,30 @@ import numpy as np
 
 from identification import (
     Backbone,
-    Channel,
     IdentificationError,
-    PeriodicVibration,
     ShortPoint,
     SlowFlow,
     nonlinear_mode,
     short_point,
 )
 from rig.bench import Bench
+from rig.campaigns.alien_force import alien_force
 from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.evaluate import (
-    as_complex,
-    as_pairs,
-    drift_objection,
+    channels_from,
     head,
+    not_evaluated,
     recorded_vibration,
+    vibration_from,
     within_periods,
 )
+from rig.campaigns.objections import alien_objection, first_of, phase_objection, std_objection
 from rig.campaigns.plan import Column, Target
-from rig.campaigns.quality import PURITY_COLUMNS, lag_scatter_deg, purity, quality_warnings
+from rig.campaigns.quality import PURITY_COLUMNS, of_a_record, of_a_vibration
 from rig.campaigns.recorded_flow import flagged, recorded_flow
+from rig.campaigns.settled_quality import settled_objection, settled_quality
 
-__all__ = ["BACKBONE_COLUMNS", "backbone_of", "frequency_scatter", "measure_backbone_point", "std_objection"]
+__all__ = ["BACKBONE_COLUMNS", "backbone_of", "measure_backbone_point"]
 
 NEAR = 0.1  # in the logarithm of the amplitude, of what a point of the slow flow is made
 
@@ -55,7 +55,6 @@ def measure_backbone_point(
     """
     if plan.evaluation == "slow-flow":
         return _short_point(bench, plan, target, rows)
-    point = head(plan, target)
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
         vibration = recorded_vibration(
@@ -63,13 +62,12 @@ def measure_backbone_point(
         )
         mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
     except (IdentificationError, ArithmeticError) as error:
-        return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
-    error_deg = vibration.phase_error_deg
-    hunting = frequency_scatter(rows["theta_rad"])
-    reason = _objection(plan, bench, vibration, hunting)
+        return not_evaluated(plan, target, error, settled=True)
+    found = settled_quality(vibration, bench, rows)
+    reason = settled_objection(plan, bench, vibration, found)
     damping = float(mode.damping_ratio[0])
     return {
-        **point,
+        **head(plan, target),
         "settled": True,
         "accepted": not reason,
         "reason": reason,
@@ -78,38 +76,27 @@ def measure_backbone_point(
         "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
         "damping_ratio": damping if math.isfinite(damping) else None,
         "amplitude_m": vibration.amplitude_m,
-        "phase_error_deg": error_deg,
-        "frequency_scatter": hunting,
-        "phase_scatter_deg": lag_scatter_deg(rows),
-        "voltage_v": float(np.abs(rows["command_v"]).mean()),
-        **purity(vibration),
-        "periods": vibration.periods,
-        "settle_periods": float(settling["periods"]),
-        "amplitude_drift": float(settling["drift"]),
-        "harmonics": as_pairs(vibration.harmonics),
-        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
-        "residual_rms": vibration.residual_rms.tolist(),
-        "drift": None if vibration.drift is None else as_pairs(vibration.drift),
-        "warnings": quality_warnings(bench, vibration, rows),
+        **found,
+        **of_a_record(bench, vibration, rows, settling),
     }
 
 
 def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> dict[str, Any]:
     """A point from the ramp to it and what follows, settled or not."""
-    point = head(plan, target)
     try:
         flow = recorded_flow(bench, rows, plan.harmonics)
         found = short_point(flow, start_s=_arrival_s(flow))
         vibration = found.vibration
     except (IdentificationError, ArithmeticError) as error:
-        return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+        return not_evaluated(plan, target, error, settled=False)
     error_deg = (plan.controller.phase_lag_deg + 180.0 - found.phase_lag_deg + 180.0) % 360.0 - 180.0
-    reason = _short_objection(plan, found, error_deg)
+    alien = alien_force(bench, [rows])
+    reason = _short_objection(plan, found, error_deg, alien)
     reason = reason or next((why for why, at in flagged(bench, rows, flow).items() if at.any()), "")
     turned = np.unwrap(rows["theta_rad"].astype(float))
     grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz
     return {
-        **point,
+        **head(plan, target),
         "settled": abs(error_deg) <= plan.settle.phase_deg and abs(grown) <= plan.settle.amplitude,
         "accepted": not reason,
         "reason": reason,
@@ -123,15 +110,9 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndar
         "phase_error_deg": error_deg,
         "growth_1_s": found.growth_1_s,
         "measured_force_n": found.force_n,
-        "voltage_v": float(np.abs(rows["command_v"]).mean()),
-        **purity(vibration),
-        "periods": vibration.periods,
+        "alien_force": alien,
         "periods_in_all": float(turned[-1] - turned[0]) / (2.0 * math.pi),
-        "harmonics": as_pairs(vibration.harmonics),
-        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
-        "residual_rms": vibration.residual_rms.tolist(),
-        "drift": None,
-        "warnings": quality_warnings(bench, vibration, rows, held=False),
+        **of_a_vibration(bench, vibration, rows, held=False),
     }
 
 
@@ -142,48 +123,17 @@ def _arrival_s(flow: SlowFlow) -> float:
     return float(flow.time_s[min(last, flow.time_s.size - 1)])
 
 
-def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float) -> str:
+def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, alien: float) -> str:
     """Why a point of the slow flow is not accepted; empty where it is."""
-    if abs(error_deg) > plan.accepted_phase_error_deg:
-        return f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
-    return std_objection(
-        plan,
-        found.modal_frequency_std_hz / found.modal_frequency_hz,
-        found.damping_ratio_std / abs(found.damping_ratio),
-    )
-
-
-def std_objection(plan: BackbonePlan | ContinuousBackbonePlan, frequency: float, damping: float) -> str:
-    """Why a point with such relative standard errors is not accepted; empty where it is."""
-    for name, std, accepted in (
-        ("modal frequency", frequency, plan.accepted_frequency_std),
-        ("damping", damping, plan.accepted_damping_std),
-    ):
-        if not std <= accepted:
-            return f"standard error of the {name} {100.0 * std:.2g} %, accepted up to {100.0 * accepted:g} %"
-    return ""
-
-
-def _objection(plan: BackbonePlan, bench: Bench, vibration: PeriodicVibration, hunting: float) -> str:
-    """Why a recorded point is not accepted; empty where it is."""
-    error_deg = vibration.phase_error_deg
-    if abs(error_deg) > plan.accepted_phase_error_deg:
-        return f"phase error {error_deg:.2f} deg, accepted up to {plan.accepted_phase_error_deg:g} deg"
-    if hunting > plan.accepted_frequency_scatter:
-        return (
-            f"the loop hunts: the frequency scatters by {100.0 * hunting:.2f} % from period to period, "
-            f"accepted up to {100.0 * plan.accepted_frequency_scatter:g} %"
+    frequency = found.modal_frequency_std_hz / found.modal_frequency_hz
+    damping = found.damping_ratio_std / abs(found.damping_ratio)
+    return first_of(
+        (
+            phase_objection(error_deg, plan.accepted_phase_error_deg),
+            std_objection(frequency, plan.accepted_frequency_std, damping, plan.accepted_damping_std),
+            alien_objection(alien, plan.accepted_alien_force),
         )
-    return drift_objection(bench, vibration, plan.accepted_drift)
-
-
-def frequency_scatter(theta_rad: np.ndarray) -> float:
-    """Standard deviation of the frequency of single periods, relative to its mean."""
-    turned = np.unwrap(theta_rad.astype(float))
-    turns = (turned - turned[0]) / (2.0 * math.pi)
-    ends = np.interp(np.arange(int(turns[-1]) + 1), turns, np.arange(turns.size))
-    lengths = np.diff(ends)
-    return float(lengths.std() / lengths.mean()) if lengths.size > 1 else 0.0
+    )
 
 
 def backbone_of(
@@ -197,21 +147,8 @@ def backbone_of(
     accepted = [point for point in points if point["accepted"]]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
-    kinds = tuple(Channel(c["name"], c["role"], c["unit"]) for c in channels)
-    vibrations = tuple(
-        PeriodicVibration(
-            kinds,
-            point["frequency_hz"],
-            as_complex(point["harmonics"]),
-            point["periods"],
-            np.asarray(point["residual_rms"], float),
-            None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
-            None if point["drift"] is None else as_complex(point["drift"]),
-            phase_lag_target_deg=phase_lag_target_deg,
-            warnings=tuple(point["warnings"]),
-        )
-        for point in accepted
-    )
+    kinds = channels_from(channels)
+    vibrations = tuple(vibration_from(point, kinds, phase_lag_target_deg) for point in accepted)
     return Backbone(
         vibrations,
         specimen,

@@ -4,11 +4,10 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from controller import AmplitudeLaw, PhaseLockedLoop
+from controller import AmplitudeLaw
 from rig.bench import Bench
-from rig.campaigns.backbone import check_loop
-from rig.campaigns.known_plant import KnownPlant
-from rig.campaigns.plan import Plan, Target
+from rig.campaigns.locked import LockedPlan
+from rig.campaigns.plan import Target
 from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
 from rig.sequencer.segments import Segment
@@ -16,7 +15,7 @@ from rig.sequencer.segments import Segment
 __all__ = ["ContinuousBackbonePlan"]
 
 
-class ContinuousBackbonePlan(KnownPlant, Plan):
+class ContinuousBackbonePlan(LockedPlan):
     """Phase-resonant vibrations whose level is ramped up and down; nothing settles.
 
     From ``start_v`` the response's loop takes over and goes to the lowest level, where the lock has ``lock_periods`` to be
@@ -26,10 +25,6 @@ class ContinuousBackbonePlan(KnownPlant, Plan):
 
     kind: Literal["continuous-backbone"] = "continuous-backbone"
     """Kind of campaign."""
-    controller: PhaseLockedLoop
-    """The phase-locked loop, and the loop that holds the response."""
-    repeats: int = Field(1, ge=1, le=1000)
-    """How many times the level goes up and down."""
     ramp_periods: float = Field(10.0, ge=1, le=1e5)
     """Length of the ramp to the lowest level, periods."""
     lock_periods: float = Field(10.0, ge=0, le=1e5)
@@ -42,27 +37,18 @@ class ContinuousBackbonePlan(KnownPlant, Plan):
     """How far the level goes beyond the lowest and highest of ``levels_m``, relative."""
     bandwidth: float = Field(0.08, gt=0, le=1)
     """Half width, in the logarithm of the amplitude, of what is taken together for one level."""
-    harmonics: int = Field(7, ge=1, le=50)
-    """Highest harmonic that is evaluated."""
     accepted_detuning: float = Field(0.03, gt=0, le=1)
     """Largest distance of the momentary frequency from the resonance found, relative; beyond, the lock is lost."""
     accepted_frequency_std: float = Field(1e-3, gt=0, le=1)
     """Largest standard error of the modal frequency, relative, with which a point is accepted."""
     accepted_damping_std: float = Field(0.1, gt=0, le=1)
     """Largest standard error of the damping, relative, with which a point is accepted; up less down is part of it."""
-    on_failure: Literal["skip", "stop"] = "skip"
-    """What follows when the level is out of reach: the way down from there, or a ramp-down and the end."""
 
     @model_validator(mode="after")
     def _in_metres(self) -> Self:
         if self.levels_m is None:
             raise ValueError(f"{self.levels_key}: a continuous backbone goes by the response, allowed is levels_m")
         return self
-
-    @property
-    def law(self) -> PhaseLockedLoop:
-        """The phase-locked loop."""
-        return self.controller
 
     def targets(self) -> tuple[Target, ...]:
         """The levels of every repeat, rising."""
@@ -97,17 +83,12 @@ class ContinuousBackbonePlan(KnownPlant, Plan):
         return tuple(out) if len(out) > len(self.start_segments()) else ()
 
     def check(self, bench: Bench) -> None:
-        """Refuse, before anything moves, what the bench cannot do."""
-        self.check_levels(bench)
-        self.check_plant(bench, self.controller)
-        check_loop(self.controller, self.harmonics, bench)
+        """Refuse, before anything moves, what the bench or the known plant cannot do."""
+        super().check(bench)
+        self._check_slow_flow(bench)
         highest, allowed = max(self.levels) * (1.0 + self.margin), bench.limits.displacement_m
         if self.amplitude_law is AmplitudeLaw.RESPONSE and highest > allowed:
             raise ConfigurationError(
                 f"margin = {self.margin:g}: beyond the highest level it leads to {highest:g} m; the bench {bench.name} "
                 f"allows up to {allowed:g} m"
-            )
-        if bench.specimen.drive_mode_shape is None:
-            raise ConfigurationError(
-                f"specimen.drive_mode_shape of the bench {bench.name} is missing: the slow flow needs it"
             )

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,19 @@ from identification import (
     Channel,
     ContinuousBackbone,
     IdentificationError,
-    PeriodicVibration,
     SlowFlow,
     continuous_backbone,
 )
 from rig.bench import Bench
-from rig.campaigns.backbone_points import std_objection
+from rig.campaigns.alien_force import alien_force
 from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
-from rig.campaigns.evaluate import WHY, as_complex, as_pairs, head, quantisation_warnings
+from rig.campaigns.continuous_ways import WAYS, Way, both_ways, rows_near
+from rig.campaigns.evaluate import channels_from, head, not_evaluated, vibration_from
+from rig.campaigns.objections import alien_objection, first_of, std_objection
 from rig.campaigns.plan import Column, Target
-from rig.campaigns.recorded_flow import AT_VOLTAGE_LIMIT, flagged, recorded_flow
+from rig.campaigns.quality import PURITY_COLUMNS, of_a_vibration
+from rig.campaigns.recorded_flow import recorded_flow
 from rig.campaigns.rounds import Passage
-from rig.sequencer.layout import Outcome, SegmentKind
 
 __all__ = ["CONTINUOUS_BACKBONE_COLUMNS", "continuous_backbones_of", "measure_continuous_backbone"]
 
@@ -35,24 +35,8 @@ CONTINUOUS_BACKBONE_COLUMNS = (
     Column("damping_ratio_std", "+-", "%", ".4f", 196.0),
     Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
     Column("phase_error_deg", "phase error", "deg", ".1f"),
+    *PURITY_COLUMNS,
 )
-
-WAYS = ("up", "down")
-FEWEST_INSTANTS = 16
-
-
-@dataclass(frozen=True)
-class Way:
-    """What is good of one way: instants of the flow (None: nothing), and why there is no more of it."""
-
-    flow: SlowFlow | None
-    why: str
-
-    def covers(self, level_m: float) -> bool:
-        """Whether an amplitude was passed."""
-        if self.flow is None:
-            return False
-        return bool(self.flow.amplitude_m.min() <= level_m <= self.flow.amplitude_m.max())
 
 
 def measure_continuous_backbone(
@@ -70,57 +54,20 @@ def measure_continuous_backbone(
     """
     try:
         flow = recorded_flow(bench, rows, plan.harmonics)
-        ways = _ways(bench, plan, rows, passages, flow, ended)
-        points = _measured(bench, plan, targets, flow, ways)
+        ways = both_ways(bench, plan, rows, passages, flow, ended)
+        points = _measured(bench, plan, targets, flow, ways, rows)
     except (IdentificationError, ArithmeticError) as error:
-        return [_failed(plan, target, f"cannot be evaluated: {error}") for target in targets]
+        return [{**not_evaluated(plan, target, error, settled=False), "direction": "both"} for target in targets]
     return [points[target.number] for target in targets]
 
 
-def _ways(
+def _measured(
     bench: Bench,
     plan: ContinuousBackbonePlan,
-    rows: np.ndarray,
-    passages: Sequence[Passage],
+    targets: Sequence[Target],
     flow: SlowFlow,
-    ended: str,
-) -> dict[str, Way]:
-    """The good instants of the ways up and down: from the time at the lowest level on, and to that at the end."""
-    middle = flow.time_s * bench.sample_rate_hz
-    bad = flagged(bench, rows, flow)
-    detuning = np.abs(flow.frequency_hz / flow.modal_frequency_hz - 1.0)
-    bad["the lock was lost"] = ~(detuning <= plan.accepted_detuning)
-    # An amplitude that is kept low spoils no waveform: what was reached is good.
-    good = ~np.any([at for reason, at in bad.items() if reason != AT_VOLTAGE_LIMIT], axis=0)
-    turn = next(
-        (p.first for p in passages if p.kind is SegmentKind.LEVEL_SWEEP and p.level < plan.levels[0]), rows.size
-    )
-    out = {}
-    for way in WAYS:
-        of_way = [p for p in passages if p.kind is not SegmentKind.RAMP and (p.first < turn) == (way == "up")]
-        inside = np.zeros(middle.size, bool)
-        for passage in of_way:
-            inside |= (middle >= passage.first) & (middle < passage.end)
-        why = _why(of_way, ended) or next((reason for reason, at in bad.items() if np.any(at & inside)), "")
-        keep = inside & good
-        out[way] = Way(
-            flow.select(keep) if np.count_nonzero(keep) >= FEWEST_INSTANTS else None,
-            why or "the level did not come so far",
-        )
-    return out
-
-
-def _why(passages: Sequence[Passage], ended: str) -> str:
-    for passage in passages:
-        if passage.outcome in (Outcome.INTERRUPTED, Outcome.RUNNING):
-            return ended or WHY[Outcome.INTERRUPTED]
-        if passage.outcome is not Outcome.DONE:
-            return WHY[passage.outcome]
-    return "" if passages else ended
-
-
-def _measured(
-    bench: Bench, plan: ContinuousBackbonePlan, targets: Sequence[Target], flow: SlowFlow, ways: Mapping[str, Way]
+    ways: Mapping[str, Way],
+    rows: np.ndarray,
 ) -> dict[int, dict[str, Any]]:
     """Points by number: from both ways, from one, or failed."""
     groups: dict[tuple[str, ...], list[Target]] = {}
@@ -141,10 +88,9 @@ def _measured(
             bandwidth=plan.bandwidth,
             specimen=bench.specimen.name,
         )
-        out |= {
-            target.number: _point(bench, plan, target, found, index, covered, flow, missing)
-            for index, target in enumerate(some)
-        }
+        for index, target in enumerate(some):
+            near = [rows_near(bench, rows, ways[name], target.level) for name in covered]
+            out[target.number] = _point(bench, plan, target, found, index, covered, flow, near, missing)
     return out
 
 
@@ -167,6 +113,7 @@ def _point(
     index: int,
     covered: Sequence[str],
     flow: SlowFlow,
+    pieces: Sequence[np.ndarray],
     missing: str,
 ) -> dict[str, Any]:
     """One level: the mean of both ways, what each gave, and how well it is known."""
@@ -177,8 +124,15 @@ def _point(
     alone = math.sqrt(2.0) if len(covered) == 1 else 1.0
     std = {"modal_frequency_hz": alone * float(mode.modal_frequency_std_hz[index])}
     std["damping_ratio"] = alone * float(mode.damping_ratio_std[index])
-    reason = f"passed on the way {covered[0]} only ({missing})" if missing else ""
-    reason = reason or std_objection(plan, std["modal_frequency_hz"] / frequency, std["damping_ratio"] / abs(damping))
+    stds = (std["modal_frequency_hz"] / frequency, std["damping_ratio"] / abs(damping))
+    alien = alien_force(bench, pieces)
+    reason = first_of(
+        (
+            f"passed on the way {covered[0]} only ({missing})" if missing else "",
+            std_objection(stds[0], plan.accepted_frequency_std, stds[1], plan.accepted_damping_std),
+            alien_objection(alien, plan.accepted_alien_force),
+        )
+    )
     near = np.abs(np.log(flow.amplitude_m / target.level)) < plan.bandwidth
     # The lag itself swings while the level is ramped; this is the one that a settled vibration so far off would have.
     lags = np.degrees(np.arctan((flow.frequency_hz[near] / frequency - 1.0) / abs(damping)))
@@ -197,14 +151,9 @@ def _point(
         "amplitude_m": vibration.amplitude_m,
         "phase_error_deg": float(lags[np.argmax(np.abs(lags))]) if lags.size else None,
         **{name: _one_way(found, WAYS.index(name) if len(covered) == 2 else 0, index) for name in covered},
-        "force_purity": float(mode.force_purity[index]),
-        "response_purity": float(mode.response_purity[index]),
-        "periods": vibration.periods,
+        "alien_force": alien,
         "periods_of_both_ways": found.periods,
-        "harmonics": as_pairs(vibration.harmonics),
-        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
-        "residual_rms": vibration.residual_rms.tolist(),
-        "warnings": [*vibration.warnings, *quantisation_warnings(vibration, bench)],
+        **of_a_vibration(bench, vibration, np.concatenate(pieces), held=False),
     }
 
 
@@ -227,7 +176,7 @@ def continuous_backbones_of(
     drive_mode_shape: float | None,
 ) -> tuple[ContinuousBackbone, ...]:
     """The accepted points of a recording, one continuous backbone per repeat; raises `IdentificationError` without any."""
-    kinds = tuple(Channel(c["name"], c["role"], c["unit"]) for c in channels)
+    kinds = channels_from(channels)
     repeats: dict[int, list[Mapping[str, Any]]] = {}
     for point in points:
         if point["accepted"]:
@@ -243,18 +192,7 @@ def _from_points(
     def both(name: str) -> np.ndarray:
         return np.array([[point[way][name] for point in points] for way in WAYS])
 
-    vibrations = tuple(
-        PeriodicVibration(
-            channels,
-            point["frequency_hz"],
-            as_complex(point["harmonics"]),
-            point["periods"],
-            np.asarray(point["residual_rms"], float),
-            None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
-            warnings=tuple(point["warnings"]),
-        )
-        for point in points
-    )
+    vibrations = tuple(vibration_from(point, channels) for point in points)
     return ContinuousBackbone(
         backbone=Backbone(vibrations, specimen, drive_mode_shape),
         amplitude_m=np.array([point["amplitude_m"] for point in points]),

@@ -1,6 +1,7 @@
 """What the evaluation of all campaigns shares: head of a point, mark of a failed one, periodic vibrations, quality."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, cast
 
@@ -15,13 +16,16 @@ __all__ = [
     "VOLTAGE",
     "as_complex",
     "as_pairs",
+    "channels_from",
     "channels_of",
-    "drift_objection",
     "failed_point",
+    "frequency_scatter",
     "head",
+    "not_evaluated",
     "quantisation_warnings",
     "recorded_vibration",
     "skew_turn",
+    "vibration_from",
     "within_periods",
 ]
 
@@ -57,6 +61,11 @@ def head(plan: Plan, target: Target) -> dict[str, Any]:
     if target.realisation is not None:
         point["realisation"] = target.realisation
     return point
+
+
+def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> dict[str, Any]:
+    """The mark of a point whose rows tell of no vibration."""
+    return {**head(plan, target), "settled": settled, "accepted": False, "reason": f"cannot be evaluated: {error}"}
 
 
 def failed_point(plan: Plan, target: Target, outcome: np.void) -> dict[str, Any]:
@@ -102,21 +111,41 @@ def recorded_vibration(
     return _without_skew(vibration, bench)
 
 
-def drift_objection(bench: Bench, vibration: PeriodicVibration, accepted: float) -> str:
-    """Why a record in which force or drive changes is not accepted; empty where neither does."""
-    for channel, drift in zip(bench.channels, () if vibration.drift is None else np.abs(vibration.drift), strict=False):
-        if channel.role in ("force", "drive") and drift > accepted:
-            return (
-                f"channel {channel.name} changed by {100.0 * drift:.1f} % over the record, "
-                f"accepted up to {100.0 * accepted:g} %"
-            )
-    return ""
+def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:
+    """A recording's table of channels as measurements know them."""
+    return tuple(Channel(row["name"], row["role"], row["unit"]) for row in rows)
+
+
+def vibration_from(
+    point: Mapping[str, Any], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
+) -> PeriodicVibration:
+    """The vibration that a recorded point holds."""
+    return PeriodicVibration(
+        channels,
+        point["frequency_hz"],
+        as_complex(point["harmonics"]),
+        point["periods"],
+        np.asarray(point["residual_rms"], float),
+        None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
+        None if point.get("drift") is None else as_complex(point["drift"]),
+        phase_lag_target_deg=phase_lag_target_deg,
+        warnings=tuple(point["warnings"]),
+    )
 
 
 def within_periods(theta_rad: np.ndarray, periods: int) -> slice:
     """The rows of the first so many periods, and one sample more."""
     turned = np.unwrap(theta_rad.astype(float))
     return slice(0, int(np.searchsorted(turned - turned[0], 2.0 * math.pi * periods)) + 1)
+
+
+def frequency_scatter(theta_rad: np.ndarray) -> float:
+    """Standard deviation of the frequency of single periods, relative to its mean."""
+    turned = np.unwrap(theta_rad.astype(float))
+    turns = (turned - turned[0]) / (2.0 * math.pi)
+    ends = np.interp(np.arange(int(turns[-1]) + 1), turns, np.arange(turns.size))
+    lengths = np.diff(ends)
+    return float(lengths.std() / lengths.mean()) if lengths.size > 1 else 0.0
 
 
 def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[str]:

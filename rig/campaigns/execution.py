@@ -1,12 +1,7 @@
 """Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
 
-import signal
-import threading
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from types import FrameType
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,10 +9,12 @@ import numpy as np
 from controller import LockState
 from rig.bench import Bench
 from rig.campaigns.evaluate import failed_point
+from rig.campaigns.kept_rows import KeptRows
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
 from rig.campaigns.quality import what_was_skipped
-from rig.campaigns.rounds import Passage
+from rig.campaigns.rounds import round_at
+from rig.campaigns.stop_signals import stop_on_signals
 from rig.daq import DAQ
 from rig.errors import RecordingError
 from rig.loop import Loop, LoopStatistics
@@ -96,7 +93,7 @@ class Execution:
         self.reported: dict[int, dict[str, Any]] = {}
         self.next_segment = 0
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
-        self.kept: deque[tuple[int, np.ndarray]] = deque()
+        self.kept = KeptRows(tick.row_dtype)
         self.write_error: RecordingError | None = None
         self.failure: Exception | None = None
 
@@ -110,7 +107,7 @@ class Execution:
         for remark in self.daq.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
-        with _stop_on_signals(self.tick):
+        with stop_on_signals(self.tick):
             for rows in self.loop.run():
                 self._write(self.journal.rows, rows)
                 self._attempt(self._note_changes, rows)
@@ -158,7 +155,7 @@ class Execution:
 
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the point under way, and evaluate the points that are over."""
-        self.kept.append((self.tick.sample - rows.size, rows))
+        self.kept.add(self.tick.sample - rows.size, rows)
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
             if self.in_one_go and int(segments[self.next_segment]["point"]) >= 0:
@@ -176,12 +173,12 @@ class Execution:
                 elif kind in EVALUATED:
                     first, end = self._begin(self.next_segment), int(entry["end_sample"])
                     settling = outcomes[self.next_segment - 1]
-                    rows = self._rows(first, end)
+                    rows = self.kept.take(first, end)
                     point = self.measure(self.bench, self.plan, self.targets[number], rows, settling)
                     point["warnings"] = [*point.get("warnings", []), *self._device_warnings(rows)]
                     self._report({**point, "first_sample": first, "end_sample": end})
             self.next_segment += 1
-        self._drop_rows_before(self._first_needed())
+        self.kept.drop_before(self._first_needed())
 
     def _device_warnings(self, rows: np.ndarray) -> list[str]:
         """A line for each flag that the device had up while the point was recorded."""
@@ -214,53 +211,19 @@ class Execution:
 
     def _finish_round(self, *, cut_short: bool = False) -> bool:
         """Evaluate the points that are measured in one go, once all their segments are over or none will follow."""
-        outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
-        numbers = self.plan.together(int(segments[self.next_segment]["point"]))
-        end = self.next_segment
-        while end < segments.size and int(segments[end]["point"]) in numbers:
-            end += 1
-        codes = [Outcome(int(outcome)) for outcome in outcomes["outcome"][self.next_segment : end]]
-        if codes[0] is Outcome.PENDING:
+        numbers = self.plan.together(int(self.tick.arrays.segments[self.next_segment]["point"]))
+        found = round_at(self.tick, self.next_segment, numbers, cut_short=cut_short)
+        if found is None:
             return False
-        brought_down = int(self.tick.guard["mode"][0]) != GuardMode.ARMED
-        if not cut_short and (Outcome.RUNNING in codes or (Outcome.PENDING in codes and not brought_down)):
-            return False
-        first = int(outcomes[self.next_segment]["first_sample"])
-        passages = []
-        for code, segment, entry in zip(
-            codes, segments[self.next_segment : end], outcomes[self.next_segment : end], strict=True
-        ):
-            if code in (Outcome.PENDING, Outcome.SKIPPED):
-                continue
-            stop = self.tick.sample if code is Outcome.RUNNING else int(entry["end_sample"])
-            kind, level = SegmentKind(int(segment["kind"])), float(segment["level"])
-            passages.append(Passage(kind, level, int(entry["first_sample"]) - first, stop - first, code))
-        rows = self._rows(first, first + passages[-1].end)
-        ended = self._why() if brought_down or cut_short else ""
+        first, passages = found.first_sample, found.passages
+        rows = self.kept.take(first, first + passages[-1].end)
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
+        ended = self._why() if found.ended_early else ""
         for point in self.measure(self.bench, self.plan, targets, rows, passages, ended):
             warnings = [*point.get("warnings", []), *self._device_warnings(rows)]
             self._report({**point, "warnings": warnings, "first_sample": first, "end_sample": first + rows.size})
-        self.next_segment = end
+        self.next_segment = found.end_segment
         return True
-
-    def _rows(self, first: int, end: int) -> np.ndarray:
-        """The rows of a point; those up to its end are kept no longer."""
-        out = np.empty(end - first, self.tick.row_dtype)
-        while self.kept and self.kept[0][0] < end:
-            start, rows = self.kept.popleft()
-            if start + rows.size <= first:
-                continue
-            taken = slice(max(0, first - start), min(rows.size, end - start))
-            out[max(0, start - first) : min(end, start + rows.size) - first] = rows[taken]
-            if start + rows.size > end:
-                self.kept.appendleft((start, rows))
-                break
-        return out
-
-    def _drop_rows_before(self, sample: int) -> None:
-        while self.kept and self.kept[0][0] + self.kept[0][1].size <= sample:
-            self.kept.popleft()
 
     def _report(self, point: dict[str, Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
@@ -320,26 +283,3 @@ def nothing_left(bench: Bench) -> dict[str, Any]:
 def _loop_report(statistics: LoopStatistics, periods: int) -> dict[str, Any]:
     factors = {name: getattr(statistics, name) for name in ("realtime_factor", "end_to_end_factor")}
     return {**asdict(statistics), "periods": periods, **factors}
-
-
-@contextmanager
-def _stop_on_signals(tick: Tick) -> Iterator[None]:
-    """While the rig is driven, Ctrl-C, SIGTERM, a closed terminal and SIGQUIT ask for a ramp-down, and end nothing.
-
-    Without effect outside the main thread, where Python delivers no signals.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def ask(number: int, frame: FrameType | None) -> None:
-        tick.request_stop()
-
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")  # the last two not on every system
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    before = {number: signal.signal(number, ask) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

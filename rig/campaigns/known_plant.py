@@ -1,6 +1,7 @@
 """What a plan may know of the plant, and what is refused on that ground before anything moves."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pydantic import Field
@@ -71,49 +72,70 @@ class KnownPlant(Levels):
     """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the voltage limit are
     refused."""
 
-    def check_plant(self, bench: Bench, law: PhaseLockedLoop) -> None:
-        """Refuse gains that are unstable on the known plant, and levels that it needs too much voltage for."""
+    def check_plant(self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float]) -> None:
+        """Refuse gains that are unstable on the known plant at one of the lags, and levels that need too much voltage on it."""
         if self.plant is None:
             return
         plant = self.plant.model
-        if law.rest_low_pass_rad_s == 0.0:  # the force at rest is not in the linearised loop
-            self._check_stability(plant, law, bench)
-        self._check_reach(plant, law, bench)
-
-    def _check_stability(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
-        if law.detector == "sign":
-            return
-        shape = bench.specimen.drive_mode_shape
         try:
-            loop = control_loop(plant, law, self.amplitude_law, shape)
-            if unstable_poles(loop) == 0:
-                return
+            # The force at rest is not in the linearised loop, and what a sign detector sees cannot be linearised.
+            if law.rest_low_pass_rad_s == 0.0 and law.detector != "sign":
+                self._check_stability(plant, law, lags_deg, bench)
+            self._check_reach(plant, lags_deg, bench)
         except ValueError as error:
             raise ConfigurationError(f"plant: {error}") from None
-        growth = max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0)
-        steadier = (part for part in MORE_DAMPING if unstable_poles(replace(loop, plant=_damped(plant, part))) == 0)
-        enough = next(steadier, None)
+
+    def _check_stability(
+        self, plant: PlantModel, law: PhaseLockedLoop, lags_deg: Sequence[float], bench: Bench
+    ) -> None:
+        shape = bench.specimen.drive_mode_shape
+        loops = [
+            control_loop(plant, law.model_copy(update={"phase_lag_deg": lag}), self.amplitude_law, shape)
+            for lag in lags_deg
+        ]
+        unstable = [loop for loop in loops if unstable_poles(loop) > 0]
+        if not unstable:
+            return
+        growth = [max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0) for loop in unstable]
+        worst = unstable[growth.index(max(growth))]
+        enough = next((part for part in MORE_DAMPING if _steady(unstable, part)), None)
         raise ConfigurationError(
-            f"controller: these gains are unstable on the known plant ([plant], {loop.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
+            f"controller: these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
             f"{100.0 * plant.damping_ratio:.3g} % damping)"
-            + (f", growing at {growth:.3g} 1/s" if growth > 0.0 else "")
+            + _where([loop.lag_deg for loop in unstable])
+            + (f", growing at {max(growth):.3g} 1/s" if max(growth) > 0.0 else "")
             + ("" if enough is None else f"; with {100.0 * enough * plant.damping_ratio:.3g} % they would be stable")
             + "; rig tune finds gains, without [plant] nothing is checked"
         )
 
-    def _check_reach(self, plant: PlantModel, law: PhaseLockedLoop, bench: Bench) -> None:
+    def _check_reach(self, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
         limit = bench.limits.voltage_v
         for index, level in enumerate(self.levels):
-            volts = voltage_for(plant, level, self.level_unit, law.phase_lag_deg)
+            volts, lag = max((voltage_for(plant, level, self.level_unit, lag), lag) for lag in lags_deg)
             if volts > limit:
                 raise ConfigurationError(
-                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: needs {volts:.3g} V on the known plant "
-                    f"([plant], {100.0 * plant.damping_ratio:.3g} % damping), the bench {bench.name} allows {limit:g} V"
+                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: needs {volts:.3g} V{_where([lag])} on "
+                    f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping), "
+                    f"the bench {bench.name} allows {limit:g} V"
                 )
 
 
-def _damped(plant: PlantModel, part: float) -> PlantModel:
-    return plant.at(damping_ratio=part * plant.damping_ratio)
+def _where(lags_deg: Sequence[float]) -> str:
+    """The lags that are meant; nothing where that is resonance alone."""
+    if list(lags_deg) == [-90.0]:
+        return ""
+    if len(lags_deg) > 3:
+        return f" at {len(lags_deg)} lags from {lags_deg[0]:g} to {lags_deg[-1]:g} deg"
+    return f" at a lag of {', '.join(f'{lag:g}' for lag in lags_deg)} deg"
+
+
+def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
+    """Whether all the loops are stable with so many times the damping; not where a lag is none of that plant's."""
+    damped = (replace(loop, plant=loop.plant.at(damping_ratio=part * loop.plant.damping_ratio)) for loop in loops)
+    try:
+        return not any(map(unstable_poles, damped))
+    except ValueError:
+        return False
 
 
 def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> float:

@@ -8,10 +8,18 @@ import numpy as np
 
 from identification import PeriodicVibration
 from rig.bench import Bench
-from rig.campaigns.evaluate import quantisation_warnings
+from rig.campaigns.evaluate import as_pairs, quantisation_warnings
 from rig.campaigns.plan import Column
 
-__all__ = ["PURITY_COLUMNS", "lag_scatter_deg", "purity", "quality_warnings", "what_was_skipped"]
+__all__ = [
+    "PURITY_COLUMNS",
+    "lag_scatter_deg",
+    "of_a_record",
+    "of_a_vibration",
+    "purity",
+    "quality_warnings",
+    "what_was_skipped",
+]
 
 PURITY_COLUMNS = (
     Column("force_purity", "force purity", "%", ".2f", 100.0),
@@ -80,6 +88,29 @@ def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: np.ndarra
             f"fundamental, trusted up to {100.0 * BIASED_DAMPING:g} %"
         )
     return out
+
+
+def of_a_vibration(bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True) -> dict[str, Any]:
+    """What every point holds of its vibration beside the numbers of its kind."""
+    return {
+        "voltage_v": float(np.abs(rows["command_v"]).mean()),
+        **purity(vibration),
+        "periods": vibration.periods,
+        "harmonics": as_pairs(vibration.harmonics),
+        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
+        "residual_rms": vibration.residual_rms.tolist(),
+        "drift": None if vibration.drift is None else as_pairs(vibration.drift),
+        "warnings": quality_warnings(bench, vibration, rows, held),
+    }
+
+
+def of_a_record(bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, settling: np.void) -> dict[str, Any]:
+    """The same of one that was settled and recorded; ``settling`` is the outcome record of its settle segment."""
+    return {
+        **of_a_vibration(bench, vibration, rows),
+        "settle_periods": float(settling["periods"]),
+        "amplitude_drift": float(settling["drift"]),
+    }
 
 
 def what_was_skipped(points: Iterable[Mapping[str, Any]], planned: int) -> str:

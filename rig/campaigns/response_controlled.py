@@ -5,10 +5,10 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from controller import AmplitudeLaw, PhaseLockedLoop
+from controller import AmplitudeLaw
 from rig.bench import Bench
-from rig.campaigns.levels import Levels
-from rig.campaigns.plan import Plan, Target
+from rig.campaigns.locked import SettledPlan
+from rig.campaigns.plan import Target
 from rig.errors import ConfigurationError
 from rig.sequencer.layout import OnFailure, SegmentKind
 from rig.sequencer.segments import Segment, SettleRule
@@ -18,7 +18,7 @@ __all__ = ["ResponseControlledPlan"]
 LEAST_SINE_LAG_DEG = 5.0
 
 
-class ResponseControlledPlan(Levels, Plan):
+class ResponseControlledPlan(SettledPlan):
     """Vibrations at given displacements of the drive point and given phase lags, from below resonance to above.
 
     Where the displacement is held, a nonlinear structure answers as a linear one: no folds, no jumps, one frequency at each
@@ -27,36 +27,20 @@ class ResponseControlledPlan(Levels, Plan):
 
     kind: Literal["response-controlled"] = "response-controlled"
     """Kind of campaign."""
-    controller: PhaseLockedLoop
-    """The phase-locked loop, and the loop that holds the displacement."""
     phase_lags_deg: tuple[float, ...]
     """Lags of the drive-point acceleration behind the force, deg; -90 is phase resonance."""
     direction: Literal["up", "down", "up-down"] = "up"
     """Order of the lags at each level; up: rising frequency."""
-    repeats: int = Field(1, ge=1, le=1000)
-    """How many times all levels are passed through."""
     level_ramp_periods: float = Field(40.0, ge=1, le=1e5)
     """Length of the ramp from one level to the next, back to the first lag, periods."""
     ramp_periods: float = Field(10.0, ge=1, le=1e5)
     """Length of the ramp from one lag to the next, periods."""
     record_periods: int = Field(20, ge=4, le=1_000_000)
     """Periods that are recorded and evaluated at each point."""
-    harmonics: int = Field(7, ge=1, le=50)
-    """Highest harmonic that is evaluated."""
     settle: SettleRule = SettleRule(settled_periods=10)
     """When a point counts as settled: displacement, force and lag."""
     accepted_level_error: float = Field(0.01, gt=0, le=1)
     """Largest deviation of the recorded displacement from its level, relative, with which a point is accepted."""
-    accepted_phase_error_deg: float = Field(3.0, gt=0, le=180)
-    """Largest phase error of the recorded fundamental with which a point is accepted, deg."""
-    accepted_frequency_scatter: float = Field(1e-3, gt=0, le=1)
-    """Largest scatter of the frequency from period to period, relative, with which a point is accepted."""
-    accepted_drift: float = Field(0.05, gt=0, le=1)
-    """Largest change of the fundamental of force or drive over a record, relative, with which a point is accepted."""
-    on_failure: Literal["skip", "stop"] = "skip"
-    """What follows when a point does not settle, is disturbed or is out of reach: the next point, or a ramp-down."""
-    on_lost_lock: Literal["skip", "stop"] = "stop"
-    """What follows when a lock is lost at a held level: ``stop`` trips, ``skip`` seeks it again at the next point."""
 
     @model_validator(mode="after")
     def _lags_and_levels_make_sense(self) -> Self:
@@ -73,14 +57,9 @@ class ResponseControlledPlan(Levels, Plan):
         return self
 
     @property
-    def law(self) -> PhaseLockedLoop:
-        """The phase-locked loop."""
-        return self.controller
-
-    @property
-    def settle_rule(self) -> SettleRule:
-        """When a point counts as settled."""
-        return self.settle
+    def asked_lags_deg(self) -> tuple[float, ...]:
+        """Every lag that is held, deg."""
+        return tuple(sorted(self.phase_lags_deg))
 
     def targets(self) -> tuple[Target, ...]:
         """All points: at each level, the lowest first, all lags; in both directions one way after the other."""
@@ -123,28 +102,12 @@ class ResponseControlledPlan(Levels, Plan):
         return tuple(out)
 
     def check(self, bench: Bench) -> None:
-        """Refuse, before anything moves, what the bench cannot do."""
-        self.check_levels(bench)
-        window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
-        linear = bench.specimen.linear_frequency_hz
-        if not window[0] < linear < window[1]:
-            raise ConfigurationError(
-                f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
-                f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
-            )
-        if window[0] < allowed[0] or window[1] > allowed[1]:
-            raise ConfigurationError(
-                f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"
-            )
-        highest = int(bench.sample_rate_hz / window[1] / 2.0) - 2
-        if self.harmonics > highest:
-            raise ConfigurationError(
-                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s"
-            )
+        """Refuse, before anything moves, what the bench or the known plant cannot do."""
         if self.controller.detector == "sign":
             raise ConfigurationError(
                 'controller.detector = "sign": allowed is two-phase or adaptive, at lags other than -90'
             )
+        super().check(bench)
 
     def _ramp(self, at: Target | None, target: Target, number: int) -> Segment:
         """The ramp to a point: along the lags, or to another level."""

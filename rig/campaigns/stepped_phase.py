@@ -6,13 +6,10 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from controller import PhaseLockedLoop
-from rig.bench import Bench
-from rig.campaigns.known_plant import KnownPlant
-from rig.campaigns.plan import Plan, Target
-from rig.errors import ConfigurationError
+from rig.campaigns.locked import SettledPlan
+from rig.campaigns.plan import Target
 from rig.sequencer.layout import OnFailure, SegmentKind
-from rig.sequencer.segments import Segment, SettleRule
+from rig.sequencer.segments import Segment
 
 __all__ = ["SteppedPhasePlan"]
 
@@ -20,7 +17,7 @@ LAGS_DEG = (-175.0, -5.0)  # between, the force feeds the vibration, and a lag t
 MOST_LAGS = 10_000
 
 
-class SteppedPhasePlan(KnownPlant, Plan):
+class SteppedPhasePlan(SettledPlan):
     """Frequency responses at constant level, stepped through the phase instead of the frequency.
 
     The frequency follows the phase lag that the plan asks for, so that over a fold of the response, where one frequency
@@ -29,8 +26,6 @@ class SteppedPhasePlan(KnownPlant, Plan):
 
     kind: Literal["stepped-phase"] = "stepped-phase"
     """Kind of campaign."""
-    controller: PhaseLockedLoop
-    """The phase-locked loop, and the loops that hold levels in newtons or metres."""
     phase_lags_deg: tuple[float, ...] | None = Field(None, min_length=1)
     """Lags of the drive-point acceleration behind the force, deg; these or ``start_deg`` and ``stop_deg``."""
     start_deg: float | None = None
@@ -41,8 +36,6 @@ class SteppedPhasePlan(KnownPlant, Plan):
     """Distance of neighbouring lags, deg; the last step may be shorter."""
     direction: Literal["up", "down", "up-down"] = "up"
     """Whether the lag rises, falls, or rises and falls."""
-    repeats: int = Field(1, ge=1, le=1000)
-    """How many times each level is passed through."""
     approach_deg: float | None = None
     """Lag at which a level is reached before the first lag is stepped to, deg; the first lag if not given."""
     approach_periods: float = Field(40.0, ge=1, le=1e5)
@@ -51,25 +44,8 @@ class SteppedPhasePlan(KnownPlant, Plan):
     """Length of the ramp from one lag to the next, periods."""
     record_periods: int = Field(20, ge=4, le=1_000_000)
     """Periods that are recorded and evaluated at each point."""
-    harmonics: int = Field(7, ge=1, le=50)
-    """Highest harmonic that is evaluated."""
-    settle: SettleRule = SettleRule()
-    """When a point counts as settled."""
     accepted_level_error: float = Field(0.01, gt=0, le=1)
     """Largest relative error of the held force or response over the record with which a point is accepted."""
-    accepted_phase_error_deg: float = Field(3.0, gt=0, le=180)
-    """Largest phase error of the recorded fundamental with which a point is accepted, deg."""
-    accepted_frequency_scatter: float = Field(1e-3, gt=0, le=1)
-    """Largest scatter of the frequency from period to period, relative, with which a point is accepted."""
-    accepted_alien_force: float = Field(0.1, gt=0, le=1)
-    """Largest part of the force's RMS that is none of the evaluated harmonics with which a point is accepted: noise, another
-    mode, a loop that swings."""
-    accepted_drift: float = Field(0.05, gt=0, le=1)
-    """Largest change of the fundamental of force or drive over a record, relative, with which a point is accepted."""
-    on_failure: Literal["skip", "stop"] = "skip"
-    """What follows when a point does not settle, is disturbed or is out of reach: the next lag, or a ramp-down."""
-    on_lost_lock: Literal["skip", "stop"] = "stop"
-    """What follows when a lock is lost at a held lag: ``stop`` trips, ``skip`` seeks it again at the next lag."""
 
     @model_validator(mode="after")
     def _lags_make_sense(self) -> Self:
@@ -101,14 +77,9 @@ class SteppedPhasePlan(KnownPlant, Plan):
         return self
 
     @property
-    def law(self) -> PhaseLockedLoop:
-        """The phase-locked loop."""
-        return self.controller
-
-    @property
-    def settle_rule(self) -> SettleRule:
-        """When a point counts as settled."""
-        return self.settle
+    def asked_lags_deg(self) -> tuple[float, ...]:
+        """Every lag that is held, deg."""
+        return self.lags if self.approach_deg is None else tuple(sorted({*self.lags, self.approach_deg}))
 
     @property
     def lags(self) -> tuple[float, ...]:
@@ -164,27 +135,6 @@ class SteppedPhasePlan(KnownPlant, Plan):
             ]
             at = target.number
         return tuple(out)
-
-    def check(self, bench: Bench) -> None:
-        """Refuse, before anything moves, what the bench cannot do."""
-        self.check_levels(bench)
-        self.check_plant(bench, self.controller)
-        window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
-        linear = bench.specimen.linear_frequency_hz
-        if not window[0] < linear < window[1]:
-            raise ConfigurationError(
-                f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
-                f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
-            )
-        highest = int(bench.sample_rate_hz / window[1] / 2.0) - 2
-        if self.harmonics > highest:
-            raise ConfigurationError(
-                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s"
-            )
-        if window[0] < allowed[0] or window[1] > allowed[1]:
-            raise ConfigurationError(
-                f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"
-            )
 
     def _approach(self, target: Target, origin: Target | None) -> list[Segment]:
         """From whatever was before to the target's level, at ``approach_deg``, then at the lag of the ``origin``."""

@@ -5,23 +5,19 @@ from typing import Any
 
 import numpy as np
 
-from controller import AmplitudeLaw
-from identification import FrequencyResponse, IdentificationError, PeriodicVibration
+from identification import FrequencyResponse, IdentificationError
 from identification.frequency_responses import Controlled
 from rig.bench import Bench
-from rig.campaigns.evaluate import (
-    as_complex,
-    as_pairs,
-    drift_objection,
-    head,
-    recorded_vibration,
-    within_periods,
-)
+from rig.campaigns.alien_force import alien_force
+from rig.campaigns.evaluate import as_complex, head, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.objections import alien_objection, drift_objection, first_of, level_error, level_objection
 from rig.campaigns.plan import Column, Target
-from rig.campaigns.quality import PURITY_COLUMNS, purity, quality_warnings
+from rig.campaigns.quality import PURITY_COLUMNS, of_a_record
 from rig.campaigns.stepped_sine import SteppedSinePlan
 
-__all__ = ["STEPPED_SINE_COLUMNS", "frequency_responses_of", "level_objection", "measure_stepped_sine_point"]
+__all__ = ["STEPPED_SINE_COLUMNS", "frequency_responses_of", "measure_stepped_sine_point"]
+
+TRUSTED_ALIEN_FORCE = 0.1  # what no lock holds is warned of, where plans under a lock accept no more
 
 CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
 """What was held, by the unit of the levels."""
@@ -39,53 +35,36 @@ def measure_stepped_sine_point(
     bench: Bench, plan: SteppedSinePlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> dict[str, Any]:
     """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment."""
-    point = head(plan, target)
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
         vibration = recorded_vibration(bench, rows, plan.harmonics)
     except (IdentificationError, ArithmeticError) as error:
-        return {**point, "settled": True, "accepted": False, "reason": f"cannot be evaluated: {error}"}
-    level_error = _level_error(plan, target, vibration)
-    reason = drift_objection(bench, vibration, plan.accepted_drift)
-    if level_error is not None and abs(level_error) > plan.accepted_level_error:
-        held = "displacement" if plan.amplitude_law is AmplitudeLaw.RESPONSE else "force"
-        reason = level_objection(held, level_error, plan.accepted_level_error)
+        return not_evaluated(plan, target, error, settled=True)
+    harmonics = np.abs(vibration.harmonics[bench.index_of("force"), 1:])
+    force_rms_n = float(np.sqrt(0.5 * np.sum(harmonics**2)))
+    missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
+    reason = first_of(
+        (
+            level_objection(plan.amplitude_law, missed, plan.accepted_level_error),
+            drift_objection(bench, vibration, plan.accepted_drift),
+        )
+    )
+    alien = alien_force(bench, [rows])
+    point = of_a_record(bench, vibration, rows, settling)
+    point["warnings"] += filter(None, [alien_objection(alien, TRUSTED_ALIEN_FORCE)])
     return {
-        **point,
+        **head(plan, target),
         "settled": True,
         "accepted": not reason,
         "reason": reason,
         "frequency_hz": vibration.frequency_hz,
         "force_n": vibration.force_n,
         "amplitude_m": vibration.amplitude_m,
-        "level_error": level_error,
+        "level_error": missed,
         "phase_lag_deg": vibration.phase_lag_deg,
-        "voltage_v": float(np.abs(rows["command_v"]).mean()),
-        **purity(vibration),
-        "periods": vibration.periods,
-        "settle_periods": float(settling["periods"]),
-        "amplitude_drift": float(settling["drift"]),
-        "harmonics": as_pairs(vibration.harmonics),
-        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
-        "residual_rms": vibration.residual_rms.tolist(),
-        "warnings": quality_warnings(bench, vibration, rows),
+        "alien_force": alien,
+        **point,
     }
-
-
-def _level_error(plan: SteppedSinePlan, target: Target, vibration: PeriodicVibration) -> float | None:
-    """Relative deviation of what was held from its level; None where nothing was."""
-    harmonics = np.abs(vibration.harmonics[[channel.role for channel in vibration.channels].index("force"), 1:])
-    held = {
-        AmplitudeLaw.FORCE: vibration.force_n,
-        AmplitudeLaw.FORCE_RMS: float(np.sqrt(0.5 * np.sum(harmonics**2))),
-        AmplitudeLaw.RESPONSE: vibration.amplitude_m,
-    }
-    return held[plan.amplitude_law] / target.level - 1.0 if plan.amplitude_law in held else None
-
-
-def level_objection(held: str, error: float, accepted: float) -> str:
-    """Why a point is not accepted whose force or displacement is not what was asked for."""
-    return f"the {held} is {100.0 * error:+.2f} % off its level, accepted up to {100.0 * accepted:g} %"
 
 
 def frequency_responses_of(

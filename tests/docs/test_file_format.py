@@ -17,10 +17,11 @@ from tests.docs.pages import ROOT
 SMALL = {"bench": "magnet-beam", "levels_v": [0.4]}
 PLANS = {
     "backbone": load_plan("magnet-beam/backbone").model_dump(mode="json") | {"levels_v": [0.8], "record_periods": 8},
-    "continuous-backbone": load_plan("magnet-beam/continuous-backbone").model_dump(mode="json"),
     "short points": load_plan("magnet-beam/backbone-short").model_dump(mode="json") | {"levels_m": [0.0005]},
     "stepped-phase": load_plan("magnet-beam/stepped-phase-fast").model_dump(mode="json")
     | {"levels_n": [0.25], "start_deg": -100.0, "stop_deg": -90.0},
+    "continuous-backbone": load_plan("magnet-beam/continuous-backbone").model_dump(mode="json")
+    | {"levels_m": [2e-4, 4e-4], "sweep_periods": 40.0},
     "response-controlled": load_plan("magnet-beam/response-controlled").model_dump(mode="json")
     | {"levels_m": [5e-4], "phase_lags_deg": [-90.0]},
     "stepped-sine": SMALL | {"kind": "stepped-sine", "frequencies_hz": [23.0]},

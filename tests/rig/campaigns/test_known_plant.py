@@ -5,7 +5,8 @@ import math
 import pytest
 
 from rig.bench import load_bench
-from rig.campaigns.plans import plan_from
+from rig.campaigns.known_plant import voltage_for
+from rig.campaigns.plans import load_plan, plan_from
 from rig.errors import ConfigurationError
 from tests.controller.tuning.rigs import plant_of
 
@@ -83,6 +84,85 @@ def test_levels_beyond_the_voltage_limit_are_refused_with_the_voltage(levels, sa
     else:
         with pytest.raises(ConfigurationError, match=said):
             plan.check(bench)
+
+
+def phases_for(kind, lags, *, controller=None, name="friction-beam", **levels):
+    """A shipped plan that steps the phase, with other lags and the rig's own plant."""
+    table = load_plan(f"{name}/{kind}").model_dump(mode="json", exclude_none=True)
+    for key in ("start_deg", "stop_deg"):
+        table.pop(key, None)
+    table["controller"] |= {"rest_low_pass_rad_s": 0.0, **(controller or {})}
+    table |= {"phase_lags_deg": lags, "plant": plant_of(name).to_dict(), **levels}
+    return plan_from(table, "plan"), load_bench(name)
+
+
+LOGARITHMIC = {"force_loop": "logarithmic", "force_proportional": 0.3, "force_integral_per_s": 2.0}
+
+
+def test_a_phase_that_a_force_loop_cannot_hold_is_refused_with_its_lag_and_the_others_pass():
+    plan, bench = phases_for("stepped-phase-fast", [-90.0, -60.0], controller=LOGARITHMIC, levels_n=[0.1])
+    plan.check(bench)
+    plan, bench = phases_for("stepped-phase-fast", [-120.0, -90.0], controller=LOGARITHMIC, levels_n=[0.1])
+    with pytest.raises(ConfigurationError, match=r"unstable .* at a lag of -120 deg, growing at 3\d\.\d 1/s; with"):
+        plan.check(bench)
+    many = phases_for("stepped-phase-fast", [-160.0, -150.0, -140.0, -130.0, -90.0], controller=LOGARITHMIC)
+    with pytest.raises(ConfigurationError, match="at 4 lags from -160 to -130 deg"):
+        many[0].check(many[1])
+
+
+def test_the_phases_that_the_papers_force_loop_loses_on_the_friction_beam_are_refused():
+    plan, bench = phases_for("stepped-phase", [-150.0, -140.0, -130.0, -100.0, -60.0, -30.0])
+    with pytest.raises(ConfigurationError, match="at a lag of -150, -140, -130 deg"):
+        plan.check(bench)
+    plan, bench = phases_for("stepped-phase", [-100.0, -60.0, -30.0])
+    plan.check(bench)
+
+
+def test_the_lag_at_which_levels_are_reached_is_checked_too():
+    plan, bench = phases_for("stepped-phase-fast", [-90.0], controller=LOGARITHMIC, levels_n=[0.1], approach_deg=-150.0)
+    with pytest.raises(ConfigurationError, match="at a lag of -150 deg"):
+        plan.check(bench)
+
+
+def test_the_loop_of_a_held_response_is_checked_at_every_lag():
+    plan, bench = phases_for("response-controlled", [-150.0, -90.0], levels_m=[1e-5])
+    plan.check(bench)
+    quick = {"response_integral_per_s": 3000.0}
+    plan, bench = phases_for("response-controlled", [-150.0, -90.0], controller=quick, levels_m=[1e-5])
+    with pytest.raises(ConfigurationError, match="unstable on the known plant"):
+        plan.check(bench)
+
+
+def test_the_voltage_that_a_level_needs_is_that_of_the_lag_that_takes_most():
+    bench, plant = load_bench("friction-beam"), plant_of("friction-beam")
+    lags = [-150.0, -90.0, -60.0]
+    volts = [voltage_for(plant, 9e-4, "m", lag) for lag in lags]
+    at = lags[volts.index(max(volts))]
+    assert at != -90.0
+    limit = 0.5 * (max(volts) + voltage_for(plant, 9e-4, "m", -90.0))
+    bench = bench.model_copy(update={"limits": bench.limits.model_copy(update={"voltage_v": limit})})
+    phases_for("response-controlled", [-90.0], levels_m=[9e-4])[0].check(bench)
+    with pytest.raises(
+        ConfigurationError, match=rf"levels_m\[0\] = .* needs [\d.]+ V at a lag of {at:g} deg on the known"
+    ):
+        phases_for("response-controlled", lags, levels_m=[9e-4])[0].check(bench)
+
+
+@pytest.mark.parametrize("kind", ["backbone", "stepped-phase-fast", "response-controlled", "continuous-backbone"])
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"frequency_window_hz": [24.6, 26.0], "centre_frequency_hz": 25.0}, "linear_frequency_hz = 24"),
+        ({"frequency_window_hz": [0.1, 90.0]}, r"the bench magnet-beam allows \["),
+        ({"harmonics": 50, "frequency_window_hz": [21.0, 60.0]}, r"harmonics = 50: allowed is up to 39"),
+    ],
+)
+def test_every_campaign_under_a_lock_checks_window_and_harmonics(kind, change, said):
+    table = load_plan(f"magnet-beam/{kind}").model_dump(mode="json", exclude_none=True)
+    own = {key: value for key, value in change.items() if key == "harmonics"}
+    table["controller"] |= {key: value for key, value in change.items() if key != "harmonics"}
+    with pytest.raises(ConfigurationError, match=said):
+        plan_from(table | own, "plan").check(load_bench("magnet-beam"))
 
 
 def test_a_plant_with_a_wrong_key_is_named():

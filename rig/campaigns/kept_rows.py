@@ -1,0 +1,38 @@
+"""The rows of the points under way: kept until their point is over, and no longer."""
+
+from collections import deque
+
+import numpy as np
+
+__all__ = ["KeptRows"]
+
+
+class KeptRows:
+    """Chunks of rows in their order, by the number of their first sample."""
+
+    def __init__(self, dtype: np.dtype) -> None:
+        self._dtype = dtype
+        self._chunks: deque[tuple[int, np.ndarray]] = deque()
+
+    def add(self, first: int, rows: np.ndarray) -> None:
+        """Keep a chunk that begins with sample ``first``."""
+        self._chunks.append((first, rows))
+
+    def take(self, first: int, end: int) -> np.ndarray:
+        """The rows of a point; those up to its end are kept no longer."""
+        out = np.empty(end - first, self._dtype)
+        while self._chunks and self._chunks[0][0] < end:
+            start, rows = self._chunks.popleft()
+            if start + rows.size <= first:
+                continue
+            taken = slice(max(0, first - start), min(rows.size, end - start))
+            out[max(0, start - first) : min(end, start + rows.size) - first] = rows[taken]
+            if start + rows.size > end:
+                self._chunks.appendleft((start, rows))
+                break
+        return out
+
+    def drop_before(self, sample: int) -> None:
+        """Keep no chunk that ends before a sample."""
+        while self._chunks and self._chunks[0][0] + self._chunks[0][1].size <= sample:
+            self._chunks.popleft()

@@ -1,0 +1,92 @@
+"""Why a recorded point is not accepted: one line each, empty where there is nothing to object to."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from controller import AmplitudeLaw
+from identification import PeriodicVibration
+from rig.bench import Bench
+
+__all__ = [
+    "alien_objection",
+    "drift_objection",
+    "first_of",
+    "hunting_objection",
+    "level_error",
+    "level_objection",
+    "phase_objection",
+    "std_objection",
+]
+
+
+def first_of(objections: Iterable[str]) -> str:
+    """The first that is not empty."""
+    return next((objection for objection in objections if objection), "")
+
+
+def phase_objection(error_deg: float, accepted_deg: float) -> str:
+    """That the recorded fundamental is too far from the wanted phase."""
+    if abs(error_deg) <= accepted_deg:
+        return ""
+    return f"phase error {error_deg:.2f} deg, accepted up to {accepted_deg:g} deg"
+
+
+def level_error(law: AmplitudeLaw, level: float, vibration: PeriodicVibration, force_rms_n: float) -> float | None:
+    """Relative error of what was held over the record; None where the level is a voltage, which nothing holds."""
+    measured = {
+        AmplitudeLaw.FORCE: vibration.force_n,
+        AmplitudeLaw.FORCE_RMS: force_rms_n,
+        AmplitudeLaw.RESPONSE: vibration.amplitude_m,
+    }.get(law)
+    return None if measured is None else float(measured / level - 1.0)
+
+
+def level_objection(law: AmplitudeLaw, error: float | None, accepted: float) -> str:
+    """That force or displacement is not what was asked for."""
+    if error is None or abs(error) <= accepted:
+        return ""
+    held = "displacement" if law is AmplitudeLaw.RESPONSE else "force"
+    return f"the {held} is {100.0 * error:+.2f} % off its level, accepted up to {100.0 * accepted:g} %"
+
+
+def alien_objection(alien: float, accepted: float) -> str:
+    """That much of the force is neither a harmonic nor noise; nothing where that is not known (NaN)."""
+    if not alien > accepted:
+        return ""
+    return (
+        f"{100.0 * alien:.1f} % of the force's RMS are no harmonics, accepted up to {100.0 * accepted:g} %: "
+        "another mode, or a loop that swings"
+    )
+
+
+def hunting_objection(scatter: float, accepted: float) -> str:
+    """That the frequency scatters from period to period."""
+    if scatter <= accepted:
+        return ""
+    return (
+        f"the loop hunts: the frequency scatters by {100.0 * scatter:.2f} % from period to period, "
+        f"accepted up to {100.0 * accepted:g} %"
+    )
+
+
+def drift_objection(bench: Bench, vibration: PeriodicVibration, accepted: float) -> str:
+    """That force or drive changes over the record."""
+    for channel, drift in zip(bench.channels, () if vibration.drift is None else np.abs(vibration.drift), strict=False):
+        if channel.role in ("force", "drive") and drift > accepted:
+            return (
+                f"channel {channel.name} changed by {100.0 * drift:.1f} % over the record, "
+                f"accepted up to {100.0 * accepted:g} %"
+            )
+    return ""
+
+
+def std_objection(frequency: float, accepted_frequency: float, damping: float, accepted_damping: float) -> str:
+    """That the relative standard errors of modal frequency or damping are too large."""
+    for name, std, accepted in (
+        ("modal frequency", frequency, accepted_frequency),
+        ("damping", damping, accepted_damping),
+    ):
+        if not std <= accepted:
+            return f"standard error of the {name} {100.0 * std:.2g} %, accepted up to {100.0 * accepted:g} %"
+    return ""

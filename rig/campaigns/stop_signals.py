@@ -1,0 +1,34 @@
+"""Signals of the operating system while a rig is driven: they ask for a ramp-down, and end nothing."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from rig.tick.tick import Tick
+
+__all__ = ["stop_on_signals"]
+
+
+@contextmanager
+def stop_on_signals(tick: Tick) -> Iterator[None]:
+    """While the rig is driven, Ctrl-C, SIGTERM, a closed terminal and SIGQUIT ask for a ramp-down, and end nothing.
+
+    Without effect outside the main thread, where Python delivers no signals.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        tick.request_stop()
+
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")  # the last two not on every system
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    before = {number: signal.signal(number, ask) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
