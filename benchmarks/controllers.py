@@ -61,6 +61,13 @@ def controllers(bench: Bench, plant: PlantModel) -> dict[str, dict[str, Any]]:
     closed, exact = hippold_gains(plant, corner).law, exact_phase_law([plant], corner)
     scheduled, response = exact_scheduled_law([plant], corner), complex_response_law(plant, corner)
     pole = plant.pole_offset_rad_s(-90.0)
+    gain = complex(plant.acceleration_per_v(1j * plant.lock_frequency_rad_s(-90.0)))
+    complex_response = adaptive | {
+        "frequency_law": "frequency-error",
+        "frequency_integral_per_s": corner * FREQUENCY_SHARE[bench.name],
+        "response_integral_per_s": response.integral_per_s,
+        "plant_pole_rad_s": [pole.real, pole.imag],
+    }
     return {
         "preset B": paper.model_dump(),
         "Hippold, w0/5": adaptive | {"k1": closed.proportional_per_s, "k2": closed.integral_per_s2},
@@ -71,13 +78,9 @@ def controllers(bench: Bench, plant: PlantModel) -> dict[str, dict[str, Any]]:
             "frequency_proportional": scheduled.proportional,
             "frequency_integral_per_s": scheduled.integral_per_s,
         },
-        "frequency error, complex response": adaptive
-        | {
-            "frequency_law": "frequency-error",
-            "frequency_integral_per_s": corner * FREQUENCY_SHARE[bench.name],
-            "response_integral_per_s": response.integral_per_s,
-            "plant_pole_rad_s": [pole.real, pole.imag],
-        },
+        "frequency error, complex response": complex_response,
+        "the same by the force at rest": complex_response
+        | {"rest_low_pass_rad_s": 2.0 * corner, "plant_gain_per_v": [gain.real, gain.imag]},
     }
 
 

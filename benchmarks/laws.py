@@ -28,9 +28,23 @@ ROUNDS = 11
 SAMPLES = 40_000
 SIMPLEST = "two-phase, phase PI, voltage (the paper's)"
 SETTINGS: dict[str, dict[str, Any]] = {
-    # bench: preset, voltage to begin with, response level (m), force level (N), pole of the plant (rad/s), share of w_LP
-    "magnet-beam": {"start_v": 0.3, "level_m": 1e-3, "level_n": 0.25, "pole": (-11.5, 3.9), "share": 8.0},
-    "friction-beam": {"start_v": 0.3, "level_m": 1e-4, "level_n": 5.0, "pole": (-5.8, -24.3), "share": 12.0},
+    # bench: voltage to begin with, response level (m), force level (N), pole (rad/s) and gain of the plant, share of w_LP
+    "magnet-beam": {
+        "start_v": 0.3,
+        "level_m": 1e-3,
+        "level_n": 0.25,
+        "pole": (-11.5, 3.9),
+        "share": 8.0,
+        "gain": (-5.42, 14.8),
+    },
+    "friction-beam": {
+        "start_v": 0.3,
+        "level_m": 1e-4,
+        "level_n": 5.0,
+        "pole": (-5.8, -24.3),
+        "share": 12.0,
+        "gain": (196.0, 31.0),
+    },
 }
 
 
@@ -49,6 +63,7 @@ def laws(bench: Bench) -> dict[str, tuple[PhaseLockedLoop, AmplitudeLaw, float]]
     error = {"frequency_law": "frequency-error", "frequency_integral_per_s": corner / facts["share"]}
     response = {"response_integral_per_s": corner / 4.0, "plant_pole_rad_s": facts["pole"]}
     through = {"force_loop": "through-response", "reference_integral_per_s": corner / 12.0}
+    rest = {"rest_low_pass_rad_s": 2.0 * corner, "plant_gain_per_v": facts["gain"]}
     volts = (AmplitudeLaw.VOLTAGE, facts["start_v"])
     return {
         SIMPLEST: (paper, *volts),
@@ -64,8 +79,8 @@ def laws(bench: Bench) -> dict[str, tuple[PhaseLockedLoop, AmplitudeLaw, float]]
             AmplitudeLaw.FORCE,
             facts["level_n"],
         ),
-        "all of it, the force's RMS held, H = 12": (
-            PhaseLockedLoop(**adaptive, **error, **response, **through, harmonics_followed=12),
+        "all of it: by the force at rest, RMS held, H = 12": (
+            PhaseLockedLoop(**adaptive, **error, **response, **through, **rest, harmonics_followed=12),
             AmplitudeLaw.FORCE_RMS,
             facts["level_n"] / math.sqrt(2.0),
         ),
