@@ -40,10 +40,12 @@ def _everything() -> dict[str, Any]:
 
 
 def _print_everything(everything: dict[str, Any]) -> None:
-    for heading in ("benches", "plans", "specimens"):
+    headings = ("benches", "plans", "specimens")
+    width = max(len(row["name"]) for heading in headings for row in everything[heading])
+    for heading in headings:
         print(f"{heading}:")
         for row in everything[heading]:
-            print(f"  {row['name']:34} {' '.join(row['description'].split())}")
+            print(f"  {row['name']:{width}}  {' '.join(row['description'].split())}")
     print(f"drivers:\n  {', '.join(everything['drivers'])}")
     print("parts of a virtual rig (rig list NAME for the keys of one):")
     for part in everything["parts"]:

@@ -137,7 +137,7 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
     seen_m = truth.amplitude_m / np.hypot(1.0, virtual.sensors[0].high_pass_hz / truth.frequency_hz)
     rows = [slice(11 * level, 11 * level + 11) for level in range(len(levels))]
     hits: dict[str, list[np.ndarray]] = {"modal_frequency_hz": [], "damping_ratio": []}
-    for seed in range(1, 16):
+    for seed in range(1, 11):
         backbone = measured(name, seed, converter=steps)
         mode = nonlinear_mode(backbone, seed=seed)  # the drive point alone, as harmonic balance has its amplitude
         for quantity, hit in hits.items():
@@ -146,7 +146,7 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
             at = [np.interp(a, seen_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)]
             hit.append((low <= at) & (at <= high))
     for quantity, hit in hits.items():
-        # 50 seeds cover 0.905 (magnet, frequency) to 0.992; the mean over so few runs scatters by 0.02
+        # 50 seeds cover 0.905 (magnet, frequency) to 0.992; the mean over so few runs scatters by 0.025
         assert 0.84 <= np.mean(hit) <= 0.998, (quantity, np.mean(hit))
 
 

@@ -8,6 +8,7 @@ import pytest
 from joblib.externals.loky import get_reusable_executor
 
 import rig
+from rig.campaigns.kinds import KINDS
 from tests.docs.output import assert_shows
 from tests.docs.pages import ROOT, blocks, pages
 from tests.docs.reader import Reader
@@ -34,6 +35,13 @@ NOT_RUN = {
 
 def name_of(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
+
+
+def anchors(page: Path) -> set[str]:
+    """What links may end in: headings in small letters, hyphens for spaces, without any other sign."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 @pytest.fixture(autouse=True)
@@ -76,11 +84,19 @@ def test_what_is_not_run_is_listed_here_with_its_reason():
     assert {(name_of(page), block.not_run) for page in pages() for block in blocks(page) if block.not_run} == NOT_RUN
 
 
-def test_every_link_between_pages_leads_to_a_file():
+def test_every_link_between_pages_leads_to_a_file_and_to_a_heading_in_it():
     for page in [*pages(), ROOT / "CHANGELOG.md"]:
-        for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-            if "://" not in target:
-                assert (page.parent / target).exists(), f"{name_of(page)}: {target}"
+        for target, anchor in re.findall(r"\]\(([^)#]*)(?:#([^)]*))?\)", page.read_text(encoding="utf-8")):
+            if "://" in target:
+                continue
+            linked = page.parent / target if target else page
+            assert linked.exists(), f"{name_of(page)}: {target}"
+            assert not anchor or anchor in anchors(linked), f"{name_of(page)}: {target}#{anchor}"
+
+
+def test_every_kind_of_plan_is_in_the_table_of_kinds():
+    table = (ROOT / "docs" / "user-guide.md").read_text(encoding="utf-8").split("\n## Plans\n")[1].split("\n\n")[1]
+    assert set(re.findall(r"^\| \[?`([\w-]+)`", table, re.MULTILINE)) == set(KINDS)
 
 
 def test_decisions_are_numbered_without_gaps_and_say_context_decision_consequences():

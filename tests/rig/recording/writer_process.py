@@ -4,6 +4,7 @@ import os
 import random
 import struct
 import sys
+from pathlib import Path
 
 from rig.recording.journal import JournalWriter
 from tests.rig.recording.samples import header, rows
@@ -12,7 +13,8 @@ from tests.rig.recording.samples import header, rows
 def main() -> None:
     path, first, seed = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     chance = random.Random(seed)
-    writer = JournalWriter.create(path, header()) if first == 0 else JournalWriter.reopen(path)
+    # The one before may have been killed before its first row: its journal is there all the same.
+    writer = JournalWriter.reopen(path) if Path(path).exists() else JournalWriter.create(path, header())
     made = rows(first, first + 200_000)
     if writer.n_rows != first:
         sys.exit(f"{writer.n_rows} rows found, {first} expected")
