@@ -27,6 +27,7 @@ Float = NDArray[np.float64]
 
 _DEGREE, _NOISY_DEGREE = 2, 1
 _NOISE_SPAN = 1.0  # in the logarithm of the amplitude
+_MEDIAN = 0.839  # over the mean, of chi-square with four degrees of freedom
 _FEWEST_INSTANTS = 8
 _NEIGHBOURS = 2
 _WIDEN = 1.25
@@ -93,7 +94,7 @@ def continuous_backbone(
     levels_m: ArrayLike | None = None,
     number: int = 15,
     bandwidth: float = 0.15,
-    accuracy: float = 0.01,
+    accuracy: float = 0.008,
     specimen: str = "",
 ) -> ContinuousBackbone:
     """Backbone from a ramp of the level up and one down, in any order.
@@ -125,7 +126,7 @@ def continuous_backbone(
     levels = _levels(up, down, levels_m, number)
     first = [_first_fits(flow, levels, bandwidth) for flow in (up, down)]
     noise = _noise([fits for _, fits in first])
-    sensors = noise_variances([_lowest_fit(flow) for flow in (up, down)])
+    sensors = _sensor_noise(up, down)
     ways = [
         _along(flow, levels, widths, fits, noise, sensors, accuracy)
         for flow, (widths, fits) in zip((up, down), first, strict=True)
@@ -196,15 +197,31 @@ def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float,
     ]
 
 
-def _lowest_fit(flow: SlowFlow) -> LocalFit:
-    """A fit over the lowest amplitudes, where the noise of the sensors, the same at all levels, stands out best.
+def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
+    """Variances of the noise of the sensors, the same at all levels: from the lowest, where it stands out best.
 
-    It takes many periods to tell its two parts apart.
+    That of the force is seen between its harmonics, and is the median's there (squares of two degrees of freedom in mean,
+    four in all, have 0.839 of their mean for a median), as some instants see ends of the record. What else is left over is
+    the motion's.
     """
+    lowest = [_lowest(flow) for flow in (up, down)]
+    force = float(np.median(np.concatenate([flow.force_noise for flow in lowest]))) / _MEDIAN
+    fits = [
+        fit_at(flow, flow.amplitude_m / flow.amplitude_m.min() - 1.0, np.ones(flow.amplitude_m.size), _DEGREE)
+        for flow in lowest
+    ]
+    left, by_force, by_motion = (
+        sum(values)
+        for values in zip(*((fit.moments[0], fit.expected[0, 0], fit.expected[0, 1]) for fit in fits), strict=True)
+    )
+    return np.array([force, max(0.0, float(left - force * by_force) / float(by_motion))])
+
+
+def _lowest(flow: SlowFlow) -> SlowFlow:
     size = flow.amplitude_m
-    keep = size <= max(size.min() * np.exp(_NOISE_SPAN), np.sort(size)[min(_FEWEST_INSTANTS, size.size) - 1])
-    part = flow.select(keep)
-    return fit_at(part, part.amplitude_m / size.min() - 1.0, np.ones(part.amplitude_m.size), _DEGREE)
+    return flow.select(
+        size <= max(size.min() * np.exp(_NOISE_SPAN), np.sort(size)[min(_FEWEST_INSTANTS, size.size) - 1])
+    )
 
 
 def _noise(fits: list[list[LocalFit]]) -> list[Float]:
