@@ -25,7 +25,9 @@ __all__ = ["ContinuousBackbone", "continuous_backbone"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_DEGREE = 2
+_DEGREE, _NOISY_DEGREE = 2, 1
+_NOISE_SPAN = 1.0  # in the logarithm of the amplitude
+_MEDIAN = 0.839  # over the mean, of chi-square with four degrees of freedom
 _FEWEST_INSTANTS = 8
 _NEIGHBOURS = 2
 _WIDEN = 1.25
@@ -92,7 +94,7 @@ def continuous_backbone(
     levels_m: ArrayLike | None = None,
     number: int = 15,
     bandwidth: float = 0.15,
-    accuracy: float = 0.015,
+    accuracy: float = 0.008,
     specimen: str = "",
 ) -> ContinuousBackbone:
     """Backbone from a ramp of the level up and one down, in any order.
@@ -106,11 +108,11 @@ def continuous_backbone(
     number
         How many of them, then.
     bandwidth
-        Half width in ln(amplitude) of what is taken together at a level (parabolic weights, properties quadratic in
-        ln(amplitude)); wider where a ramp has fewer than eight instants there. What bends within it is smoothed.
+        Half width in ln(amplitude) of what is taken together at a level (parabolic weights, properties quadratic in the
+        amplitude); wider where a ramp has fewer than eight instants there. What bends within it is smoothed.
     accuracy
-        Relative random standard error of one ramp's damping above which more than the bandwidth is taken together, up to
-        one in ln(amplitude).
+        Relative random standard error of one ramp's damping above which properties are taken for linear in the amplitude,
+        over more than the bandwidth where that is not enough, up to one in ln(amplitude).
     specimen
         Name of what was tested.
 
@@ -124,8 +126,9 @@ def continuous_backbone(
     levels = _levels(up, down, levels_m, number)
     first = [_first_fits(flow, levels, bandwidth) for flow in (up, down)]
     noise = _noise([fits for _, fits in first])
+    sensors = _sensor_noise(up, down)
     ways = [
-        _along(flow, levels, widths, fits, noise, accuracy)
+        _along(flow, levels, widths, fits, noise, sensors, accuracy)
         for flow, (widths, fits) in zip((up, down), first, strict=True)
     ]
     stiffness, damping = (np.array([[getattr(fit, name) for fit in way.fits] for way in ways]) for name in _PROPERTIES)
@@ -194,6 +197,33 @@ def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float,
     ]
 
 
+def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
+    """Variances of the noise of the sensors, the same at all levels: from the lowest, where it stands out best.
+
+    That of the force is seen between its harmonics, and is the median's there (squares of two degrees of freedom in mean,
+    four in all, have 0.839 of their mean for a median), as some instants see ends of the record. What else is left over is
+    the motion's.
+    """
+    lowest = [_lowest(flow) for flow in (up, down)]
+    force = float(np.median(np.concatenate([flow.force_noise for flow in lowest]))) / _MEDIAN
+    fits = [
+        fit_at(flow, flow.amplitude_m / flow.amplitude_m.min() - 1.0, np.ones(flow.amplitude_m.size), _DEGREE)
+        for flow in lowest
+    ]
+    left, by_force, by_motion = (
+        sum(values)
+        for values in zip(*((fit.moments[0], fit.expected[0, 0], fit.expected[0, 1]) for fit in fits), strict=True)
+    )
+    return np.array([force, max(0.0, float(left - force * by_force) / float(by_motion))])
+
+
+def _lowest(flow: SlowFlow) -> SlowFlow:
+    size = flow.amplitude_m
+    return flow.select(
+        size <= max(size.min() * np.exp(_NOISE_SPAN), np.sort(size)[min(_FEWEST_INSTANTS, size.size) - 1])
+    )
+
+
 def _noise(fits: list[list[LocalFit]]) -> list[Float]:
     """Variances of the noise at every level, from the fits of both ramps near it."""
     count = len(fits[0])
@@ -202,28 +232,39 @@ def _noise(fits: list[list[LocalFit]]) -> list[Float]:
 
 
 def _along(
-    flow: SlowFlow, levels: Float, widths: Float, fits: list[LocalFit], noise: list[Float], accuracy: float
+    flow: SlowFlow,
+    levels: Float,
+    widths: Float,
+    fits: list[LocalFit],
+    noise: list[Float],
+    sensors: Float,
+    accuracy: float,
 ) -> _Way:
-    """One ramp: where noise leaves too little of the damping, fits over more."""
-    found, periods = [], []
+    """One ramp: where the noise of the sensors leaves too little of the damping, fits of fewer unknowns, over more."""
+    found, periods, errors = [], [], []
     step = float(np.median(np.diff(flow.phase_periods)))
     for n, level in enumerate(np.log(levels)):
-        width = widths[n]
-        while fits[n].standard_errors(noise[n])[1] > accuracy * abs(fits[n].damping) and width * _WIDEN <= _WIDEST:
-            width *= _WIDEN
-            fits[n] = fit_at(*_around(flow, level, width), _DEGREE)
-        part, place, weight = _around(flow, level, width)
-        found.append(amplitudes_at(part, place, weight, _DEGREE))
+        width, degree = widths[n], _DEGREE
+        while fits[n].standard_errors(sensors)[1] > accuracy * abs(fits[n].damping):
+            if degree == _NOISY_DEGREE:
+                width *= _WIDEN
+            if width > _WIDEST:
+                break
+            degree = _NOISY_DEGREE
+            fits[n] = fit_at(*_around(flow, level, width), degree)
+        part, place, weight = _around(flow, level, min(width, _WIDEST))
+        found.append(amplitudes_at(part, place, weight, degree))
         periods.append(place.size * step)
-    errors = [fit.standard_errors(variances) for fit, variances in zip(fits, noise, strict=True)]
+        # What a ramp leaves over where the level is high is more than noise of the sensors.
+        errors.append(np.maximum(fits[n].standard_errors(noise[n]), fits[n].standard_errors(sensors)))
     return _Way(fits, np.array(errors), found, periods)
 
 
 def _around(flow: SlowFlow, level: float, width: float) -> tuple[SlowFlow, Float, Float]:
-    """The instants around ``ln X = level``, their places and weights."""
-    place = (np.log(flow.amplitude_m) - level) / width
-    near = np.abs(place) < 1.0
-    return flow.select(near), place[near], 1.0 - place[near] ** 2
+    """The instants around ``ln X = level``, their places (linear in X) and weights."""
+    distance = (np.log(flow.amplitude_m) - level) / width
+    near = np.abs(distance) < 1.0
+    return flow.select(near), (flow.amplitude_m[near] * np.exp(-level) - 1.0) / width, 1.0 - distance[near] ** 2
 
 
 def _wide_enough(size: Float, level: float, bandwidth: float) -> float:

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["WINDOW_PERIODS", "amplitudes", "derivatives", "window_correlations"]
+__all__ = ["WINDOW_PERIODS", "amplitudes", "between_harmonics", "derivatives", "window_correlations"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -76,6 +76,15 @@ def amplitudes(theta: Float, data: Float, at: Float, harmonics: int) -> Complex:
         window = _blackman((theta[part] - centre) / half) * weight[part]
         out[:, number] = (data[:, part] * (window / window.sum())) @ rotations[:, part].T
     return np.asarray(out * factor)
+
+
+def between_harmonics(theta: Float, signal: Float, at: Float) -> Float:
+    """float[len(at)]: half the squared amplitude of float[n] ``signal`` where there are no harmonics: at orders 1.5 and 2.5.
+
+    Seen through a window of twice the length, whose zeros lie on all harmonics; given as the single window would pass it.
+    """
+    found = amplitudes(0.5 * theta, signal[None], 0.5 * at, 5)[0]
+    return np.asarray(np.mean(np.abs(found[:, [3, 5]]) ** 2, axis=1))
 
 
 def _blackman(place: Float) -> Float:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.slow_flows.fits import LocalFit, as_settled, local_fit, noise_variances
-from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, derivatives
+from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, between_harmonics, derivatives
 from identification.validation import finite_array, positive
 
 __all__ = ["SlowFlow", "slow_flow"]
@@ -53,6 +53,9 @@ class SlowFlow:
     noise
         float[n, 2], variances of real and imaginary part of ``g X``, (m/s^2)^2: the part that averages out as white noise
         of the force does, and the part that averages out faster (`identification.slow_flows.fits`).
+    force_noise
+        float[n], ``phi_d^4 |F|^2 / 2`` between the harmonics, (m/s^2)^2, as the window of the demodulation would pass it: its
+        mean is the first of these variances, known from the force alone.
     drive_mode_shape
         phi_d, kg^-1/2.
     fit_periods
@@ -73,6 +76,7 @@ class SlowFlow:
     stiffness_std: Float
     damping_std_1_s: Float
     noise: Float
+    force_noise: Float
     drive_mode_shape: float
     fit_periods: float
     residual_m_n: float
@@ -161,7 +165,7 @@ class SlowFlow:
 
 _PER_INSTANT = (
     *("time_s", "phase_periods", "drive_m", "dynamic_stiffness", "rate_1_s", "stiffness", "damping_1_s"),
-    *("stiffness_std", "damping_std_1_s", "noise"),
+    *("stiffness_std", "damping_std_1_s", "noise", "force_noise"),
 )
 
 
@@ -258,6 +262,7 @@ def slow_flow(
         stiffness_std=errors[:, 0],
         damping_std_1_s=errors[:, 1],
         noise=noise,
+        force_noise=shape**4 * between_harmonics(theta, data[force], at),
         drive_mode_shape=shape,
         fit_periods=fit_periods,
         residual_m_n=residual_m_n,
