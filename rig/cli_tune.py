@@ -37,6 +37,7 @@ def tune_(
     from rig.campaigns.multisine_points import MULTISINE_COLUMNS
     from rig.console import RunProgress, print_json
     from rig.errors import ConfigurationError
+    from rig.exchange.whole_file import whole_file
     from rig.figures.tuning import check_figure, draw_tuning
     from rig.tuning.report import lines, summary
     from rig.tuning.tuning import tune
@@ -46,6 +47,8 @@ def tune_(
         raise ConfigurationError(f"-o {output}: plans are written as .toml")
     keep_existing([], output, overwrite)
     recorded = output.with_suffix(".h5") if recording is None else recording
+    if recorded.suffix != ".h5":
+        raise ConfigurationError(f"--recording {recorded}: recordings are written as .h5")
     if figure is not None:
         check_figure(figure, overwrite)
     progress = RunProgress(MULTISINE_COLUMNS)
@@ -66,7 +69,8 @@ def tune_(
         )
     finally:
         progress.close()
-    output.write_text(found.plan_toml, encoding="utf-8")
+    with whole_file(output) as part:
+        part.write_text(found.plan_toml, encoding="utf-8")
     if figure is not None:
         draw_tuning(found, figure)
     facts = {**summary(found), "plan": str(output), "figure": None if figure is None else str(figure)}

@@ -345,3 +345,16 @@ def test_the_help_needs_none_of_the_heavy_libraries():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"
     assert "identify" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ("-o plan.toml --recording plan.toml", "--recording plan.toml: recordings are written as .h5"),
+        ("-o plan.h5", "-o plan.h5: plans are written as .toml"),
+    ],
+)
+def test_a_tuning_writes_plan_and_recording_under_names_of_their_own(command, names, said):
+    status, _, err = command(f"tune --bench magnet-beam {names}")
+    assert status != 0
+    assert said in err
