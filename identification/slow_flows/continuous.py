@@ -263,7 +263,7 @@ def _errors(fit: LocalFit, degree: int, noise: Float, sensors: Float) -> Float:
     """float[2], standard errors: what a ramp leaves over where the level is high is more than noise of the sensors."""
     by_sensors = np.array(fit.standard_errors(sensors))
     if degree == _DEGREE:
-        return np.maximum(fit.standard_errors(noise), by_sensors)
+        return np.asarray(np.maximum(fit.standard_errors(noise), by_sensors))
     expected = float(fit.expected[0] @ sensors)
     more = max(1.0, float(fit.moments[0]) / expected) if expected > 0.0 else 1.0
     return np.asarray(by_sensors * np.sqrt(more))
