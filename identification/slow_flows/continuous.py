@@ -255,9 +255,18 @@ def _along(
         part, place, weight = _around(flow, level, min(width, _WIDEST))
         found.append(amplitudes_at(part, place, weight, degree))
         periods.append(place.size * step)
-        # What a ramp leaves over where the level is high is more than noise of the sensors.
-        errors.append(np.maximum(fits[n].standard_errors(noise[n]), fits[n].standard_errors(sensors)))
+        errors.append(_errors(fits[n], degree, noise[n], sensors))
     return _Way(fits, np.array(errors), found, periods)
+
+
+def _errors(fit: LocalFit, degree: int, noise: Float, sensors: Float) -> Float:
+    """float[2], standard errors: what a ramp leaves over where the level is high is more than noise of the sensors."""
+    by_sensors = np.array(fit.standard_errors(sensors))
+    if degree == _DEGREE:
+        return np.asarray(np.maximum(fit.standard_errors(noise), by_sensors))
+    expected = float(fit.expected[0] @ sensors)
+    more = max(1.0, float(fit.moments[0]) / expected) if expected > 0.0 else 1.0
+    return np.asarray(by_sensors * np.sqrt(more))
 
 
 def _around(flow: SlowFlow, level: float, width: float) -> tuple[SlowFlow, Float, Float]:
