@@ -91,8 +91,12 @@ def predict(
         typer.Option(help="Stepped sines to compare with (recorded or imported); may be repeated."),
     ] = None,
     over: Annotated[
-        str, typer.Option(help="Compare at each frequency, or at each phase (tells all branches apart).")
-    ] = "frequency",
+        str | None,
+        typer.Option(
+            help="Compare over frequency or phase, which tells all branches apart. "
+            "If left out: phase where the measured frequency turns back."
+        ),
+    ] = None,
     allow_extrapolation: Annotated[
         bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
     ] = False,

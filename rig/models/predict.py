@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast, get_args
 
+import numpy as np
+
 from identification import (
     Exciter,
     FrequencyResponse,
@@ -64,8 +66,8 @@ class PredictionRequest:
     """Linear model: the other modes take part, responses of the other sensors are predicted."""
     references: tuple[Path, ...] = ()
     """Stepped sines that are predicted at their own force and compared."""
-    over: str = "frequency"
-    """What they are compared over: ``frequency`` or ``phase``."""
+    over: str | None = None
+    """What they are compared over: ``frequency`` or ``phase``; if not given, the phase where the frequency turns back."""
     allow_extrapolation: bool = False
     """Whether to answer beyond twice the largest modal amplitude identified."""
 
@@ -76,7 +78,7 @@ class PredictionRequest:
             )
         for name, value, allowed in (
             ("--force", self.held, get_args(HeldForce)),
-            ("--over", self.over, get_args(Over)),
+            ("--over", self.over, (None, *get_args(Over))),
             ("--zero-crossings", self.zero_crossings, (None, *CROSSINGS)),
         ):
             if value not in allowed:
@@ -169,7 +171,14 @@ def _compared(
             recorded_force_response(mode, measured, modes=modes, allow_extrapolation=request.allow_extrapolation),
             None,
         )
-    return predicted, measured, compare(predicted, measured, over=cast(Over, request.over)).error, band
+    over = request.over or ("phase" if _turns_back(measured.frequency_hz) else "frequency")
+    return predicted, measured, compare(predicted, measured, over=cast(Over, over)).error, band
+
+
+def _turns_back(frequency_hz: np.ndarray) -> bool:
+    """Whether a branch has more than one vibration at a frequency: then only the phase tells them apart."""
+    steps = np.diff(frequency_hz)
+    return bool((steps > 0.0).any() and (steps < 0.0).any())
 
 
 def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
