@@ -37,6 +37,8 @@ class ContinuousBackbonePlan(LockedPlan):
     """How far the level goes beyond the lowest and highest of ``levels_m``, relative."""
     bandwidth: float = Field(0.08, gt=0, le=1)
     """Half width, in the logarithm of the amplitude, of what is taken together for one level."""
+    accepted_alien_force: float = Field(0.25, gt=0, le=1)
+    """As of every plan under a lock, but wider: what swings while the lock is gained stands beside the harmonics."""
     accepted_detuning: float = Field(0.03, gt=0, le=1)
     """Largest distance of the momentary frequency from the resonance found, relative; beyond, the lock is lost."""
     accepted_frequency_std: float = Field(1e-3, gt=0, le=1)

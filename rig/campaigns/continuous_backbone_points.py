@@ -53,7 +53,7 @@ def measure_continuous_backbone(
     passed at all has failed.
     """
     try:
-        flow = recorded_flow(bench, rows, plan.harmonics)
+        flow = recorded_flow(bench, rows, plan.harmonics, plan.plant)
         ways = both_ways(bench, plan, rows, passages, flow, ended)
         points = _measured(bench, plan, targets, flow, ways, rows)
     except (IdentificationError, ArithmeticError) as error:

@@ -60,6 +60,12 @@ class PlantFacts(Configured):
     """Samples from an output to the input that shows it."""
 
     @property
+    def residual_m_n(self) -> float:
+        """Receptance of the other modes at the drive point, at the mode's frequency, m/N."""
+        constant, square = self.residual_per_kg
+        return -(constant - square * (self.frequency_rad_s / self.centre_rad_s) ** 2) / self.frequency_rad_s**2
+
+    @property
     def model(self) -> PlantModel:
         """The plant."""
         return PlantModel(**self.model_dump())

@@ -5,6 +5,7 @@ import numpy as np
 from identification import SlowFlow, slow_flow
 from rig.bench import Bench
 from rig.campaigns.evaluate import channels_of
+from rig.campaigns.known_plant import PlantFacts
 from rig.tick.layout import FREQUENCY_CLAMPED, SATURATED, SENSOR_AT_RANGE
 
 __all__ = ["AT_VOLTAGE_LIMIT", "flagged", "recorded_flow"]
@@ -14,8 +15,8 @@ AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
 HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far an instant looks to either side
 
 
-def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int) -> SlowFlow:
-    """The slow flow of recorded rows, the channels' skew taken out.
+def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFacts | None = None) -> SlowFlow:
+    """The slow flow of recorded rows, the channels' skew taken out, and with a known plant the share of its other modes.
 
     Raises `identification.IdentificationError` where there is none to be seen.
     """
@@ -27,6 +28,7 @@ def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int) -> SlowFlow:
         drive_mode_shape=bench.specimen.drive_mode_shape or 0.0,
         harmonics=harmonics,
         skew_samples=[channel.skew_samples for channel in bench.channels],
+        residual_m_n=0.0 if plant is None else plant.residual_m_n,
     )
 
 
