@@ -18,10 +18,18 @@ from controller.tuning.laws import (
 from controller.tuning.loop import ControlLoop, lag_per_frequency
 from controller.tuning.noise import LowPassChoice, low_pass_from_densities, low_pass_from_noise
 from controller.tuning.plant import PlantModel
-from controller.tuning.stability import Margins, closed_loop_poles, margins, unstable_poles
+from controller.tuning.stability import (
+    LARGEST_AT_HALF,
+    Margins,
+    closed_loop_poles,
+    gains_at_half,
+    margins,
+    unstable_poles,
+)
 from controller.tuning.steps import settling_s, step_response
 
 __all__ = [
+    "LARGEST_AT_HALF",
     "ComplexResponseLaw",
     "ControlLoop",
     "Design",
@@ -43,6 +51,7 @@ __all__ = [
     "exact_phase_law",
     "exact_scheduled_law",
     "frequency_error_law",
+    "gains_at_half",
     "hippold_gains",
     "lag_per_frequency",
     "low_pass_from_densities",

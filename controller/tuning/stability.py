@@ -2,22 +2,29 @@
 
 Closed-loop poles are zeros of ``det(I + K M)``, analytic but for the known poles of plant, low-pass and integrators. They
 are counted on a contour by the argument principle, and found by Newton's method from a grid. The region is the half disc of
-radius W/2: beyond it averaging over a period means nothing, and no law of this family has gain there.
+radius 0.8 W: further out the map runs into what the exciter does at rest, and averaging over a period means nothing. A loop
+that is strong enough to have poles there is not counted but recognised by its gain at W/2 (`gains_at_half`).
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.tuning.laws import ComplexResponseLaw
 from controller.tuning.loop import ControlLoop
 
-__all__ = ["Margins", "closed_loop_poles", "margins", "unstable_poles"]
+__all__ = ["LARGEST_AT_HALF", "Margins", "closed_loop_poles", "gains_at_half", "margins", "unstable_poles"]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+REACH = 0.8  # of W: radius within which poles are looked for
+HALF = 0.5  # of W: changes within two periods, the quickest that averaging over one can follow
+LARGEST_AT_HALF = 2.2
+"""Largest loop gain at W/2: with up to this, poles that grow stay within the radius that is looked at, also those of a loop
+that falls steeply. Above 1, for the paper's force loop crosses over at 0.5 to 1 W off resonance and holds."""
 INSET = 2e-4  # of W: closer to the imaginary axis than this, a pole counts as marginal, not as unstable
 
 
@@ -38,10 +45,31 @@ class Margins:
 def unstable_poles(loop: ControlLoop) -> int:
     """Number of closed-loop poles in the right half plane, by the argument principle."""
     omega = loop.omega_rad_s
-    radius = 0.5 * omega
+    radius = REACH * omega
     offsets = loop.plant.poles_rad_s - 1j * omega
     known = 2 * int(np.sum((offsets.real > INSET * omega) & (np.abs(offsets) < radius)))
     return _windings(loop.determinant, INSET * omega, radius) + known
+
+
+def gains_at_half(loop: ControlLoop) -> dict[str, float]:
+    """Largest gain of each loop, the others open, on the half circle of radius W/2 in the right half plane.
+
+    It is linear in the loop's gains. A pole leaves the half disc only where it passes 1; a pole that has left is not found,
+    hence a loop above `LARGEST_AT_HALF` is to be taken as unusable, whatever the number of poles.
+    """
+    angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 101)
+    s = HALF * loop.omega_rad_s * np.exp(1j * angle)
+    out = {"frequency loop": (loop.feedback(s) @ loop.measured(s))[:, 2, 2]}
+    law = loop.amplitude_law
+    if isinstance(law, ComplexResponseLaw):
+        inner = replace(loop, amplitude_law=replace(law, force_per_s=0.0))
+        out["response loop"] = inner.amplitude_loop_gain(s)
+        if law.force_per_s > 0.0:
+            both, alone = (np.linalg.det(some.return_difference(s)[:, :2, :2]) for some in (loop, inner))
+            out["force loop"] = both / alone - 1.0
+    elif law is not None:
+        out["amplitude loop"] = loop.amplitude_loop_gain(s)
+    return {name: float(np.abs(gain).max()) for name, gain in out.items()}
 
 
 def _windings(function: Callable[[Complex], Complex], inset: float, radius: float) -> int:
@@ -64,7 +92,7 @@ def _windings(function: Callable[[Complex], Complex], inset: float, radius: floa
 
 
 def closed_loop_poles(loop: ControlLoop) -> Complex:
-    """Poles of the closed loop (1/s) within half the locked frequency of the origin, slowest first [n].
+    """Poles of the closed loop (1/s) within 0.8 times the locked frequency of the origin, slowest first [n].
 
     A multiple pole is given once.
     """
@@ -77,7 +105,7 @@ def closed_loop_poles(loop: ControlLoop) -> Complex:
     def function(s: Complex) -> Complex:
         return np.asarray(loop.determinant(s) * np.prod((s[:, None] - known) / scale, axis=1))
 
-    reach = 0.5 * omega
+    reach = REACH * omega
     grid = np.concatenate([-np.geomspace(1e-3, 1.0, 14) * reach, np.geomspace(1e-2, 1.0, 5) * reach])
     height = np.concatenate([[0.01], np.linspace(0.05, 1.0, 14)]) * reach
     start = (grid[:, None] + 1j * height).ravel()

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from controller import AmplitudeLaw, PhaseLockedLoop
 from controller.tuning import (
+    LARGEST_AT_HALF,
     ComplexResponseLaw,
     ControlLoop,
     ForceLaw,
@@ -17,6 +18,7 @@ from controller.tuning import (
     PhaseLaw,
     PlantModel,
     closed_loop_poles,
+    gains_at_half,
     unstable_poles,
 )
 from controller.tuning.laws import AmplitudeLaw as AmplitudeGains
@@ -25,7 +27,7 @@ from rig.campaigns.levels import Levels
 from rig.configuration import Configured
 from rig.errors import ConfigurationError
 
-__all__ = ["KnownPlant", "PlantFacts", "control_loop", "voltage_for"]
+__all__ = ["KnownPlant", "PlantFacts", "control_loop", "motion_for", "voltage_for"]
 
 MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known one: a joint's rises with the level
 
@@ -75,46 +77,39 @@ class KnownPlant(Levels):
     """Levels of a plan that may know its plant."""
 
     plant: PlantFacts | None = None
-    """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the voltage limit are
+    """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the bench's limits are
     refused."""
 
     def check_plant(self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float]) -> None:
-        """Refuse gains that are unstable on the known plant at one of the lags, and levels that need too much voltage on it."""
+        """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels out of its reach."""
         if self.plant is None:
             return
         plant = self.plant.model
         try:
-            # The force at rest is not in the linearised loop, and what a sign detector sees cannot be linearised.
-            if law.rest_low_pass_rad_s == 0.0 and law.detector != "sign":
-                self._check_stability(plant, law, lags_deg, bench)
-            self._check_reach(plant, lags_deg, bench)
+            # What a sign detector sees cannot be linearised.
+            if law.detector != "sign":
+                loops = self._loops(plant, law, lags_deg, bench)
+                _check_quickness(loops)
+                _check_stability(loops)
+            self._check_voltage(plant, lags_deg, bench)
+            self._check_motion(plant, lags_deg, bench)
         except ValueError as error:
             raise ConfigurationError(f"plant: {error}") from None
 
-    def _check_stability(
+    def _loops(
         self, plant: PlantModel, law: PhaseLockedLoop, lags_deg: Sequence[float], bench: Bench
-    ) -> None:
+    ) -> list[ControlLoop]:
+        """The loop at each lag; where the force at rest is used, which cannot be linearised, only the loops inside it."""
+        amplitude_law = self.amplitude_law
+        if law.rest_low_pass_rad_s > 0.0 and amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
+            through = law.force_loop == "through-response"
+            amplitude_law = AmplitudeLaw.RESPONSE if through else AmplitudeLaw.VOLTAGE
         shape = bench.specimen.drive_mode_shape
-        loops = [
-            control_loop(plant, law.model_copy(update={"phase_lag_deg": lag}), self.amplitude_law, shape)
-            for lag in lags_deg
+        return [
+            control_loop(plant, law.model_copy(update={"phase_lag_deg": lag}), amplitude_law, shape) for lag in lags_deg
         ]
-        unstable = [loop for loop in loops if unstable_poles(loop) > 0]
-        if not unstable:
-            return
-        growth = [max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0) for loop in unstable]
-        worst = unstable[growth.index(max(growth))]
-        enough = next((part for part in MORE_DAMPING if _steady(unstable, part)), None)
-        raise ConfigurationError(
-            f"controller: these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
-            f"{100.0 * plant.damping_ratio:.3g} % damping)"
-            + _where([loop.lag_deg for loop in unstable])
-            + (f", growing at {max(growth):.3g} 1/s" if max(growth) > 0.0 else "")
-            + ("" if enough is None else f"; with {100.0 * enough * plant.damping_ratio:.3g} % they would be stable")
-            + "; rig tune finds gains, without [plant] nothing is checked"
-        )
 
-    def _check_reach(self, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
+    def _check_voltage(self, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
         limit = bench.limits.voltage_v
         for index, level in enumerate(self.levels):
             volts, lag = max((voltage_for(plant, level, self.level_unit, lag), lag) for lag in lags_deg)
@@ -124,6 +119,61 @@ class KnownPlant(Levels):
                     f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping), "
                     f"the bench {bench.name} allows {limit:g} V"
                 )
+
+    def _check_motion(self, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
+        """Refuse levels in N or m that are beyond the limits of force or motion whatever a joint may dissipate.
+
+        A joint that dissipates more needs more force for a displacement, and moves less under a force.
+        """
+        if self.level_unit == "V":
+            return
+        part = 1.0 if self.level_unit == "m" else MORE_DAMPING[-1]
+        damped = plant.at(damping_ratio=min(part * plant.damping_ratio, 0.99))
+        for index, level in enumerate(self.levels):
+            for name, unit in (("force_n", "N"), ("displacement_m", "m"), ("acceleration_m_s2", "m/s^2")):
+                least, lag = max((motion_for(damped, level, self.level_unit, lag)[name], lag) for lag in lags_deg)
+                limit = getattr(bench.limits, name)
+                if least <= limit:
+                    continue
+                known = motion_for(plant, level, self.level_unit, lag)[name]
+                more = f", and still {least:.3g} {unit} with {part:g} times the damping" if part > 1.0 else " or more"
+                raise ConfigurationError(
+                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: means {known:.3g} {unit}{_where([lag])} on "
+                    f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping){more}; "
+                    f"the bench {bench.name} allows limits.{name} = {limit:g}"
+                )
+
+
+def _check_quickness(loops: Sequence[ControlLoop]) -> None:
+    """Refuse a loop that would have to act within a period or two, where no demodulator has anything to go by."""
+    found = [(gain, name, loop) for loop in loops for name, gain in gains_at_half(loop).items()]
+    gain, name, loop = max(found, key=lambda entry: entry[0])
+    if gain > LARGEST_AT_HALF:
+        hertz = loop.omega_rad_s / 2.0 / math.pi
+        raise ConfigurationError(
+            f"controller: the {name} is too quick on the known plant ([plant], {hertz:.2f} Hz){_where([loop.lag_deg])}: "
+            f"its gain at {0.5 * hertz:.4g} Hz, half the locked frequency, is {gain:.3g}, allowed is {LARGEST_AT_HALF:g}: "
+            f"demodulated signals cannot follow changes within two periods; its gains are about "
+            f"{gain / LARGEST_AT_HALF:.2g} times too large"
+        )
+
+
+def _check_stability(loops: Sequence[ControlLoop]) -> None:
+    unstable = [loop for loop in loops if unstable_poles(loop) > 0]
+    if not unstable:
+        return
+    growth = [max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0) for loop in unstable]
+    worst = unstable[growth.index(max(growth))]
+    enough = next((part for part in MORE_DAMPING if _steady(unstable, part)), None)
+    damping = 100.0 * worst.plant.damping_ratio
+    raise ConfigurationError(
+        f"controller: these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
+        f"{damping:.3g} % damping)"
+        + _where([loop.lag_deg for loop in unstable])
+        + (f", growing at {max(growth):.3g} 1/s" if max(growth) > 0.0 else "")
+        + ("" if enough is None else f"; with {enough * damping:.3g} % they would be stable")
+        + "; rig tune finds gains, without [plant] nothing is checked"
+    )
 
 
 def _where(lags_deg: Sequence[float]) -> str:
@@ -152,6 +202,15 @@ def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> f
     if unit == "m":
         return float(level * omega**2 / abs(complex(plant.acceleration_per_v(1j * omega))))
     return float(level * (math.sqrt(2.0) if unit == "N RMS" else 1.0) * plant.volts_per_newton(lag_deg))
+
+
+def motion_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> dict[str, float]:
+    """Force, displacement and acceleration (peak, by their limits' names) of a level (N, N RMS, m) on a linear plant."""
+    omega = plant.lock_frequency_rad_s(lag_deg)
+    accelerance = abs(complex(plant.accelerance(1j * omega)))
+    force = level * omega**2 / accelerance if unit == "m" else level * (math.sqrt(2.0) if unit == "N RMS" else 1.0)
+    acceleration = force * accelerance
+    return {"force_n": force, "displacement_m": acceleration / omega**2, "acceleration_m_s2": acceleration}
 
 
 def control_loop(

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rig.bench import load_bench
-from rig.campaigns.known_plant import voltage_for
+from rig.campaigns.known_plant import motion_for, voltage_for
 from rig.campaigns.plans import load_plan, plan_from
 from rig.errors import ConfigurationError
 from tests.controller.tuning.rigs import plant_of
@@ -129,8 +129,91 @@ def test_the_loop_of_a_held_response_is_checked_at_every_lag():
     plan.check(bench)
     quick = {"response_integral_per_s": 3000.0}
     plan, bench = phases_for("response-controlled", [-150.0, -90.0], controller=quick, levels_m=[1e-5])
-    with pytest.raises(ConfigurationError, match="unstable on the known plant"):
+    with pytest.raises(ConfigurationError, match="the response loop is too quick on the known plant"):
         plan.check(bench)
+
+
+@pytest.mark.parametrize(("k2", "k4"), [(6280.0, 1.0), (6280.0, 500.0), (6.28, 500.0 * 1.5)])
+def test_the_papers_gains_a_hundred_times_as_large_are_refused_on_the_magnet_beam(k2, k4):
+    lags = [-150.0, -90.0, -30.0]
+    phases_for("stepped-phase", lags, name="magnet-beam")[0].check(load_bench("magnet-beam"))
+    plan, bench = phases_for("stepped-phase", lags, name="magnet-beam", controller={"k2": k2, "k4": k4})
+    with pytest.raises(ConfigurationError, match=r"(unstable|is too quick) on the known plant"):
+        plan.check(bench)
+
+
+def test_a_loop_that_is_too_quick_is_refused_with_its_gain_at_half_the_frequency():
+    plan, bench = plan_for("magnet-beam", controller={"response_integral_per_s": 2000.0})
+    with pytest.raises(
+        ConfigurationError,
+        match=r"the response loop is too quick .* gain at 12\.\d+ Hz, half the locked frequency, is \d.*allowed is 2\.2",
+    ):
+        plan.check(bench)
+
+
+@pytest.mark.parametrize("name", LINEAR_HZ)
+@pytest.mark.parametrize(
+    "kind",
+    ["stepped-phase-fast", "stepped-phase-fast-rms", "response-controlled", "backbone-short", "continuous-backbone"],
+)
+def test_shipped_plans_pass_with_their_plant(name, kind):
+    table = load_plan(f"{name}/{kind}").model_dump(mode="json", exclude_none=True)
+    plan_from(table | {"plant": plant_of(name).to_dict()}, "plan").check(load_bench(name))
+
+
+@pytest.mark.parametrize("name", LINEAR_HZ)
+@pytest.mark.parametrize(("key", "factor"), [("response_integral_per_s", 30.0), ("frequency_integral_per_s", 60.0)])
+def test_the_loops_inside_a_force_loop_by_the_force_at_rest_are_checked(name, key, factor):
+    table = load_plan(f"{name}/stepped-phase-fast").model_dump(mode="json", exclude_none=True)
+    assert table["controller"]["rest_low_pass_rad_s"] > 0.0
+    table["controller"][key] *= factor
+    plan = plan_from(table | {"plant": plant_of(name).to_dict()}, "plan")
+    with pytest.raises(ConfigurationError, match="on the known plant"):
+        plan.check(load_bench(name))
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "levels", "said"),
+    [
+        (
+            "force_n",
+            0.5,
+            {"levels_m": [1e-3, 4e-3]},
+            r"levels_m\[1\] = 0\.004 m: means 0\.9\d* N on .* or more; .* = 0\.5",
+        ),
+        ("acceleration_m_s2", 50.0, {"levels_m": [1e-3, 4e-3]}, r"levels_m\[1\] = 0\.004 m: means 93\.\d m/s\^2 on"),
+        (
+            "displacement_m",
+            2e-4,
+            {"levels_n": [0.1, 0.55]},
+            r"levels_n\[1\] = 0\.55 N: means 0\.00242 m on .* still 0\.0003\d* m with 8 times the damping; .* = 0\.0002",
+        ),
+        ("displacement_m", 4e-4, {"levels_n": [0.1, 0.55]}, None),  # a joint of eight times the damping would do
+        ("acceleration_m_s2", 5.0, {"levels_rms_n": [0.39]}, r"0\.39 N RMS: means 56\.\d m/s\^2 on"),
+        ("displacement_m", 2e-4, {"levels_v": [0.5]}, None),
+    ],
+)
+def test_levels_beyond_the_limits_of_force_and_motion_are_refused_with_the_number(limit, value, levels, said):
+    plan, bench = plan_for("magnet-beam", controller={"k4": 0.5}, **levels)
+    plan.check(bench)
+    narrow = bench.limits.model_copy(update={limit: value})
+    bench = bench.model_copy(update={"limits": narrow})
+    if said is None:
+        plan.check(bench)
+    else:
+        with pytest.raises(ConfigurationError, match=said):
+            plan.check(bench)
+
+
+def test_force_and_motion_of_a_level_are_those_of_one_mode_at_resonance():
+    plant = plant_of("magnet-beam")
+    found = motion_for(plant, 0.55, "N", -90.0)
+    one_mode = 0.55 * plant.drive_shape**2 / (2.0 * plant.damping_ratio * plant.frequency_rad_s**2)
+    assert found["displacement_m"] == pytest.approx(one_mode, rel=1e-2)
+    assert found["acceleration_m_s2"] == pytest.approx(one_mode * plant.frequency_rad_s**2, rel=1e-2)
+    back = motion_for(plant, found["displacement_m"], "m", -90.0)
+    assert back["force_n"] == pytest.approx(0.55)
+    assert motion_for(plant, 0.55 / math.sqrt(2.0), "N RMS", -90.0)["force_n"] == pytest.approx(0.55)
 
 
 def test_the_voltage_that_a_level_needs_is_that_of_the_lag_that_takes_most():
@@ -140,7 +223,9 @@ def test_the_voltage_that_a_level_needs_is_that_of_the_lag_that_takes_most():
     at = lags[volts.index(max(volts))]
     assert at != -90.0
     limit = 0.5 * (max(volts) + voltage_for(plant, 9e-4, "m", -90.0))
-    bench = bench.model_copy(update={"limits": bench.limits.model_copy(update={"voltage_v": limit})})
+    bench = bench.model_copy(
+        update={"limits": bench.limits.model_copy(update={"voltage_v": limit, "acceleration_m_s2": 1e3})}
+    )
     phases_for("response-controlled", [-90.0], levels_m=[9e-4])[0].check(bench)
     with pytest.raises(
         ConfigurationError, match=rf"levels_m\[0\] = .* needs [\d.]+ V at a lag of {at:g} deg on the known"
