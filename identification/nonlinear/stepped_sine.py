@@ -16,6 +16,7 @@ Why beta: damping localised in a joint makes the modal constant complex, and a s
 drifting resonance looks the same. Holding it at zero forces the mismatch into the modal frequency.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -32,7 +33,9 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _LEVEL_TOLERANCE = 0.02
-_MIN_POINTS = 5
+_ENOUGH_POINTS = 5  # below, the window is widened
+_MIN_POINTS = 3  # six equations for four unknowns
+_SAID_APART = 2e-4  # relative distance of phase resonance from the modal frequency that is worth a note
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,8 @@ class _LevelFit:
     omega_std: float
     damping_std: float
     residual: float
-    points: int
+    widest_deg: float
+    """Distance from phase resonance of the farthest point."""
 
 
 def stepped_sine_mode(
@@ -59,7 +63,8 @@ def stepped_sine_mode(
     responses
         Measured levels; those not response-controlled are left out and named in the notes.
     phase_window_deg
-        Points whose phase lag is within this of 90 degrees are used, if the response held its level within 2 %.
+        Points whose phase lag is within this of 90 degrees are used, if the response held its level within 2 %. Where
+        fewer than five lie within, the five nearest to 90 degrees are, up to 90 degrees away; three must be left.
     complex_constant
         Whether the modal constant may be complex (beta above); False holds beta at zero.
 
@@ -70,13 +75,14 @@ def stepped_sine_mode(
         level, ``frequency_hz`` the modal frequency, ``phase_lag_deg`` is ``90 + beta``, ``force_n`` the fitted force
         there. Without a mass-normalised shape ``modal_amplitude`` is NaN: amplitudes are those of the measured point,
         which is enough to predict responses there together with ``apparent_mass_kg``. Power, purity and MAC are NaN:
-        fundamentals alone say nothing of them. Standard errors come from the residual of the fit as if it were noise;
-        where the model is what does not fit, they are no interval.
+        fundamentals alone say nothing of them. Standard errors come from the residual of the fit as if it were noise,
+        enlarged for few points: 1.96 of them are half of Student's 95 % interval. Where the model is what does not fit,
+        they are no interval. Levels that no mode can be fitted to are left out and named in the notes.
 
     Raises
     ------
     IdentificationError
-        Without response-controlled levels, or with fewer than five usable points or no resonance in one of them.
+        Without response-controlled levels, or with fewer than three usable points or no resonance in all of them.
     """
     if not 0.0 < phase_window_deg <= 90.0:
         raise IdentificationError(f"phase_window_deg: is {phase_window_deg:g}, allowed is above 0 to 90")
@@ -87,7 +93,9 @@ def stepped_sine_mode(
             f"responses: none is response-controlled ({kinds} given); a fit of one linear mode per level needs a "
             "constant response amplitude"
         )
-    fits = [_fit_level(level, phase_window_deg, complex_constant) for level in levels]
+    fitted, refusals = _fitted(levels, phase_window_deg, complex_constant)
+    left_out = len(responses) - len(levels)
+    levels, fits = [level for level, _ in fitted], [fit for _, fit in fitted]
     unknown = np.full(len(fits), np.nan)
     omega, damping = np.array([fit.omega for fit in fits]), np.array([fit.damping for fit in fits])
     mass, beta = np.array([fit.mass_kg for fit in fits]), np.array([fit.beta for fit in fits])
@@ -114,20 +122,48 @@ def stepped_sine_mode(
         response_harmonics_m=np.column_stack([unknown.astype(complex), motion.astype(complex)]),
         source="stepped sine",
         specimen=levels[0].specimen,
-        notes=_notes(responses, levels, fits),
+        notes=_notes(len(responses), left_out, refusals, fitted, phase_window_deg),
     )
+
+
+def _fitted(
+    levels: Sequence[FrequencyResponse], window_deg: float, complex_constant: bool
+) -> tuple[list[tuple[FrequencyResponse, _LevelFit]], list[str]]:
+    """Levels with their fits, and why others have none; raises the first reason where none has a fit."""
+    fitted, refusals = [], []
+    for level in levels:
+        try:
+            fitted.append((level, _fit_level(level, window_deg, complex_constant)))
+        except IdentificationError as error:
+            refusals.append(str(error))
+    if not fitted:
+        others = f" (no other of {len(levels)} levels fits either)" if len(refusals) > 1 else ""
+        raise IdentificationError(refusals[0] + others)
+    return fitted, refusals
+
+
+def _used(level: FrequencyResponse, window_deg: float, name: str) -> NDArray[np.bool_]:
+    """bool[n]: held at their level and within the window; where these are few, those nearest to phase resonance."""
+    held = np.abs(np.abs(level.response) / np.median(np.abs(level.response)) - 1.0) <= _LEVEL_TOLERANCE
+    away_deg = np.where(held, np.abs(level.phase_lag_deg - 90.0), np.inf)
+    used = away_deg <= window_deg
+    if np.count_nonzero(used) < _ENOUGH_POINTS:
+        used = np.zeros(held.size, bool)
+        used[np.argsort(away_deg, kind="stable")[:_ENOUGH_POINTS]] = True
+        used &= away_deg <= 90.0
+    distinct = np.unique(level.frequency_hz[used]).size
+    if distinct < _MIN_POINTS:
+        raise IdentificationError(
+            f"{name}: points at {distinct} frequencies of {held.size} points have a lag of 0 to 180 deg and the response "
+            f"at its level within {100 * _LEVEL_TOLERANCE:g} %, needs at least {_MIN_POINTS}"
+        )
+    return used
 
 
 def _fit_level(level: FrequencyResponse, window_deg: float, complex_constant: bool) -> _LevelFit:
     """Weighted linear least squares for m w^2, m and 2 m w z, with beta eliminated; see the module's head."""
     name = f"level '{level.label}'" if level.label else f"level {level.level:g} {level.level_unit}"
-    held = np.abs(np.abs(level.response) / np.median(np.abs(level.response)) - 1.0) <= _LEVEL_TOLERANCE
-    used = held & (np.abs(level.phase_lag_deg - 90.0) <= window_deg)
-    if np.count_nonzero(used) < _MIN_POINTS:
-        raise IdentificationError(
-            f"{name}: {np.count_nonzero(used)} of {used.size} points lie within {window_deg:g} deg of phase resonance "
-            f"with the response at its level within {100 * _LEVEL_TOLERANCE:g} %, needs at least {_MIN_POINTS}"
-        )
+    used = _used(level, window_deg, name)
     omega = 2.0 * np.pi * level.frequency_hz[used]
     stiffness = level.force[used] / level.displacement_m[used]
     scale = float(np.mean(omega))
@@ -158,7 +194,7 @@ def _fit_level(level: FrequencyResponse, window_deg: float, complex_constant: bo
         omega_std=float(np.sqrt(covariance[0, 0])) * scale,
         damping_std=float(np.sqrt(covariance[1, 1])),
         residual=float(np.linalg.norm(misfit) / np.sqrt(x.size)),
-        points=int(x.size),
+        widest_deg=float(np.max(np.abs(level.phase_lag_deg[used] - 90.0))),
     )
 
 
@@ -168,13 +204,16 @@ def _stacked(values: Complex | Float) -> Float:
 
 
 def _covariance(x: Float, w: float, z: float, mass: float, weight: Float, misfit: Float, turned: bool) -> Float:
-    """Covariance of w, z, m (and beta) from the misfit taken as white noise."""
+    """Covariance of w, z, m (and beta) from the misfit taken as white noise, with Student's factor for few points."""
+    from scipy.stats import t
+
     model = mass * (w**2 - x**2 + 2j * x * w * z)
     columns = [mass * (2.0 * w + 2j * x * z), 2j * mass * x * w, model / mass]
     if turned:
         columns.append(1j * model)
     jacobian = _stacked(np.column_stack(columns) * weight[:, None])
-    variance = float(np.sum(misfit**2)) / (misfit.size - len(columns))
+    freedom = misfit.size - len(columns)
+    variance = float(np.sum(misfit**2)) / freedom * (float(t.ppf(0.975, freedom)) / 1.96) ** 2
     return np.asarray(variance * np.linalg.inv(jacobian.T @ jacobian))
 
 
@@ -185,12 +224,31 @@ def _held_amplitude_m(level: FrequencyResponse, omega: float) -> float:
 
 
 def _notes(
-    responses: Sequence[FrequencyResponse], levels: Sequence[FrequencyResponse], fits: Sequence[_LevelFit]
+    count: int,
+    left_out: int,
+    refusals: Sequence[str],
+    fitted: Sequence[tuple[FrequencyResponse, _LevelFit]],
+    window_deg: float,
 ) -> tuple[str, ...]:
     notes = ["modal amplitude, harmonics, power and MAC cannot be had from fundamentals at one point alone"]
-    if len(levels) < len(responses):
-        notes.append(f"{len(responses) - len(levels)} of {len(responses)} levels left out: not response-controlled")
-    for level, fit in zip(levels, fits, strict=True):
+    if left_out:
+        notes.append(f"{left_out} of {count} levels left out: not response-controlled")
+    notes += [f"left out: {why}" for why in refusals]
+    widened = [fit.widest_deg for _, fit in fitted if fit.widest_deg > window_deg]
+    if widened:
+        notes.append(
+            f"{len(widened)} of {len(fitted)} levels have fewer than {_ENOUGH_POINTS} points within {window_deg:g} deg of "
+            f"phase resonance: points up to {max(widened):.0f} deg away are used"
+        )
+    # Force and velocity are in phase where the angle of w^2 - W^2 + 2 i W w z is 90 deg - beta, near W = w (1 - z tan beta).
+    apart = max(abs(fit.damping * math.tan(fit.beta)) for _, fit in fitted)
+    if apart > _SAID_APART:
+        turned = max(abs(math.degrees(fit.beta)) for _, fit in fitted)
+        notes.append(
+            f"the modal constant turns by up to {turned:.1f} deg: phase resonance lies up to {100.0 * apart:.2f} % from the "
+            "modal frequency, which its standard error says nothing of"
+        )
+    for level, fit in fitted:
         if not level.frequency_hz.min() <= fit.omega / (2.0 * np.pi) <= level.frequency_hz.max():
             notes.append(
                 f"level {level.level:g} {level.level_unit}: its modal frequency lies outside the measured range"

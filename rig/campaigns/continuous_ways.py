@@ -14,7 +14,7 @@ from rig.campaigns.recorded_flow import AT_VOLTAGE_LIMIT, flagged
 from rig.campaigns.rounds import Passage
 from rig.sequencer.layout import Outcome, SegmentKind
 
-__all__ = ["WAYS", "Way", "both_ways", "rows_near"]
+__all__ = ["WAYS", "Way", "both_ways", "rows_near", "turning_point"]
 
 WAYS = ("up", "down")
 FEWEST_INSTANTS = 16
@@ -50,9 +50,8 @@ def both_ways(
     bad["the lock was lost"] = ~(detuning <= plan.accepted_detuning)
     # An amplitude that is kept low spoils no waveform: what was reached is good.
     good = ~np.any([at for reason, at in bad.items() if reason != AT_VOLTAGE_LIMIT], axis=0)
-    turn = next(
-        (p.first for p in passages if p.kind is SegmentKind.LEVEL_SWEEP and p.level < plan.levels[0]), rows.size
-    )
+    turn = turning_point(passages)
+    turn = rows.size if turn is None else turn
     out = {}
     for way in WAYS:
         of_way = [p for p in passages if p.kind is not SegmentKind.RAMP and (p.first < turn) == (way == "up")]
@@ -66,6 +65,15 @@ def both_ways(
             why or "the level did not come so far",
         )
     return out
+
+
+def turning_point(passages: Sequence[Passage]) -> int | None:
+    """Number of the first row of the way down, which leads back to the level that the way up began with; None without one.
+
+    What is left of a plan may lie anywhere among its levels: the passages themselves say which is the lowest.
+    """
+    lowest = min((p.level for p in passages), default=0.0)
+    return next((p.first for p in passages if p.kind is SegmentKind.LEVEL_SWEEP and p.level == lowest), None)
 
 
 def _why(passages: Sequence[Passage], ended: str) -> str:

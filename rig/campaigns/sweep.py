@@ -41,6 +41,9 @@ class SweepPlan(TonePlan):
     """Time at the first frequency before the sweep, periods."""
     off_resonance_hz: tuple[tuple[float, float], ...] | None = Field(None, min_length=1)
     """Bands in which the force counts as that off resonance (the mean of their medians); the first 15 % if not given."""
+    accepted_level_error: float = Field(0.2, gt=0, le=1)
+    """Largest deviation of a held force or displacement from its level, relative, over three quarters of a sweep with which it
+    is accepted: the rest is left to jumps; of no meaning with levels in volts."""
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:

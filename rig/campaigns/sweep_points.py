@@ -16,6 +16,7 @@ from rig.tick.layout import SATURATED
 __all__ = ["SWEEP_COLUMNS", "measure_sweep", "transient_of"]
 
 NOT_HELD = 0.05  # of its level: a deviation that is said
+USUAL = 0.75  # of a sweep: over so much of it the level is to be held
 
 SWEEP_COLUMNS = (
     Column("off_resonance_n", "force off resonance", "N", ".4f"),
@@ -37,17 +38,30 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
         drop_out = force_drop_out(transient, off_resonance_hz=plan.off_resonance_hz)
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+    held = _held(bench, plan, target, rows, transient)
+    reason = _level_objection(plan, held.get("held_usual_error"))
     return {
         **point,
         "settled": None,
-        "accepted": True,
-        "reason": "",
+        "accepted": not reason,
+        "reason": reason,
         **asdict(drop_out),
         "minimum_ratio": drop_out.minimum_ratio,
         "overshoot_ratio": drop_out.overshoot_ratio,
         "duration_s": rows.size / bench.sample_rate_hz,
-        **_held(bench, plan, target, rows, transient),
+        **held,
     }
+
+
+def _level_objection(plan: SweepPlan, error: float | None) -> str:
+    """That what was held was too far from its level, jumps aside: through these no loop holds it."""
+    if error is None or error <= plan.accepted_level_error:
+        return ""
+    held = "displacement" if plan.level_unit == "m" else "force"
+    return (
+        f"the {held} is more than {100.0 * error:.3g} % off its level in {100.0 * (1.0 - USUAL):.0f} % of the sweep, "
+        f"accepted up to {100.0 * plan.accepted_level_error:g} %"
+    )
 
 
 def _held(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, transient: Transient) -> dict[str, Any]:
@@ -68,6 +82,7 @@ def _held(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, trans
         "held_most": float(held[most]),
         "held_most_frequency_hz": float(transient.frequency_hz[most]),
         "held_rms_error": float(np.sqrt(np.mean((held - 1.0) ** 2))),
+        "held_usual_error": float(np.quantile(np.abs(held - 1.0), USUAL)),
         "saturated_share": share,
         "warnings": warnings,
     }

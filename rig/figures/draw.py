@@ -128,6 +128,7 @@ def _draw_stepped_phase(page: "Figure", recording: Recording) -> None:
         frequency_responses(recording),
         held="RMS of the force" if plan.get("levels_rms_n") else "",
         title=text + (f", {left_out} not accepted" if left_out else ""),
+        lags_deg=sorted({point["asked_phase_lag_deg"] + 180.0 for point in points}),
     )
 
 

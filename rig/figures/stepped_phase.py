@@ -20,12 +20,18 @@ NEAR_DEG = 5.0  # of phase resonance: the point that is marked as resonant
 
 
 def draw_stepped_phase(
-    page: "Figure", responses: Sequence[FrequencyResponse], *, held: str = "", title: str = ""
+    page: "Figure",
+    responses: Sequence[FrequencyResponse],
+    *,
+    held: str = "",
+    title: str = "",
+    lags_deg: Sequence[float] = (),
 ) -> None:
     """Displacement amplitude, phase lag of the displacement and force over frequency.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement: where the response
-    folds over, the line runs back. The point nearest to phase resonance is filled; beside the force's fundamental a level
+    folds over, the line runs back; where lags of the displacement that were asked for, ``lags_deg``, are missing, it is
+    broken. The point nearest to phase resonance is filled; beside the force's fundamental a level
     that was ``held`` otherwise is dashed.
     """
     from matplotlib import colormaps
@@ -36,9 +42,10 @@ def draw_stepped_phase(
     for number, item in enumerate(responses):
         colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.85)
         label = item.label or f"{item.level:g} {item.level_unit}"
-        _branch(amplitude, item, item.amplitude_m * (1e6 if micro else 1e3), colour, label)
-        _branch(lag, item, item.phase_lag_deg, colour)
-        _branch(force, item, item.force_n, colour)
+        gaps = _gaps(item, lags_deg)
+        _branch(amplitude, item, item.amplitude_m * (1e6 if micro else 1e3), colour, gaps, label)
+        _branch(lag, item, item.phase_lag_deg, colour, gaps)
+        _branch(force, item, item.force_n, colour, gaps)
         if item.controlled == "force":
             force.axhline(item.level, color=colour, lw=0.9, ls="--")
     amplitude.set(xlabel="frequency, Hz", ylabel=f"displacement amplitude, {'µm' if micro else 'mm'}")
@@ -53,11 +60,26 @@ def draw_stepped_phase(
     heading(page, title)
 
 
+def _gaps(item: FrequencyResponse, lags_deg: Sequence[float]) -> NDArray[np.intp]:
+    """int[k]: points before which at least one of the lags that were asked for is missing."""
+    if not len(lags_deg):
+        return np.array([], dtype=np.intp)
+    asked = np.sort(lags_deg)
+    nearest = np.argmin(np.abs(np.subtract.outer(item.phase_lag_deg, asked)), axis=1)
+    return np.flatnonzero(np.abs(np.diff(nearest)) > 1) + 1
+
+
 def _branch(
-    axis: "Axes", item: FrequencyResponse, values: NDArray[np.float64], colour: object, label: str | None = None
+    axis: "Axes",
+    item: FrequencyResponse,
+    values: NDArray[np.float64],
+    colour: object,
+    gaps: NDArray[np.intp],
+    label: str | None = None,
 ) -> None:
     """One level in the order of measurement, its resonant point filled."""
-    axis.plot(item.frequency_hz, values, "o-", ms=4, mfc="white", color=colour, label=label)
+    x, y = np.insert(item.frequency_hz, gaps, np.nan), np.insert(values, gaps, np.nan)
+    axis.plot(x, y, "o-", ms=4, mfc="white", color=colour, label=label)
     resonant = int(np.argmin(np.abs(item.phase_lag_deg - 90.0)))
     if abs(item.phase_lag_deg[resonant] - 90.0) <= NEAR_DEG:
         axis.plot(item.frequency_hz[resonant], values[resonant], "o", ms=5, color=colour)

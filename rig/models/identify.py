@@ -11,6 +11,7 @@ from identification import (
     Exciter,
     FrequencyResponse,
     FrequencyResponseMatrix,
+    IdentificationError,
     LinearModes,
     ModalAnalysis,
     NonlinearMode,
@@ -71,9 +72,7 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
     if set(kinds) <= {FREQUENCY_RESPONSES.name, *STEPPED}:
         if modes is not None:
             raise ConfigurationError("--modes: stepped sines of one sensor have no use for mode shapes; leave it out")
-        stepped, missing = _stepped(paths)
-        found = stepped_sine_mode(stepped)
-        return replace(found, notes=(*missing, *found.notes))
+        return _stepped_mode(paths)
     identified = []
     for path in paths:
         runs, notes = _backbones(path)
@@ -85,6 +84,23 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
             )
             identified.append(replace(found, notes=(*notes, *found.notes)))
     return identified[0] if len(identified) == 1 else combined(identified)
+
+
+def _stepped_mode(paths: Sequence[Path]) -> NonlinearMode:
+    """From levels of a held response; at others stepped sines give responses, through which a mode's amplitude passes."""
+    stepped, missing = _stepped(paths)
+    if all(item.controlled != "response" for item in stepped):
+        raise ConfigurationError(
+            f"{', '.join(map(str, paths))}: frequency responses at levels of force or voltage, not a mode (`rig plot` shows "
+            "them); a nonlinear mode comes from backbones, or from levels of a held response"
+        )
+    try:
+        found = stepped_sine_mode(stepped)
+    except IdentificationError as error:
+        raise IdentificationError(
+            f"{error}; --model force-surface takes levels of held displacement as they are"
+        ) from None
+    return replace(found, notes=(*missing, *found.notes))
 
 
 def _stepped(paths: Sequence[Path]) -> tuple[list[FrequencyResponse], tuple[str, ...]]:

@@ -124,6 +124,18 @@ def test_a_sweep_says_how_well_its_force_was_held_and_where_not():
     assert 24.55 < point["held_most_frequency_hz"] < 24.75
     assert any(f"the force rose to {100 * force.max():.1f} % of its level" in line for line in point["warnings"])
     assert point["saturated_share"] == 0.0
+    assert point["accepted"]
+    assert point["held_usual_error"] == pytest.approx(np.quantile(np.abs(force - 1.0), 0.75), rel=1e-6)
+
+
+def test_a_sweep_that_is_too_fast_for_its_loop_is_not_accepted():
+    table = {"kind": "sweep", "levels_n": [FORCE_N], "start_hz": 24.3, "stop_hz": 24.8, "rate_hz_per_s": 0.5}
+    table |= {"hold_periods": 80, "accepted_level_error": 0.05}
+    with rig.run(plan_from(TONE | table, "sweep")) as run:
+        (point,) = run.recording.latest.values()
+    assert point["held_usual_error"] > 0.05
+    off = f"the force is more than {100.0 * point['held_usual_error']:.3g} % off its level in 25 % of the sweep"
+    assert (point["accepted"], point["reason"]) == (False, f"{off}, accepted up to 5 %")
 
 
 def test_a_sweep_of_given_voltage_says_nothing_of_holding():

@@ -57,6 +57,14 @@ def test_force_and_amplitude_are_those_at_the_modal_frequency() -> None:
     assert mode.source == "stepped sine"
 
 
+def test_a_turned_modal_constant_says_how_far_phase_resonance_lies_away() -> None:
+    fine = np.linspace(80.0, 80.6, 60001)
+    turned = level(beta_deg=9.0, f_hz=fine)
+    away = abs(float(np.interp(90.0, turned.phase_lag_deg, fine)) / 80.3 - 1.0)
+    assert any(f"up to {100.0 * away:.2f} %" in note for note in stepped_sine_mode([level(beta_deg=9.0)]).notes)
+    assert not any("turns by" in note for note in stepped_sine_mode([level(beta_deg=1.0)]).notes)
+
+
 def test_a_turned_modal_constant_held_real_shifts_the_frequency() -> None:
     mode = stepped_sine_mode([level(beta_deg=9.0)], complex_constant=False)
     assert 0.02 < 80.3 - mode.modal_frequency_hz[0] < 0.15
@@ -70,6 +78,48 @@ def test_stated_uncertainty_covers_the_truth_under_proportional_noise() -> None:
     covered = np.mean(np.abs([frequency, damping]) < 1.96, axis=1)
     assert np.all((covered > 0.90) & (covered < 0.99)), covered
     assert abs(np.mean(damping)) < 0.4
+
+
+def at_lags(lags_deg: list[float]) -> np.ndarray:
+    """Frequencies of the linear mode of `level` at lags of its displacement."""
+    cot = 1.0 / np.tan(np.radians(lags_deg))
+    return np.asarray(80.3 * (np.sqrt(1.0 + (0.004 * cot) ** 2) - 0.004 * cot))
+
+
+@pytest.mark.parametrize("lags_deg", [[32.0, 90.0, 148.0], [27.0, 58.0, 90.0, 122.0, 153.0]])
+def test_few_lags_are_enough_and_their_uncertainty_covers_the_truth(lags_deg: list[float]) -> None:
+    f_hz = at_lags(lags_deg)
+    exact = level(f_hz=f_hz, beta_deg=3.0)
+    assert exact.phase_lag_deg == pytest.approx(np.array(lags_deg) + 3.0)
+    assert stepped_sine_mode([exact]).damping_ratio[0] == pytest.approx(0.004, rel=1e-7)
+    modes = [stepped_sine_mode([level(f_hz=f_hz, beta_deg=3.0, noise=0.01, seed=seed)]) for seed in range(300)]
+    frequency = [(m.modal_frequency_hz[0] - 80.3) / m.modal_frequency_std_hz[0] for m in modes]
+    damping = [(m.damping_ratio[0] - 0.004) / m.damping_ratio_std[0] for m in modes]
+    covered = np.mean(np.abs([frequency, damping]) < 1.96, axis=1)
+    assert np.all((covered > 0.91) & (covered < 0.98)), covered
+
+
+def test_a_window_that_was_widened_is_said_and_points_within_it_keep_others_out() -> None:
+    lags = [27.0, 58.0, 90.0, 122.0, 153.0]
+    mode = stepped_sine_mode([level(f_hz=at_lags(lags)), level()])
+    assert any("1 of 2 levels have fewer than 5 points within 60 deg" in note for note in mode.notes)
+    assert any("points up to 63 deg away" in note for note in mode.notes)
+    spoilt = level(f_hz=at_lags([10.0, 40.0, 60.0, 90.0, 120.0, 140.0]))
+    force = spoilt.force.copy()
+    force[0] *= 1.5
+    spoilt = FrequencyResponse(spoilt.frequency_hz, force, spoilt.response, spoilt.kind, "response", 20.0)
+    mode = stepped_sine_mode([spoilt])
+    assert mode.damping_ratio[0] == pytest.approx(0.004, rel=1e-7)
+    assert len(mode.notes) == 1
+
+
+def test_a_level_that_no_mode_fits_does_not_take_the_others_with_it() -> None:
+    poor = level(f_hz=np.array([80.25, 80.35]))
+    mode = stepped_sine_mode([poor, level(80.1)])
+    assert mode.modal_frequency_hz == pytest.approx([80.1])
+    assert any(note.startswith("left out: level '20': points at 2 frequencies") for note in mode.notes)
+    with pytest.raises(IdentificationError, match=r"level '20'.*needs at least 3 \(no other of 2 levels fits either\)"):
+        stepped_sine_mode([poor, poor])
 
 
 def test_points_where_the_controller_lost_its_level_are_left_out() -> None:
@@ -90,8 +140,8 @@ def test_levels_that_are_not_response_controlled_are_left_out_and_said_so() -> N
 
 
 def test_what_cannot_be_fitted_is_named() -> None:
-    with pytest.raises(IdentificationError, match=r"level '20': 2 of 2 points lie within 60 deg.*needs at least 5"):
-        stepped_sine_mode([level(f_hz=np.array([80.25, 80.35]))])
+    with pytest.raises(IdentificationError, match=r"level '20': points at 2 frequencies of 3 points .*at least 3"):
+        stepped_sine_mode([level(f_hz=np.array([80.25, 80.35, 80.35]))])
     with pytest.raises(IdentificationError, match="phase_window_deg: is 120, allowed is above 0 to 90"):
         stepped_sine_mode([level()], phase_window_deg=120.0)
     good = level()

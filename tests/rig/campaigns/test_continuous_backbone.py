@@ -1,18 +1,23 @@
 """The continuous backbone: up and down without waiting, as accurate as harmonic balance of the coupled rig says it is."""
 
+import shutil
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from scipy.interpolate import PchipInterpolator
 
 import rig
 from identification import IdentificationError, ModalProperties
+from rig.campaigns.continuous_ways import turning_point
 from rig.campaigns.execution import Silent
 from rig.campaigns.plans import load_plan
+from rig.campaigns.rounds import Passage
 from rig.errors import ConfigurationError
 from rig.figures.draw import plot
 from rig.measurements import continuous_backbones
 from rig.models.identify import Request, identify_model
-from rig.sequencer.layout import SegmentKind
+from rig.sequencer.layout import Outcome, SegmentKind
 from rig.summary import summarise
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
@@ -138,6 +143,53 @@ def test_an_interrupted_way_down_is_resumed_over_the_levels_that_it_lacks(tmp_pa
         assert [point["number"] for point in run.recording.parts[1].points] == lacking
         highest = run.recording.parts[1].rows("command_v")
     assert np.abs(highest).max() < 1.0
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """Four levels about a gap."""
+    path = tmp_path_factory.mktemp("measured") / "out.h5"
+    rig.run(plan_with(levels_m=[2e-4, 4e-4, 1.2e-3]), output=path, seed=0).close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def finer():
+    found = phase_resonance_backbone(VirtualRig.shipped("magnet-beam"), forces_n=np.geomspace(0.03, 0.7, 16))
+    return PchipInterpolator(found.amplitude_m, found.modal_frequency_hz)
+
+
+@pytest.mark.parametrize(
+    "added", [[2.2e-3], [7e-4], [1.4e-4], [1.4e-4, 2.2e-3]], ids=["highest", "middle", "lowest", "both ends"]
+)
+def test_a_level_that_is_added_is_accepted_wherever_it_lies(measured, tmp_path, finer, added):
+    path = shutil.copy(measured, tmp_path / "out.h5")
+    with rig.resume(path, plan=plan_with(levels_m=sorted([2e-4, 4e-4, 1.2e-3, *added])), seed=4) as run:
+        assert run.complete
+        points = run.recording.parts[1].points
+    assert [point["level"] for point in points] == added
+    assert [(point["direction"], point["reason"]) for point in points] == [("both", "")] * len(added)
+    np.testing.assert_allclose([point["modal_frequency_hz"] for point in points], finer(added), rtol=5e-4)
+
+
+def test_after_the_voltage_limit_a_lower_level_in_its_place_is_accepted(tmp_path):
+    path, bench = tmp_path / "out.h5", bench_with({"limits": {"voltage_v": 1.5}})
+    rig.run(plan_with(levels_m=[2e-4, 4e-4, 2e-3]), bench=bench, output=path, seed=0).close()
+    with rig.resume(path, plan=plan_with(levels_m=[2e-4, 4e-4, 6e-4]), seed=1) as run:
+        assert run.complete
+        (point,) = run.recording.parts[1].points
+    assert (point["level"], point["direction"], point["reason"]) == (6e-4, "both", "")
+
+
+@pytest.mark.parametrize("lowest", [1e-4, 1e-3])
+def test_a_way_down_without_a_way_up_is_a_way_down(lowest):
+    found = turning_point(
+        [
+            Passage(SegmentKind.RAMP, lowest, 0, 100, Outcome.NOT_SETTLED),
+            Passage(SegmentKind.LEVEL_SWEEP, lowest, 100, 900, Outcome.DONE),
+        ]
+    )
+    assert found == 100
 
 
 def test_a_frequency_beyond_its_window_ends_what_is_taken():

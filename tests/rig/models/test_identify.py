@@ -1,11 +1,16 @@
-"""``rig identify`` for exciters: its numbers against the rig's own, and one line for every mistake."""
+"""``rig identify`` for exciters and held responses: its numbers against the rig's own, and one line for every mistake."""
 
 import json
 
+import numpy as np
 import pytest
 
+import rig
 from identification.prediction.exciter import PARAMETERS
+from rig.campaigns.plans import load_plan, plan_from
+from rig.models.files import load
 from rig.recording.reader import Recording
+from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
 
 
@@ -41,9 +46,9 @@ def test_an_exciter_is_shown_with_units_and_drawn(command, shelf, tmp_path):
 
 def test_a_known_resistance_and_stinger_make_the_moving_mass_surer(command, shelf, monkeypatch):
     monkeypatch.chdir(shelf)
-    rig = VirtualRig.shipped("magnet-beam")
-    known = f"--resistance {rig.exciter.resistance_ohm} --amplifier-gain {rig.exciter.amplifier_gain}"
-    known += f" --stinger-stiffness {rig.stinger.stiffness_n_m}"
+    own = VirtualRig.shipped("magnet-beam")
+    known = f"--resistance {own.exciter.resistance_ohm} --amplifier-gain {own.exciter.amplifier_gain}"
+    known += f" --stinger-stiffness {own.stinger.stiffness_n_m}"
     done = command(f"identify exciter.h5 --model exciter {known} -o known.h5 --json")
     assert done.status == 0, done.err
     told = json.loads(done.out)["parameters"]
@@ -51,9 +56,9 @@ def test_a_known_resistance_and_stinger_make_the_moving_mass_surer(command, shel
     assert told["moving_mass_kg"]["std"] < 0.7 * alone["moving_mass_kg"]["std"]
     assert told["back_emf_damping_n_s_m"]["std"] < 0.01 * alone["back_emf_damping_n_s_m"]["std"]
     for name, value in (
-        ("moving_mass_kg", rig.exciter.armature_mass_kg),
-        ("back_emf_damping_n_s_m", rig.exciter.force_factor_n_a**2 / rig.exciter.resistance_ohm),
-        ("suspension_damping_n_s_m", rig.exciter.suspension_damping_n_s_m),
+        ("moving_mass_kg", own.exciter.armature_mass_kg),
+        ("back_emf_damping_n_s_m", own.exciter.force_factor_n_a**2 / own.exciter.resistance_ohm),
+        ("suspension_damping_n_s_m", own.exciter.suspension_damping_n_s_m),
     ):
         assert told[name]["value"] == pytest.approx(value, rel=5e-3)
         assert abs(told[name]["value"] - value) < 4.0 * told[name]["std"]
@@ -112,3 +117,28 @@ def test_every_mistake_is_named_in_one_line_and_leaves_no_file(command, shelf, m
     assert said in done.err
     assert len(done.err.strip().splitlines()) == 1
     assert not (shelf / "wrong.h5").exists()
+
+
+def test_five_lags_of_the_friction_beam_give_its_mode_as_harmonic_balance_has_it(command, tmp_path):
+    shipped = load_plan("friction-beam/response-controlled").model_dump(exclude_none=True)
+    plan = plan_from(shipped | {"levels_m": [5.5e-5, 6.56e-5, 7.83e-5]}, "three levels")
+    rig.run(plan, output=tmp_path / "held.h5", seed=1).close()
+    done = command("identify held.h5 -o mode.h5 --json")
+    assert done.status == 0, done.err
+    mode = load(tmp_path / "mode.h5")
+    truth = phase_resonance_backbone(VirtualRig.shipped("friction-beam"), forces_n=np.geomspace(0.8, 1.8, 16))
+    for name, within in (("modal_frequency_hz", 2e-4), ("damping_ratio", 0.02)):
+        expected = np.interp(mode.amplitude_m, truth.amplitude_m, getattr(truth, name))
+        np.testing.assert_allclose(getattr(mode, name), expected, rtol=within)
+
+
+def test_a_held_rms_gives_responses_and_not_a_mode(command, tmp_path):
+    shipped = load_plan("magnet-beam/stepped-phase-fast-rms").model_dump(exclude_none=True)
+    shipped = {name: value for name, value in shipped.items() if name not in ("start_deg", "stop_deg", "step_deg")}
+    plan = plan_from(shipped | {"levels_rms_n": [0.1], "phase_lags_deg": [-110.0, -90.0, -70.0]}, "three lags")
+    with rig.run(plan, output=tmp_path / "lags.h5", seed=1) as run:
+        assert run.complete
+    done = command("identify lags.h5 -o mode.h5")
+    assert done.status != 0
+    assert "lags.h5: frequency responses at levels of force or voltage, not a mode" in done.err
+    assert not (tmp_path / "mode.h5").exists()
