@@ -24,6 +24,7 @@ from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 PLAN = load_plan("magnet-beam/continuous-backbone")
+UNKNOWN = {"plant": None}  # a known plant refuses levels that the test's limits do not allow
 FORCES = (0.0412, 0.120, 0.26, 0.412)
 
 
@@ -100,7 +101,7 @@ def test_repeats_are_backbones_of_their_own_and_make_one_mode(tmp_path):
 
 def test_at_the_voltage_limit_the_level_turns_and_what_was_reached_is_kept():
     bench = bench_with({"limits": {"voltage_v": 1.5}})
-    with rig.run(plan_with(levels_m=[2e-4, 4e-4, 6e-4, 2e-3]), bench=bench, seed=0) as run:
+    with rig.run(plan_with(**UNKNOWN, levels_m=[2e-4, 4e-4, 6e-4, 2e-3]), bench=bench, seed=0) as run:
         points = list(run.recording.latest.values())
         assert not run.complete
     assert [point["accepted"] for point in points] == [True, True, True, False]
@@ -110,7 +111,7 @@ def test_at_the_voltage_limit_the_level_turns_and_what_was_reached_is_kept():
 
 def test_a_trip_on_the_way_up_keeps_what_was_found_there_and_says_so():
     bench = bench_with({"limits": {"acceleration_m_s2": 35.0}})
-    with rig.run(plan_with(levels_m=[2e-4, 4e-4, 2e-3]), bench=bench, seed=0) as run:
+    with rig.run(plan_with(**UNKNOWN, levels_m=[2e-4, 4e-4, 2e-3]), bench=bench, seed=0) as run:
         points = list(run.recording.latest.values())
         with pytest.raises(IdentificationError, match="none of the recording was accepted"):
             run.backbone()
@@ -174,8 +175,8 @@ def test_a_level_that_is_added_is_accepted_wherever_it_lies(measured, tmp_path, 
 
 def test_after_the_voltage_limit_a_lower_level_in_its_place_is_accepted(tmp_path):
     path, bench = tmp_path / "out.h5", bench_with({"limits": {"voltage_v": 1.5}})
-    rig.run(plan_with(levels_m=[2e-4, 4e-4, 2e-3]), bench=bench, output=path, seed=0).close()
-    with rig.resume(path, plan=plan_with(levels_m=[2e-4, 4e-4, 6e-4]), seed=1) as run:
+    rig.run(plan_with(**UNKNOWN, levels_m=[2e-4, 4e-4, 2e-3]), bench=bench, output=path, seed=0).close()
+    with rig.resume(path, plan=plan_with(**UNKNOWN, levels_m=[2e-4, 4e-4, 6e-4]), seed=1) as run:
         assert run.complete
         (point,) = run.recording.parts[1].points
     assert (point["level"], point["direction"], point["reason"]) == (6e-4, "both", "")
