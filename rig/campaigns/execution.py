@@ -28,6 +28,7 @@ from rig.tick.tick import Tick
 __all__ = ["Execution", "Progress", "Silent", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
+STARTS = {SegmentKind.START, SegmentKind.RAMP, SegmentKind.LEVEL_SWEEP}
 UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED}
 OVER = {
     Outcome.DONE,
@@ -241,7 +242,7 @@ class Execution:
     def _mark_unlocked(self) -> None:
         """Without a lock at the start voltage all that is left of the plan has failed, and for that reason."""
         for segment, entry in zip(self.tick.arrays.segments, self.tick.outcomes, strict=True):
-            if int(segment["kind"]) == SegmentKind.START and int(entry["outcome"]) in UNLOCKED:
+            if int(segment["kind"]) in STARTS and int(entry["outcome"]) in UNLOCKED:
                 for target in self.targets:
                     left = target.number not in self.measured_before
                     if left and self.numbers[target.number] not in self.reported:

@@ -183,6 +183,12 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, sam
 
 
 @kernel
+def is_ramp(kind: int) -> bool:
+    """Whether a segment changes the level."""
+    return kind in (RAMP, LEVEL_SWEEP)
+
+
+@kernel
 def give_up(
     progress: Record,
     segments: np.ndarray,
@@ -196,7 +202,7 @@ def give_up(
     """The present segment has failed: on to the next point, or end the run, as its plan wants it."""
     segment = segments[progress.segment]
     close_segment(progress, outcomes, settling, failure, cycle, sample)
-    if segment.kind == START:
+    if segment.kind == START or (is_ramp(segment.kind) and failure == OUTSIDE_WINDOW):
         progress.finished = 1
         shut_down(guard, NO_LOCK if failure == NOT_LOCKED else NO_LOCK_IN_WINDOW, -1, 0.0, sample, False)
     elif (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
@@ -204,12 +210,6 @@ def give_up(
         shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
     else:
         skip_point(progress, segments, outcomes, sample)
-
-
-@kernel
-def is_ramp(kind: int) -> bool:
-    """Whether a segment changes the level."""
-    return kind in (RAMP, LEVEL_SWEEP)
 
 
 @kernel
@@ -293,6 +293,8 @@ def advance(
     if unreached and is_ramp(segment.kind) and segment.level > progress.level:
         progress.frozen_cycles += cycle - progress.last_cycle
     progress.last_cycle = cycle
+    if lock.state == LOCKED:
+        progress.unlocked = 0
     elapsed = cycle - progress.start_cycle
     if is_ramp(segment.kind):
         done = min((elapsed - progress.frozen_cycles) / segment.periods, 1.0)
@@ -302,6 +304,8 @@ def advance(
         progress.omega = between(progress.start_omega, segment.omega, rise)
         if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        elif progress.unlocked == 1 and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE:
+            give_up(progress, segments, outcomes, settling, guard, OUTSIDE_WINDOW, cycle, sample)
         elif progress.frozen_cycles >= SATURATED_PERIODS:
             give_up(progress, segments, outcomes, settling, guard, UNREACHABLE, cycle, sample)
         return
@@ -324,6 +328,7 @@ def advance(
     if segment.kind == START and elapsed >= segment.periods:
         verdict = start_verdict(settling, lock, elapsed)
         if verdict == DONE:
+            progress.unlocked = 1
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
         elif verdict != RUNNING:
             give_up(progress, segments, outcomes, settling, guard, verdict, cycle, sample)

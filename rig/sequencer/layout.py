@@ -145,6 +145,8 @@ PROGRESS = np.dtype(
         ("omega", "f8"),
         ("finished", "i8"),
         ("entered", "i8"),
+        ("unlocked", "i8"),
     ]
 )
-"""Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow."""
+"""Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow,
+``unlocked``: no lock since the time at the start voltage."""
