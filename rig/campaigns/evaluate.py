@@ -71,7 +71,7 @@ def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -
 
 
 def failed_point(plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False) -> dict[str, Any]:
-    """The mark of a point that was not measured, with the reason; it holds no data. ``at_start``: there was no lock to go on."""
+    """The mark of a point that was not measured, with the reason; it holds no data. ``at_start``: for want of a lock there."""
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle_rule.longest_periods)
