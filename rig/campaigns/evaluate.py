@@ -10,6 +10,7 @@ import numpy as np
 from identification import Channel, PeriodicVibration, periodic_vibration
 from rig.bench import Bench
 from rig.campaigns.plan import OpenLoopPlan, Plan, Target
+from rig.safety.layout import POLARITY_HINT
 from rig.sequencer.layout import Outcome
 
 __all__ = [
@@ -38,6 +39,7 @@ WHY = {
     Outcome.LOST_LOCK: "phase lock lost",
     Outcome.UNREACHABLE: "out of reach: the output stood at its voltage limit",
     Outcome.OUTSIDE_WINDOW: "the frequency stood at an end of its window: another mode, or a resonance outside",
+    Outcome.NOT_LOCKED: "the phase error stayed that of a lost lock",
     Outcome.INTERRUPTED: "interrupted",
 }
 
@@ -68,11 +70,13 @@ def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -
     return {**head(plan, target), "settled": settled, "accepted": False, "reason": f"cannot be evaluated: {error}"}
 
 
-def failed_point(plan: Plan, target: Target, outcome: np.void) -> dict[str, Any]:
-    """The mark of a point that was not measured, with the reason; it holds no data."""
+def failed_point(plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False) -> dict[str, Any]:
+    """The mark of a point that was not measured, with the reason; it holds no data. ``at_start``: for want of a lock there."""
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle_rule.longest_periods)
+    if at_start:
+        why = f"no lock at the start voltage: {why}"
     if target.frequency_hz is not None:
         why = f"at {target.frequency_hz:.6g} Hz: {why}"
     if not math.isfinite(error) and code in (Outcome.NOT_SETTLED, Outcome.DISTURBED):
@@ -80,8 +84,8 @@ def failed_point(plan: Plan, target: Target, outcome: np.void) -> dict[str, Any]
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
         phase = "" if isinstance(plan, OpenLoopPlan) else f"averaged phase error {error:.2f} deg, "
         why += f" ({phase}amplitude drift {100.0 * drift:.2g} %)"
-        if abs(error) > POLARITY_DEG:
-            why += "; is a sensor's polarity reversed, or the resonance outside the frequency window?"
+    if code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG:
+        why += f"; {POLARITY_HINT}"
     return {
         **head(plan, target),
         "settled": False,

@@ -28,6 +28,8 @@ from rig.tick.tick import Tick
 __all__ = ["Execution", "Progress", "Silent", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
+STARTS = {SegmentKind.START, SegmentKind.RAMP, SegmentKind.LEVEL_SWEEP}
+UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED}
 OVER = {
     Outcome.DONE,
     Outcome.NOT_SETTLED,
@@ -35,6 +37,7 @@ OVER = {
     Outcome.LOST_LOCK,
     Outcome.UNREACHABLE,
     Outcome.OUTSIDE_WINDOW,
+    Outcome.NOT_LOCKED,
 }
 
 
@@ -114,6 +117,7 @@ class Execution:
                 self._attempt(self._collect, rows)
                 self._attempt(self.progress.advance, rows, self.tick)
         self._attempt(self._mark_interrupted)
+        self._attempt(self._mark_unlocked)
         self._write(self.journal.end, self._end())
         if self.failure is not None:
             raise self.failure
@@ -234,6 +238,15 @@ class Execution:
         self.finished += 1
         self.accepted += 1 if point["accepted"] else 0
         self.progress.point(point, self.finished, len(self.targets))
+
+    def _mark_unlocked(self) -> None:
+        """Without a lock at the start voltage all that is left of the plan has failed, and for that reason."""
+        for segment, entry in zip(self.tick.arrays.segments, self.tick.outcomes, strict=True):
+            if int(segment["kind"]) in STARTS and int(entry["outcome"]) in UNLOCKED:
+                for target in self.targets:
+                    left = target.number not in self.measured_before
+                    if left and self.numbers[target.number] not in self.reported:
+                        self._report(failed_point(self.plan, target, entry, at_start=True))
 
     def _mark_interrupted(self) -> None:
         if self.in_one_go:

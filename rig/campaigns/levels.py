@@ -39,7 +39,8 @@ class Levels(Configured):
     start_v: float | None = Field(None, gt=0)
     """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""
     start_periods: float = Field(40.0, ge=1, le=1e5)
-    """Time at ``start_v``, for the lock to be gained, periods."""
+    """Time at ``start_v``, for the lock to be gained, periods; a little longer while one is in doubt. Without any at its end
+    (the frequency at an end of its window, or the phase far off all the time, for 20 periods), the run ends."""
 
     @model_validator(mode="after")
     def _levels_make_sense(self) -> Self:
@@ -88,7 +89,8 @@ class Levels(Configured):
             amplitude_law=AmplitudeLaw.VOLTAGE,
             lag_deg=lag_deg,
         )
-        return [ramp, replace(ramp, kind=SegmentKind.HOLD, periods=self.start_periods)]
+        kind = SegmentKind.START if excitation is None else SegmentKind.HOLD
+        return [ramp, replace(ramp, kind=kind, periods=self.start_periods)]
 
     def check_levels(self, bench: Bench) -> None:
         """Refuse a level beyond the bench's limit, and levels of a logarithmic loop without a voltage to begin with."""

@@ -2,6 +2,7 @@
 
 import math
 
+from controller.kernels import wrap
 from rig.safety.layout import ARMED, DISARMED, OFF, RAMPING, EndReason
 from vibrolock.compiled import Record, kernel
 
@@ -84,6 +85,24 @@ def watch_frequency(guard: Record, limits: Record, omega: float, sample: int) ->
     """Check the frequency (rad/s) of what is put out."""
     if guard.mode == ARMED and (omega < limits.lowest_rad_s or omega > limits.highest_rad_s):
         shut_down(guard, FREQUENCY_LIMIT, -1, omega / (2.0 * math.pi), sample, False)
+
+
+@kernel
+def permitted_turn(limits: Record, turn: float, demanded: float, before_v: float, after_v: float) -> float:
+    """Angle (rad) of the complex command that may follow ``turn`` while its amplitude goes from ``before_v`` to ``after_v``.
+
+    The command's whole change keeps the slew limit s: ``|dU|^2 = da^2 + 4 a_0 a_1 sin^2(d/2) <= da^2 + a_0 a_1 d^2 <= s^2``.
+    The amplitude goes first, the angle d has what is left. It takes the shorter way round.
+    """
+    product = before_v * after_v
+    if demanded == turn or not product > 0.0:
+        return demanded
+    change = after_v - before_v
+    left = max(limits.slew_v_per_sample * limits.slew_v_per_sample - change * change, 0.0)
+    way = wrap(demanded - turn)
+    if way * way * product <= left:
+        return demanded
+    return float(turn + math.copysign(math.sqrt(left / product), way))
 
 
 @kernel

@@ -4,7 +4,7 @@ from enum import IntEnum
 
 import numpy as np
 
-__all__ = ["GUARD", "INPUT", "INPUT_WATCH", "LIMITS", "TEXT", "EndReason", "GuardMode"]
+__all__ = ["GUARD", "INPUT", "INPUT_WATCH", "LIMITS", "POLARITY_HINT", "TEXT", "EndReason", "GuardMode"]
 
 
 class GuardMode(IntEnum):
@@ -27,6 +27,8 @@ class EndReason(IntEnum):
     COMPLETED = 1
     STOP_REQUESTED = 2
     PLAN_STOPPED = 3
+    NO_LOCK_IN_WINDOW = 4
+    NO_LOCK = 5
     FORCE_LIMIT = 10
     RESPONSE_LIMIT = 11
     DISPLACEMENT_LIMIT = 12
@@ -50,6 +52,8 @@ TEXT = {
     EndReason.COMPLETED: "the plan was carried out",
     EndReason.STOP_REQUESTED: "stopped by request",
     EndReason.PLAN_STOPPED: "stopped by the plan's rule after a point failed",
+    EndReason.NO_LOCK_IN_WINDOW: "no lock at the start voltage: the frequency stands at an end of its window",
+    EndReason.NO_LOCK: "no lock at the start voltage: the phase error stays large (start_periods may be too short)",
     EndReason.FORCE_LIMIT: "force above its limit",
     EndReason.RESPONSE_LIMIT: "response above its limit",
     EndReason.DISPLACEMENT_LIMIT: "displacement above its limit",
@@ -63,6 +67,9 @@ TEXT = {
     EndReason.DRIVER_FAILED: "the driver failed",
 }
 """One line for each reason."""
+
+POLARITY_HINT = "is a sensor's polarity reversed, or the resonance outside the frequency window?"
+"""What to look for where a loop finds no lock."""
 
 DISARMED, ARMED, RAMPING, OFF = (int(mode) for mode in GuardMode)
 
@@ -123,7 +130,9 @@ GUARD = np.dtype(
         ("stop_requested", "i8"),
         ("dropped", "i8"),
         ("off_samples", "i8"),
+        ("lock", "i8"),
     ]
 )
 """State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once: the first
-cause stays. ``off_samples`` counts since the output is off; ``dropped``: it was not ramped but dropped."""
+cause stays. ``off_samples`` counts since the output is off; ``dropped``: it was not ramped but dropped; ``lock``: the
+lock state when a segment was cut short."""

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from controller.layout import LockState
 from rig.bench import Bench
-from rig.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, TEXT, EndReason, GuardMode
+from rig.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_HINT, TEXT, EndReason, GuardMode
 
 INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
 
@@ -65,11 +66,12 @@ def guard_record(armed: bool) -> np.ndarray:
 
 
 def describe_end(guard: np.ndarray, bench: Bench) -> str:
-    """One sentence on why the output was brought down: reason, channel, value, sample."""
+    """One sentence on why the output was brought down: reason, channel, value, sample; what to look for without a lock."""
     reason = EndReason(int(guard["reason"][0]))
     text = TEXT[reason]
     if not reason.is_trip:
-        return text
+        unlocked = reason in (EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK)
+        return f"{text}; {POLARITY_HINT}" if unlocked else text
     channel = int(guard["channel"][0])
     sample = int(guard["sample"][0])
     where = ""
@@ -78,4 +80,6 @@ def describe_end(guard: np.ndarray, bench: Bench) -> str:
         where = f" on channel {bench.channels[channel].name} ({float(guard['value'][0]):.4g} {unit})"
     elif reason is EndReason.FREQUENCY_LIMIT:
         where = f" ({float(guard['value'][0]):.4g} Hz)"
-    return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s)"
+    acquiring = int(guard["lock"][0]) == LockState.ACQUIRING and reason <= EndReason.FREQUENCY_LIMIT
+    hint = f"; the loop was not locked: {POLARITY_HINT}" if acquiring else ""
+    return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s){hint}"

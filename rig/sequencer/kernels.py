@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from controller.layout import LOST, VOLTAGE
+from controller.layout import LOCKED, LOST, VOLTAGE
 from controller.lock.kernels import reacquire
 from rig.safety.kernels import shut_down
 from rig.safety.layout import ARMED, EndReason
@@ -15,6 +15,7 @@ from rig.sequencer.layout import (
     RAMP,
     RECORD,
     SETTLE,
+    START,
     SWEEP,
     OnFailure,
     Outcome,
@@ -25,6 +26,8 @@ COMPLETED = int(EndReason.COMPLETED)
 STOP_REQUESTED = int(EndReason.STOP_REQUESTED)
 PLAN_STOPPED = int(EndReason.PLAN_STOPPED)
 TRIP_LOST_LOCK = int(EndReason.LOST_LOCK)
+NO_LOCK_IN_WINDOW = int(EndReason.NO_LOCK_IN_WINDOW)
+NO_LOCK = int(EndReason.NO_LOCK)
 
 RUNNING = int(Outcome.RUNNING)
 DONE = int(Outcome.DONE)
@@ -35,10 +38,12 @@ UNREACHABLE = int(Outcome.UNREACHABLE)
 SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
 OUTSIDE_WINDOW = int(Outcome.OUTSIDE_WINDOW)
+NOT_LOCKED = int(Outcome.NOT_LOCKED)
 STOP = int(OnFailure.STOP)
 
 SATURATED_PERIODS = 20
 CLAMPED_PERIODS = 20
+FAR_PERIODS = 20
 ARRIVED = 1e-3  # the output within this part of the larger of a ramp's levels is at its end
 LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
 
@@ -79,6 +84,7 @@ def judge_period(
     settling.responses[slot] = response
     settling.forces[slot] = force
     settling.controlled[slot] = controlled
+    settling.clamped_in_row = settling.clamped_in_row + 1 if clamped else 0
     last = settling.count
     settling.count += 1
     if settling.count < 2 * n:
@@ -133,6 +139,23 @@ def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed:
 
 
 @kernel
+def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
+    """Whether the time at the start voltage, over by its length, ends: DONE, a failure's code, or RUNNING while in doubt.
+
+    No lock is needed, for one may swing in and out at plain voltage. Refused is a frequency that stands at an end of its
+    window, or a phase error that was that of a lost lock in every period so far; each for 20 periods at the least.
+    """
+    if lock.state == LOCKED:
+        return DONE
+    if settling.clamped_in_row >= CLAMPED_PERIODS:
+        return OUTSIDE_WINDOW
+    always_far = lock.far_periods > 0 and lock.far_periods >= math.floor(elapsed) - 1
+    if always_far and lock.far_periods >= FAR_PERIODS:
+        return NOT_LOCKED
+    return RUNNING if always_far or settling.clamped_in_row > 0 else DONE
+
+
+@kernel
 def close_segment(
     progress: Record, outcomes: np.ndarray, settling: Record, outcome: int, cycle: float, sample: int
 ) -> None:
@@ -160,6 +183,12 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, sam
 
 
 @kernel
+def is_ramp(kind: int) -> bool:
+    """Whether a segment changes the level."""
+    return kind in (RAMP, LEVEL_SWEEP)
+
+
+@kernel
 def give_up(
     progress: Record,
     segments: np.ndarray,
@@ -173,17 +202,14 @@ def give_up(
     """The present segment has failed: on to the next point, or end the run, as its plan wants it."""
     segment = segments[progress.segment]
     close_segment(progress, outcomes, settling, failure, cycle, sample)
-    if (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
+    if segment.kind == START or (is_ramp(segment.kind) and failure == OUTSIDE_WINDOW):
+        progress.finished = 1
+        shut_down(guard, NO_LOCK if failure == NOT_LOCKED else NO_LOCK_IN_WINDOW, -1, 0.0, sample, False)
+    elif (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
         progress.finished = 1
         shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
     else:
         skip_point(progress, segments, outcomes, sample)
-
-
-@kernel
-def is_ramp(kind: int) -> bool:
-    """Whether a segment changes the level."""
-    return kind in (RAMP, LEVEL_SWEEP)
 
 
 @kernel
@@ -239,6 +265,7 @@ def advance(
     if guard.stop_requested == 1 and guard.mode == ARMED:
         shut_down(guard, STOP_REQUESTED, -1, 0.0, sample, False)
     if guard.mode != ARMED:
+        guard.lock = lock.state
         if progress.entered:
             close_segment(progress, outcomes, settling, INTERRUPTED, cycle, sample)
         progress.finished = 1
@@ -266,6 +293,8 @@ def advance(
     if unreached and is_ramp(segment.kind) and segment.level > progress.level:
         progress.frozen_cycles += cycle - progress.last_cycle
     progress.last_cycle = cycle
+    if lock.state == LOCKED:
+        progress.unlocked = 0
     elapsed = cycle - progress.start_cycle
     if is_ramp(segment.kind):
         done = min((elapsed - progress.frozen_cycles) / segment.periods, 1.0)
@@ -275,6 +304,8 @@ def advance(
         progress.omega = between(progress.start_omega, segment.omega, rise)
         if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        elif progress.unlocked == 1 and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE:
+            give_up(progress, segments, outcomes, settling, guard, OUTSIDE_WINDOW, cycle, sample)
         elif progress.frozen_cycles >= SATURATED_PERIODS:
             give_up(progress, segments, outcomes, settling, guard, UNREACHABLE, cycle, sample)
         return
@@ -294,6 +325,14 @@ def advance(
         if failure != RUNNING:
             give_up(progress, segments, outcomes, settling, guard, failure, cycle, sample)
             return
+    if segment.kind == START and elapsed >= segment.periods:
+        verdict = start_verdict(settling, lock, elapsed)
+        if verdict == DONE:
+            progress.unlocked = 1
+            close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        elif verdict != RUNNING:
+            give_up(progress, segments, outcomes, settling, guard, verdict, cycle, sample)
+        return
     if segment.kind != SETTLE and elapsed >= segment.periods:
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
         close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE, cycle, sample)

@@ -25,6 +25,8 @@ class SegmentKind(IntEnum):
     """Hold the level and sweep the frequency of a tone to ``omega``; these rows are evaluated."""
     LEVEL_SWEEP = 5
     """A ramp of the level whose rows are evaluated."""
+    START = 6
+    """Hold for ``periods``, and as long as a lock is in doubt; without any the run ends before a loop takes the level over."""
 
 
 class Drive(IntEnum):
@@ -55,6 +57,8 @@ class Outcome(IntEnum):
     INTERRUPTED = 8
     OUTSIDE_WINDOW = 9
     """The loop's frequency stood at an end of its window."""
+    NOT_LOCKED = 10
+    """The phase error stayed beyond that of a lost lock for all the time at the start voltage."""
 
 
 class OnFailure(IntEnum):
@@ -64,7 +68,7 @@ class OnFailure(IntEnum):
     STOP = 1
 
 
-RAMP, SETTLE, RECORD, HOLD, SWEEP, LEVEL_SWEEP = (int(kind) for kind in SegmentKind)
+RAMP, SETTLE, RECORD, HOLD, SWEEP, LEVEL_SWEEP, START = (int(kind) for kind in SegmentKind)
 LOOP_DRIVE, TONE, WAVEFORM = (int(drive) for drive in Drive)
 
 SEGMENT = np.dtype(
@@ -117,11 +121,13 @@ SETTLING = np.dtype(
         ("bad_periods", "i8"),
         ("saturated_periods", "i8"),
         ("clamped_periods", "i8"),
+        ("clamped_in_row", "i8"),
         ("mean_error_rad", "f8"),
         ("drift", "f8"),
     ]
 )
-"""Period means of the last periods, as a ring, and what the settle rule made of them (one record)."""
+"""Period means of the last periods, as a ring, and what the settle rule made of them (one record).
+``clamped_in_row`` counts at any time, ``clamped_periods`` since the present settling."""
 
 PROGRESS = np.dtype(
     [
@@ -139,6 +145,8 @@ PROGRESS = np.dtype(
         ("omega", "f8"),
         ("finished", "i8"),
         ("entered", "i8"),
+        ("unlocked", "i8"),
     ]
 )
-"""Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow."""
+"""Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow,
+``unlocked``: no lock since the time at the start voltage."""

@@ -9,12 +9,13 @@ import math
 import numpy as np
 
 from controller.demodulation.kernels import adapt, demodulate, sign_product, turn_phasors
-from controller.kernels import TWO_PI, advance_phase, size, track
+from controller.kernels import TWO_PI, advance_phase, size, track, wrap
 from controller.layout import ADAPTIVE, SIGN
 from rig.safety.kernels import (
     NON_FINITE_OUTPUT,
     SENSOR_OVERLOAD,
     permitted_amplitude,
+    permitted_turn,
     shut_down,
     watch_frequency,
     watch_input,
@@ -202,7 +203,12 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
             watch_frequency(guard, t.limits[0], loop.omega, now)
         demanded = demanded_amplitude(t, present)
         flags |= SATURATED if loop.saturated == 1 else 0
+    before, loop.turn_behind = guard.amplitude_v, 0
     amplitude = permitted_amplitude(guard, t.limits[0], demanded, now)
+    if running and loop.demanded_turn != loop.turn:
+        loop.turn = permitted_turn(t.limits[0], loop.turn, loop.demanded_turn, before, amplitude)
+        if loop.turn != loop.demanded_turn:
+            loop.turn_behind = 1 if wrap(loop.demanded_turn - loop.turn) > 0.0 else -1
     loop.held_back = 1 if abs(amplitude - demanded) > HELD_BACK * abs(demanded) else 0
     loop.behind = 0 if loop.held_back == 0 else (1 if demanded > amplitude else -1)
     output = oscillate(t, amplitude)

@@ -33,6 +33,8 @@ LOOP = np.dtype(
         ("amplitude_law", "i8"),
         ("demanded_v", "f8"),
         ("turn", "f8"),
+        ("demanded_turn", "f8"),
+        ("turn_behind", "i8"),
         ("force_integral", "f8"),
         ("log_integral", "c16"),
         ("log_reference", "f8"),
@@ -65,7 +67,8 @@ LOOP = np.dtype(
         ("play", "i8"),
     ]
 )
-"""State of oscillator and laws (one record). ``turn``: angle of the complex command U; ``displacement``: amplitude of the
+"""State of oscillator and laws (one record). ``turn``: angle of the complex command U that is put out, ``demanded_turn`` by
+its law, ``turn_behind``: 1 while it cannot rise there as fast as it should, -1 fall; ``displacement``: amplitude of the
 drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at;
 ``late_`` amplitudes that passed one more low-pass, ``rest_`` sizes and phase error as they will be once the response keeps
 still (`rig.tick.laws.frequency.kernels.see_rest`)."""

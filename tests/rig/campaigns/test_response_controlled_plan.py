@@ -53,7 +53,7 @@ def test_the_loop_takes_over_from_the_start_voltage_and_every_other_segment_hold
     first, hold, *rest = plan().segments(5000.0)
     assert [(s.kind, s.level, s.amplitude_law) for s in (first, hold)] == [
         (SegmentKind.RAMP, 0.2, AmplitudeLaw.VOLTAGE),
-        (SegmentKind.HOLD, 0.2, AmplitudeLaw.VOLTAGE),
+        (SegmentKind.START, 0.2, AmplitudeLaw.VOLTAGE),
     ]
     assert {s.amplitude_law for s in rest} == {AmplitudeLaw.RESPONSE}
     assert [s.kind for s in rest[:3]] == [SegmentKind.RAMP, SegmentKind.SETTLE, SegmentKind.RECORD]

@@ -114,7 +114,7 @@ def test_before_the_first_point_the_lock_is_gained_at_its_level():
     kinds = [(s.kind, s.point) for s in plan.segments(5000.0)[:6]]
     assert kinds == [
         (SegmentKind.RAMP, -1),
-        (SegmentKind.HOLD, -1),
+        (SegmentKind.START, -1),
         (SegmentKind.RAMP, -1),
         (SegmentKind.HOLD, -1),
         (SegmentKind.RAMP, 0),

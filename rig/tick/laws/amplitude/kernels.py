@@ -48,6 +48,8 @@ def take_over(t: TickArrays, segment: Record) -> None:
     if segment.amplitude_law == loop.amplitude_law:
         return
     loop.amplitude_law = segment.amplitude_law
+    loop.demanded_turn = loop.turn
+    loop.turn_behind = 0
     amplitude = t.guard[0].amplitude_v
     progress.level = amplitude if loop.amplitude_law == VOLTAGE else controlled_size(t)
     loop.force_integral = amplitude
@@ -90,7 +92,8 @@ def hold_response(t: TickArrays, displacement: float) -> None:
     error = complex(log_ratio(displacement, loop.displacement), turned)
     loop.response_error += law.demodulator_gain * (error - loop.response_error)
     error = loop.response_error
-    loop.demanded_v, angle, loop.log_integral = log_proportional_integral(
+    before = loop.log_integral.imag
+    loop.demanded_v, angle, integral = log_proportional_integral(
         error,
         loop.log_integral,
         response_proportional(t),
@@ -100,8 +103,12 @@ def hold_response(t: TickArrays, displacement: float) -> None:
         law.largest_v,
         loop.behind,
     )
+    if (integral.imag - before) * loop.turn_behind > 0.0:  # no further the way that the output cannot turn
+        angle -= integral.imag - before
+        integral = complex(integral.real, before)
+    loop.log_integral = integral
     if law.turns == 1:
-        loop.turn = angle
+        loop.demanded_turn = angle
 
 
 @kernel
