@@ -6,6 +6,7 @@ to ``v = (ln|U|, arg U, Omega)``, all of them small deviations; arguments are ta
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,41 +93,36 @@ class ForceLaw:
 
 
 @dataclass(frozen=True)
-class LogForceLaw:
+class _LogLaw:
+    """``ln U = kp e + ki int e``, e the logarithm of wanted over measured size of one quantity."""
+
+    proportional: float
+    """kp (1)."""
+    integral_per_s: float
+    """ki (1/s)."""
+    measured: ClassVar[int]
+    """Which of m is held."""
+
+    def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        del plant, lag_deg
+        return _amplitude_row(s, self.measured, self.proportional + self.integral_per_s / s)
+
+    def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
+        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        return self.rows(s, plant, lag_deg)[:, :, self.measured]
+
+
+class LogForceLaw(_LogLaw):
     """``ln U = kp e + ki int e`` with ``e = ln(F*/|F|)``."""
 
-    proportional: float
-    """kp (1)."""
-    integral_per_s: float
-    """ki (1/s)."""
-
-    def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """K's rows of ln|U| and arg U [n, 2, 4]."""
-        del plant, lag_deg
-        return _amplitude_row(s, 0, self.proportional + self.integral_per_s / s)
-
-    def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
-        return self.rows(s, plant, lag_deg)[:, :, 0]
+    measured = 0
 
 
-@dataclass(frozen=True)
-class LogResponseLaw:
+class LogResponseLaw(_LogLaw):
     """``ln U = kp e + ki int e`` with ``e = ln(A_ref/|A|)``."""
 
-    proportional: float
-    """kp (1)."""
-    integral_per_s: float
-    """ki (1/s)."""
-
-    def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """K's rows of ln|U| and arg U [n, 2, 4]."""
-        del plant, lag_deg
-        return _amplitude_row(s, 2, self.proportional + self.integral_per_s / s)
-
-    def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
-        return self.rows(s, plant, lag_deg)[:, :, 2]
+    measured = 2
 
 
 @dataclass(frozen=True)

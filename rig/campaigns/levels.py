@@ -40,7 +40,7 @@ class Levels(Configured):
     """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""
     start_periods: float = Field(40.0, ge=1, le=1e5)
     """Time at ``start_v``, for the lock to be gained, periods; a little longer while one is in doubt. Without any at its end
-    (the frequency at an end of its window, or the phase far off all the time, for 20 periods), the run ends."""
+    (the frequency at an end of its window for 20 periods, or the phase far off for all of 100), the run ends."""
 
     @model_validator(mode="after")
     def _levels_make_sense(self) -> Self:

@@ -43,7 +43,7 @@ STOP = int(OnFailure.STOP)
 
 SATURATED_PERIODS = 20
 CLAMPED_PERIODS = 20
-FAR_PERIODS = 20
+FAR_PERIODS = 100  # a lock that swings at plain voltage comes near within the memory of a lightly damped mode
 ARRIVED = 1e-3  # the output within this part of the larger of a ramp's levels is at its end
 LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
 
@@ -143,7 +143,7 @@ def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
     """Whether the time at the start voltage, over by its length, ends: DONE, a failure's code, or RUNNING while in doubt.
 
     No lock is needed, for one may swing in and out at plain voltage. Refused is a frequency that stands at an end of its
-    window, or a phase error that was that of a lost lock in every period so far; each for 20 periods at the least.
+    window for 20 periods, or a phase error that was that of a lost lock in every period so far, for 100 at the least.
     """
     if lock.state == LOCKED:
         return DONE

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identification import Backbone, IdentificationError, nonlinear_mode, short_point, slow_flow
+from identification import Backbone, IdentificationError, SlowFlow, nonlinear_mode, short_point, slow_flow
 from tests.identification.slow_flows.ramps import (
     CHANNELS,
     PHI,
@@ -17,7 +17,7 @@ from tests.identification.slow_flows.ramps import (
 NOISE = (1e-3, 5e-3)
 
 
-def flow_of(record: Ramp):  # type: ignore[no-untyped-def]
+def flow_of(record: Ramp) -> SlowFlow:
     return slow_flow(record.theta, record.samples, CHANNELS, sample_rate_hz=RATE_HZ, drive_mode_shape=PHI)
 
 
