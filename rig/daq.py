@@ -17,7 +17,10 @@ from pydantic import Field, model_validator
 from rig.configuration import Configured
 from rig.errors import DaqError, DaqRefused
 
-__all__ = ["DAQ", "Capabilities", "Channel", "Role", "State"]
+__all__ = ["DAQ", "LOST", "Capabilities", "Channel", "Role", "State"]
+
+LOST = 1 << 15
+"""Bit of `DAQ.flags`: the sample was lost on its way, its inputs are NaN."""
 
 
 class Role(IntEnum):
@@ -104,10 +107,12 @@ class DAQ(ABC):
     `stop`. A driver implements the methods with a leading underscore and leaves the rest alone.
 
     ``flags`` (uint16[n]) are the device's own remarks on each sample of the last block, as bits: a driver that has any fills it
-    in `_exchange` and names the bits, lowest first, by its `counters`.
+    in `_exchange` and names the bits, lowest first, by its `counters`. Samples that were lost on their way are rows of NaN with
+    the bit `LOST`, in their place: the count of rows is the device's count of instants. `start` arms the device; whether it may
+    be started at all is decided above, by a person.
 
     Errors: `DaqRefused` for what the device or the present state cannot do, `DaqTimeout`, `DaqDisconnected`,
-    `DaqOverrun` for what happens on the way.
+    `DaqOverrun` and the others of `rig.errors` for what happens on the way.
     """
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float, output_range_v: float) -> None:
@@ -142,6 +147,16 @@ class DAQ(ABC):
     def remarks(self) -> tuple[str, ...]:
         """What looks odd about the bench to the driver, one line each; a run prints and records them."""
         return ()
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """What stands behind the driver, for the record: port, model, firmware, serial number; known once open."""
+        return {}
+
+    @property
+    def statistics(self) -> dict[str, float]:
+        """What was measured of the wire so far, for the record: bus load, round trips and the like, unit in the name."""
+        return {}
 
     @abstractmethod
     def _open(self) -> None:

@@ -2,11 +2,18 @@
 
 __all__ = [
     "ConfigurationError",
+    "DaqBusy",
     "DaqDisconnected",
+    "DaqEmergencyStop",
     "DaqError",
+    "DaqMismatch",
     "DaqOverrun",
+    "DaqProtocol",
     "DaqRefused",
+    "DaqReset",
     "DaqTimeout",
+    "DaqWatchdog",
+    "NotArmed",
     "RecordingError",
     "RigError",
 ]
@@ -42,3 +49,31 @@ class DaqOverrun(DaqError):  # noqa: N818
 
 class DaqRefused(DaqError):  # noqa: N818
     """The device or bus cannot carry what was asked for: rate, block, voltage or channels."""
+
+
+class DaqBusy(DaqError):  # noqa: N818
+    """The port is there, but somebody else holds it."""
+
+
+class DaqMismatch(DaqError):  # noqa: N818
+    """The device says of its channels, ranges or rates something else than the bench does."""
+
+
+class DaqProtocol(DaqError):  # noqa: N818
+    """What answers speaks another version, not this protocol, or two devices answer as one."""
+
+
+class DaqReset(DaqError):  # noqa: N818
+    """The device has started anew in the middle of a run."""
+
+
+class DaqWatchdog(DaqError):  # noqa: N818
+    """The device's watchdog has brought the output to 0 V, because no output had come in time."""
+
+
+class DaqEmergencyStop(DaqError):  # noqa: N818
+    """The emergency stop has brought the output to 0 V."""
+
+
+class NotArmed(RigError):  # noqa: N818
+    """Something physical would move and nobody has armed the bench."""

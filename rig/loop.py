@@ -2,8 +2,8 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
 
-__all__ = ["FusedDAQ", "Loop", "LoopStatistics"]
+__all__ = ["FusedDAQ", "Loop", "LoopStatistics", "RunningLoop"]
 
 CHUNK_S = 0.5
 PACED_CHUNK_S = 0.02
@@ -48,11 +48,45 @@ class LoopStatistics:
         """Seconds of rig time per second of everything, recording included."""
         return self.samples / self.sample_rate_hz / self.wall_s if self.wall_s > 0 else 0.0
 
+    def report(self, periods: int) -> dict[str, Any]:
+        """All of it as plain data; ``periods`` of the oscillator, in all."""
+        factors = {name: getattr(self, name) for name in ("realtime_factor", "end_to_end_factor")}
+        return {**asdict(self), "periods": periods, **factors}
+
+
+class RunningLoop(Protocol):
+    """A loop as a campaign sees it, in this process or in another."""
+
+    tick: Tick
+    """Its control state, as of the last row that `run` has yielded."""
+    failure: DaqError | None
+    """Why the driver ended the loop, if it did."""
+    statistics: LoopStatistics
+    """What the loop did so far."""
+
+    def run(self) -> Iterator[np.ndarray]:
+        """Telemetry in chunks, until the output is off."""
+
+    def request_stop(self) -> None:
+        """Ask for the ramp to 0 V; returns at once, may be called any time and from a signal handler."""
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The driver's counters."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The driver's remarks on the bench."""
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Statistics for the record, as plain data."""
+
 
 class Loop:
     """Runs a tick over a started driver until the guard has brought the output to 0 V.
 
-    `run` yields structured rows in chunks; between two chunks the caller may `Tick.request_stop`. A driver that fails
+    `run` yields structured rows in chunks; between two chunks the caller may `request_stop`. A driver that fails
     ends the loop: the rows so far are yielded, ``failure`` holds the error. ``paced`` holds a virtual rig back to the
     wall clock; a chunk that is done too late counts as an overrun. ``fused`` false makes a virtual rig go through
     `DAQ.exchange` as a real one does.
@@ -84,6 +118,25 @@ class Loop:
             if done:
                 yield self.tick.joined(readings[:done], rows[:done])
         self.statistics.wall_s = time.perf_counter() - began
+
+    def request_stop(self) -> None:
+        """Ask for the ramp to 0 V; it begins with the next chunk."""
+        self.tick.request_stop()
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The driver's counters."""
+        return self.daq.counters
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The driver's remarks on the bench."""
+        return self.daq.remarks
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Statistics for the record, as plain data."""
+        return {**self.statistics.report(int(self.tick.arrays.loop["cycles"][0])), **self.daq.statistics}
 
     def _load_kernels(self) -> None:
         """Compile, or load from the cache, what the loop calls, before the clock runs."""

@@ -1,7 +1,6 @@
 """Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,9 +14,8 @@ from rig.campaigns.plan import Plan
 from rig.campaigns.quality import what_was_skipped
 from rig.campaigns.rounds import round_at
 from rig.campaigns.stop_signals import stop_on_signals
-from rig.daq import DAQ
 from rig.errors import RecordingError
-from rig.loop import Loop, LoopStatistics
+from rig.loop import LoopStatistics, RunningLoop
 from rig.recording.journal import JournalWriter
 from rig.safety.layout import EndReason, GuardMode
 from rig.safety.limits import describe_end
@@ -74,17 +72,14 @@ class Execution:
         self,
         plan: Plan,
         bench: Bench,
-        daq: DAQ,
-        tick: Tick,
+        loop: RunningLoop,
         journal: JournalWriter,
-        realtime: bool,
         progress: Progress,
         done: frozenset[int] = frozenset(),
         numbers: Sequence[int] | None = None,
     ) -> None:
-        self.plan, self.bench, self.daq, self.tick = plan, bench, daq, tick
+        self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
         self.journal, self.progress = journal, progress
-        self.loop = Loop(daq, tick, paced=realtime)
         self.measure = KINDS[plan.kind].measure
         self.in_one_go = KINDS[plan.kind].in_one_go
         self.targets = plan.targets()
@@ -96,7 +91,7 @@ class Execution:
         self.reported: dict[int, dict[str, Any]] = {}
         self.next_segment = 0
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
-        self.kept = KeptRows(tick.row_dtype)
+        self.kept = KeptRows(loop.tick.row_dtype)
         self.write_error: RecordingError | None = None
         self.failure: Exception | None = None
 
@@ -105,12 +100,12 @@ class Execution:
 
         ``information`` is what is said of the part before its first row.
         """
-        flags = {"points_done": self.finished, "device_flags": [*self.daq.counters]}
+        flags = {"points_done": self.finished, "device_flags": [*self.loop.counters]}
         self._write(self.journal.part, {**information, **flags})
-        for remark in self.daq.remarks:
+        for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
-        with stop_on_signals(self.tick):
+        with stop_on_signals(self.loop.request_stop):
             for rows in self.loop.run():
                 self._write(self.journal.rows, rows)
                 self._attempt(self._note_changes, rows)
@@ -132,7 +127,7 @@ class Execution:
             step(*arguments)
         except Exception as error:  # whatever it is: a driven rig is brought down before anything is said
             self.failure = error
-            self.tick.request_stop()
+            self.loop.request_stop()
 
     def _write(self, method: Any, what: Any) -> None:
         """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""
@@ -142,7 +137,7 @@ class Execution:
             method(what)
         except RecordingError as error:
             self.write_error = error
-            self.tick.request_stop()
+            self.loop.request_stop()
 
     def _note_changes(self, rows: np.ndarray) -> None:
         """Every change of lock state and guard becomes an event, with its sample."""
@@ -187,7 +182,7 @@ class Execution:
     def _device_warnings(self, rows: np.ndarray) -> list[str]:
         """A line for each flag that the device had up while the point was recorded."""
         flags = rows["flags"] >> DEVICE_SHIFT
-        counted = ((name, int(np.count_nonzero(flags & (1 << bit)))) for bit, name in enumerate(self.daq.counters))
+        counted = ((name, int(np.count_nonzero(flags & (1 << bit)))) for bit, name in enumerate(self.loop.counters))
         return [f"{name.replace('_', ' ')} in {count} of {rows.size} samples" for name, count in counted if count]
 
     def _begin(self, segment: int) -> int:
@@ -267,8 +262,8 @@ class Execution:
             "text": self._why(),
             "tripped": reason.is_trip,
             "skipped": what_was_skipped(self.reported.values(), len(self.targets) - self.done),
-            "loop": _loop_report(self.loop.statistics, int(self.tick.arrays.loop["cycles"][0])),
-            "counters": self.daq.counters,
+            "loop": self.loop.report,
+            "counters": self.loop.counters,
         }
 
     def _why(self) -> str:
@@ -288,11 +283,6 @@ def nothing_left(bench: Bench) -> dict[str, Any]:
         "text": "nothing was left to measure",
         "tripped": False,
         "skipped": "",
-        "loop": _loop_report(LoopStatistics(bench.sample_rate_hz), 0),
+        "loop": LoopStatistics(bench.sample_rate_hz).report(0),
         "counters": {},
     }
-
-
-def _loop_report(statistics: LoopStatistics, periods: int) -> dict[str, Any]:
-    factors = {name: getattr(statistics, name) for name in ("realtime_factor", "end_to_end_factor")}
-    return {**asdict(statistics), "periods": periods, **factors}

@@ -9,16 +9,14 @@ from rig.campaigns.continuation import what_is_left
 from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
 from rig.campaigns.output import make_way, set_aside
 from rig.campaigns.plan import Plan
-from rig.daq import DAQ
-from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.recording.store import continue_recording, finalise
 from rig.sequencer.segments import Segment
+from rig.session import Session, TickSettings, open_session
 from rig.tick.layout import ROW_COLUMNS
-from rig.tick.tick import Tick
 
 __all__ = ["carry_out", "take_up"]
 
@@ -41,23 +39,21 @@ def carry_out(
     """
     plan.check(bench)
     make_way(output, overwrite)
-    with _armable(bench, seed) as daq:
-        daq.start(bench.block)
-        tick = _tick(plan, bench, daq, plan.segments(bench.sample_rate_hz))
+    with open_session(bench, seed, realtime=realtime) as session:
+        _require_armed(bench, session)
+        loop = session.start(_settings(plan, bench, plan.segments(bench.sample_rate_hz)))
         header = Header(
             kind=plan.kind,
             configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
             channels=[channel.model_dump(mode="json") for channel in bench.channels],
-            row_dtype=tick.row_dtype,
+            row_dtype=loop.tick.row_dtype,
             columns=[Column(**column) for column in ROW_COLUMNS],
             software_version=vibrolock.__version__,
             started=datetime.now(UTC).isoformat(timespec="seconds"),
             seed=seed,
         )
         with set_aside(output), JournalWriter.create(journal_path(output), header) as journal:
-            Execution(plan, bench, daq, tick, journal, realtime, progress or Silent()).go(
-                {"first_sample": 0, "seed": seed}
-            )
+            Execution(plan, bench, loop, journal, progress or Silent()).go({"first_sample": 0, "seed": seed})
     finalise(journal_path(output), output)
     return Recording(output)
 
@@ -88,13 +84,12 @@ def take_up(
     plan, bench = left.plan, left.bench
     segments = plan.segments(bench.sample_rate_hz, left.done)
     if segments:
-        with _armable(bench, drawn) as daq:
-            daq.start(bench.block)
-            tick = _tick(plan, bench, daq, segments)
+        with open_session(bench, drawn, realtime=realtime) as session:
+            _require_armed(bench, session)
+            loop = session.start(_settings(plan, bench, segments))
             columns = [Column(**column) for column in ROW_COLUMNS]
-            with continue_recording(output, row_dtype=tick.row_dtype, columns=columns) as journal:
-                executed = (plan, bench, daq, tick, journal, realtime, progress or Silent())
-                Execution(*executed, left.done, left.numbers).go(information)
+            with continue_recording(output, row_dtype=loop.tick.row_dtype, columns=columns) as journal:
+                Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers).go(information)
     elif not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
@@ -104,22 +99,13 @@ def take_up(
     return Recording(output)
 
 
-def _armable(bench: Bench, seed: int) -> DAQ:
-    """The bench's driver, not yet open; refused where something physical would move."""
-    daq = make_daq(bench, seed)
-    if not daq.capabilities.virtual:
+def _require_armed(bench: Bench, session: Session) -> None:
+    """Refuse where something physical would move."""
+    if not session.capabilities.virtual:
         raise ConfigurationError(f"bench {bench.name}: only virtual rigs can be armed by this version")
-    return daq
 
 
-def _tick(plan: Plan, bench: Bench, daq: DAQ, segments: tuple[Segment, ...]) -> Tick:
-    lead = bench.block + daq.latency_samples
-    return Tick(
-        bench,
-        plan.law,
-        plan.amplitude_law,
-        plan.settle_rule,
-        segments,
-        lead,
-        waveforms=plan.waveforms(bench.sample_rate_hz),
+def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:
+    return TickSettings(
+        bench, plan.law, plan.amplitude_law, plan.settle_rule, segments, plan.waveforms(bench.sample_rate_hz)
     )

@@ -2,17 +2,15 @@
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-
-from rig.tick.tick import Tick
 
 __all__ = ["stop_on_signals"]
 
 
 @contextmanager
-def stop_on_signals(tick: Tick) -> Iterator[None]:
+def stop_on_signals(request_stop: Callable[[], None]) -> Iterator[None]:
     """While the rig is driven, Ctrl-C, SIGTERM, a closed terminal and SIGQUIT ask for a ramp-down, and end nothing.
 
     Without effect outside the main thread, where Python delivers no signals.
@@ -22,7 +20,7 @@ def stop_on_signals(tick: Tick) -> Iterator[None]:
         return
 
     def ask(number: int, frame: FrameType | None) -> None:
-        tick.request_stop()
+        request_stop()
 
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")  # the last two not on every system
     numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]

@@ -1,0 +1,269 @@
+"""The messages that host and device exchange, whatever the wire: requests and answers, samples, outputs, heartbeats.
+
+A device is a dictionary of parameters of four bytes each, a state (`DeviceState`) and two streams. Every command is one
+`Request`, answered by one `Answer` with the same number, and repeated by the host until it is; a device that sees the number of
+its last request again repeats its answer and does nothing. Samples and outputs are never repeated: what is lost stays a gap.
+"""
+
+import struct
+from enum import IntEnum, IntFlag
+from typing import NamedTuple
+
+import numpy as np
+
+__all__ = [
+    "ARM_KEY",
+    "NAME_WORDS",
+    "VERSION",
+    "Answer",
+    "Command",
+    "DeviceFlag",
+    "DeviceState",
+    "EmergencyStop",
+    "Heartbeat",
+    "Message",
+    "Output",
+    "Parameter",
+    "Request",
+    "Samples",
+    "Status",
+    "Stream",
+    "as_float",
+    "as_text",
+    "float_word",
+    "text_words",
+]
+
+VERSION = 1
+"""Version of the protocol that this product speaks."""
+
+NAME_WORDS = 8
+"""Words of four bytes of a text parameter; word w of channel c is item ``8 c + w``."""
+
+
+class Command(IntEnum):
+    """What a request asks for."""
+
+    GET = 1
+    """The value of a parameter."""
+    SET = 2
+    """A new value of a parameter; the answer holds the value in force. Only while idle."""
+    START = 3
+    """Begin sampling at index 0, output 0 V, with the rate, block, queue and watchdog that were set."""
+    STOP = 4
+    """0 V at once, end sampling. Any time."""
+    ARM = 5
+    """Let outputs through from now on, and start the watchdog; ``value`` is `ARM_KEY`. Only while running."""
+    DISARM = 6
+    """0 V at once; sampling goes on."""
+    CLEAR = 7
+    """Forget a latched watchdog or emergency stop, once its cause is gone. Only while idle."""
+
+
+ARM_KEY = 0x41524D21  # "ARM!": no bit error of another command arms a device
+
+
+class Status(IntEnum):
+    """What a device says to a request."""
+
+    DONE = 0
+    UNKNOWN = 1
+    """It knows no such command, parameter or item."""
+    NOT_ALLOWED = 2
+    """The value is not allowed; the answer's ``value`` is the nearest that is."""
+    WRONG_STATE = 3
+    """Not in the present state; the answer's ``value`` is the `DeviceState`."""
+    LATCHED = 4
+    """The watchdog or the emergency stop has latched: clear it first."""
+
+
+class DeviceState(IntEnum):
+    """Life of a device."""
+
+    IDLE = 0
+    """0 V, not sampling."""
+    RUNNING = 1
+    """Sampling, 0 V."""
+    ARMED = 2
+    """Sampling, outputs let through, watchdog running."""
+    LATCHED = 3
+    """0 V until it is stopped and cleared; sampling goes on if it did."""
+
+
+class DeviceFlag(IntFlag):
+    """Remarks of the device on a block of samples."""
+
+    OVERLOAD = 1
+    """An input was beyond its range."""
+    OUTPUT_CLIPPED = 2
+    """An output was beyond the converter's range."""
+    OUTPUT_HELD = 4
+    """An output had not come in time: the last one was held."""
+    WATCHDOG = 8
+    """The watchdog has brought the output to 0 V, and latched."""
+    EMERGENCY_STOP = 16
+    """The emergency stop has brought the output to 0 V, and latched."""
+
+
+class Parameter(IntEnum):
+    """Four bytes each, little-endian: unsigned, or float32 where ``_V``, or four ASCII bytes of a text, zeros behind."""
+
+    LOWEST_VERSION = 1
+    HIGHEST_VERSION = 2
+    VERSION = 3
+    """To be set first: the version that both speak."""
+    MODEL = 4
+    """Text."""
+    FIRMWARE = 5
+    """Text."""
+    SERIAL_NUMBER = 6
+    """Text."""
+    BOOT = 7
+    """Another number after every reset."""
+    SIMULATED = 8
+    """1 where nothing physical moves."""
+    STATE = 9
+    """`DeviceState`."""
+    N_CHANNELS = 16
+    CHANNEL_NAME = 17
+    """Text, by channel."""
+    CHANNEL_UNIT = 18
+    """Text, by channel: of what `CHANNEL_V_PER_COUNT` scales to, ``V``."""
+    CHANNEL_RANGE_V = 19
+    """Largest reading, by channel."""
+    CHANNEL_V_PER_COUNT = 20
+    """Volts of one count, by channel."""
+    OUTPUT_RANGE_V = 21
+    OUTPUT_V_PER_COUNT = 22
+    BITS = 23
+    """16 or 32: size of counts on the wire, signed."""
+    LOWEST_RATE_MHZ = 32
+    """Millihertz."""
+    HIGHEST_RATE_MHZ = 33
+    """Millihertz."""
+    LARGEST_BLOCK = 34
+    LARGEST_QUEUE = 35
+    SHORTEST_WATCHDOG_US = 36
+    LONGEST_WATCHDOG_US = 37
+    FILTER_DELAY_NS = 38
+    """Mean delay of the converters' filters at low frequency."""
+    SKEW_NS = 39
+    """Delay behind the first channel, by channel."""
+    RATE_MHZ = 48
+    """Set: sample rate, millihertz."""
+    BLOCK = 49
+    """Set: samples a block."""
+    QUEUE = 50
+    """Set: blocks between the handing over of an output and the converter, at least 1."""
+    WATCHDOG_US = 51
+    """Set: longest time without a valid output while armed."""
+    RAMP_US = 52
+    """Set: time in which the watchdog ramps the output to 0 V; 0 drops it."""
+    LAYOUT_CRC = 64
+    """CRC-32 of the definition that sender and receiver must share; 0 where there is none."""
+    PING = 65
+    """Any item, answered at once."""
+
+
+class Request(NamedTuple):
+    """Host to device, eight bytes: ``<BBBBI``."""
+
+    number: int
+    command: int
+    parameter: int = 0
+    item: int = 0
+    value: int = 0
+
+
+class Answer(NamedTuple):
+    """Device to host, eight bytes: ``<BBBBI``."""
+
+    number: int
+    status: int
+    parameter: int = 0
+    item: int = 0
+    value: int = 0
+
+
+class Samples(NamedTuple):
+    """Device to host: one block, once it is measured."""
+
+    first: int
+    """Index of the first row, since START."""
+    counts: np.ndarray
+    """int16 or int32 [n, n_channels]."""
+    flags: int = 0
+    """`DeviceFlag`."""
+    dropped: int = 0
+    """Samples that the device could not send since START, in all."""
+    clock_us: int = 0
+    """Device clock when the last row was measured, microseconds; 0 where the wire has no room for it."""
+    sequence: int = 0
+    """Number of the block on the wire, wrapping."""
+
+
+class Output(NamedTuple):
+    """Host to device: the outputs of one block."""
+
+    first: int
+    """Index of the sample from which on they are due: (j + q) n."""
+    counts: np.ndarray
+    """int16 or int32 [n]."""
+    sequence: int = 0
+    """Number of the block on the wire, wrapping."""
+
+
+class Heartbeat(NamedTuple):
+    """Device to host, ten times a second and at every change of state."""
+
+    state: int
+    """`DeviceState`."""
+    flags: int
+    """`DeviceFlag`."""
+    boot: int
+    """Low byte of the parameter BOOT; another number after every reset."""
+    samples: int
+    """Samples measured since START."""
+    dropped: int = 0
+    """As in `Samples`."""
+
+
+class EmergencyStop(NamedTuple):
+    """Host to device, or from anybody on a bus: 0 V at once, and latch. Sent three times, answered by a heartbeat."""
+
+    reason: int = 0
+
+
+Message = Request | Answer | Samples | Output | Heartbeat | EmergencyStop
+
+
+class Stream(NamedTuple):
+    """What samples and outputs look like from START on; both ends know it from the parameters."""
+
+    n_channels: int
+    block: int
+    rate_hz: float
+    bits: int = 16
+    queue: int = 1
+
+
+def float_word(value: float) -> int:
+    """A float32 as the four bytes of a parameter."""
+    return int.from_bytes(struct.pack("<f", value), "little")
+
+
+def as_float(word: int) -> float:
+    """The float32 in the four bytes of a parameter."""
+    return float(struct.unpack("<f", word.to_bytes(4, "little"))[0])
+
+
+def text_words(text: str) -> list[int]:
+    """A text of up to 32 ASCII characters as the words of a parameter."""
+    data = text.encode("ascii", "replace")[: 4 * NAME_WORDS].ljust(4 * NAME_WORDS, b"\0")
+    return [int.from_bytes(data[4 * word : 4 * word + 4], "little") for word in range(NAME_WORDS)]
+
+
+def as_text(words: list[int]) -> str:
+    """The text in the words of a parameter; what is not printable ASCII becomes a question mark."""
+    data = b"".join(word.to_bytes(4, "little") for word in words).split(b"\0")[0]
+    return "".join(chr(byte) if 32 <= byte < 127 else "?" for byte in data)

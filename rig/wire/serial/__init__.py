@@ -1,0 +1,1 @@
+"""The protocol on a serial line: COBS frames with CRC-32."""
