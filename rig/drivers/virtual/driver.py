@@ -1,6 +1,7 @@
 """`VirtualDAQ`: a full sibling of a real driver, with any block and any latency."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -39,6 +40,8 @@ class VirtualDAQ(DAQ):
 
     It returns at once: pacing is the loop's. Not modelled: lost samples, jitter, a device that fails.
     """
+
+    wall_clock: ClassVar[bool] = False
 
     def __init__(self, bench: Bench, seed: int = 0) -> None:
         super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
