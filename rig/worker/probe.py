@@ -49,7 +49,7 @@ def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
             "paced_by": "device" if capabilities.paced else "host",
             "virtual": capabilities.virtual,
         }
-        prepare()
+        prepare(privileged=capabilities.paced)  # what returns at once would never let go of the processor
         daq.start(bench.block)
         zeros = np.zeros(bench.block)
         for _ in range(SETTLE_BLOCKS):
