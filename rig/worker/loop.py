@@ -1,6 +1,8 @@
 """The loop by the wall clock: one block after the other, on time or counted, and a safe end whatever happens."""
 
+import gc
 import os
+import sys
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -33,6 +35,11 @@ def suspended_s() -> float:
     return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
+def _collections() -> int:
+    """Runs of the garbage collector so far."""
+    return sum(int(generation["collections"]) for generation in gc.get_stats())
+
+
 class WallClockLoop:
     """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
 
@@ -41,6 +48,7 @@ class WallClockLoop:
 
     Whatever asks for the end of it (the campaign, a signal, a full ring, a campaign that is gone, a computer that has
     slept) gets the tick's ramp to 0 V. ``cause`` says who, unless it was the campaign; ``failure`` is the driver's error.
+    ``imports`` and ``collections``: modules imported and runs of the garbage collector in it, both of which are stalls.
     """
 
     def __init__(
@@ -61,6 +69,7 @@ class WallClockLoop:
         self._voltages = np.zeros(daq.block)
         self._begun_ns = self._release_ns = 0
         self._samples = self._overruns = self._busy_ns = 0
+        self.imports = self.collections = 0
         histograms = memory.histograms
         self._counts = histograms["wake_up"].add, histograms["execution"].add, histograms["response"].add
 
@@ -71,6 +80,7 @@ class WallClockLoop:
 
     def run(self) -> None:
         """Until the output is off."""
+        modules, collections = len(sys.modules), _collections()
         began = _now()
         self._pace.begin()
         over = False
@@ -80,6 +90,7 @@ class WallClockLoop:
             over = self.failure is not None or self.tick.over
             self._hand_over(slot, rows, _now() - began)
             self._look_round()
+        self.imports, self.collections = len(sys.modules) - modules, _collections() - collections
 
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; returns the rows that it holds."""

@@ -1,6 +1,5 @@
 """The loop process: opens the driver, takes its orders from the campaign, runs the loop, and says what came of it."""
 
-import os
 import signal
 import sys
 from multiprocessing.connection import Connection
@@ -117,5 +116,6 @@ def _listen() -> list[str]:
 def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
     """What the loop process alone knows, as plain data for the record."""
     pacing = "device" if loop.daq.capabilities.paced else "host"
-    real_time = {**said, "pacing": pacing, "process": os.getpid()}
+    counted = {"imports": str(loop.imports), "collections": str(loop.collections)}
+    real_time = {**said, "pacing": pacing, **counted}
     return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}
