@@ -3,8 +3,9 @@
 At each rate the loop drives the virtual magnet beam, paced by the host, in blocks of one sample. The parent writes every row
 to a journal in one thread while another spins. cyclictest (of Debian's rt-tests) runs in the same minutes, with the same
 interval, priority, locked memory and load: both take turns of a quarter of a minute, because two tasks of one priority on
-few processors would wait for each other. In its turns the parent goes on spinning and writes the rows of the turn before to a
-second journal, at the same pace. ``--unprivileged`` takes real-time scheduling and locked memory from both.
+few processors would wait for each other. In its turns the parent goes on spinning, and writes the rows of the turn before
+to a second journal, at the same pace. A period that was missed altogether is left out by both, and counted by the loop.
+``--unprivileged`` takes real-time scheduling and locked memory from both.
 
 ``stall_ms``: largest lateness of either. The collector never runs in the loop's process and nothing is imported there, both of
 which is counted, so what is late beyond the largest of cyclictest is the scheduler's or the machine's.
@@ -124,7 +125,8 @@ def cyclictest_turn(
     for line in text.splitlines():
         if line and line[0].isdigit():
             lateness, count = line.split()
-            counts[int(lateness)] += int(count)
+            if int(count):
+                counts[int(lateness)] += int(count)
         elif line.startswith("# Max Latencies"):
             counts[int(line.split(":")[1])] += 0
     return counts

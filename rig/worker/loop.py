@@ -2,6 +2,7 @@
 
 import gc
 import os
+import struct
 import sys
 import time
 from collections.abc import Callable
@@ -22,6 +23,7 @@ __all__ = ["CHUNK_DONE", "LONGEST_STALL_S", "WallClockLoop", "suspended_s"]
 
 CHUNK_DONE = b"."
 """What is sent to the campaign with every chunk."""
+NOTICE = struct.pack("!i", len(CHUNK_DONE)) + CHUNK_DONE  # as `Connection.send_bytes` has it, without its detours
 LONGEST_STALL_S = 1.0
 """A loop paced by the host that comes later than this, or ten blocks, ends with a ramp."""
 OFF = int(GuardMode.OFF)
@@ -57,7 +59,8 @@ class WallClockLoop:
         self.daq, self.tick = daq, tick
         self.failure: DaqError | None = None
         self.cause = ""
-        self._state, self._memory, self._facts, self._asked = state, memory, facts, asked
+        self._state, self._memory, self._asked = state, memory, asked
+        self._facts_descriptor = facts.fileno()
         self._parent = os.getppid()
         self._alone = False
         self._slept_s = suspended_s()
@@ -67,6 +70,10 @@ class WallClockLoop:
         self._deadline_ns = int(period_ns * max(1, queue))
         self._stall_ns = int(max(1e9 * LONGEST_STALL_S, 10 * period_ns))
         self._voltages = np.zeros(daq.block)
+        self._unsaid = False
+        # Spread over the blocks of a chunk, for each costs as much as a block does; a chunk of one block does both in one.
+        chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
+        self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
         self._begun_ns = self._release_ns = 0
         self._samples = self._overruns = self._busy_ns = 0
         self.imports = self.collections = 0
@@ -89,17 +96,20 @@ class WallClockLoop:
             rows = self._fill(slot)
             over = self.failure is not None or self.tick.over
             self._hand_over(slot, rows, _now() - began)
-            self._look_round()
+        self._announce()
         self.imports, self.collections = len(sys.modules) - modules, _collections() - collections
 
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; returns the rows that it holds."""
         tick, words, pace, daq, voltages = self.tick, self._memory.words, self._pace, self.daq, self._voltages
         arrays, block, by_device = tick.arrays, daq.block, self._pace.by_device
+        chores = self._chores
         guard = arrays.guard.view(np.int64).data
         for first in range(0, self._memory.layout.chunk, block):
             if words[STOP]:
                 tick.request_stop()
+            if first in chores:
+                chores[first]()
             self._account()
             pace.wait()
             begun = 0 if by_device else _now()
@@ -133,7 +143,6 @@ class WallClockLoop:
         if done - release > self._deadline_ns:
             self._overruns += 1
             if done - release > self._stall_ns and not self._pace.by_device:
-                self._pace.skip(done - release)
                 self._end(f"the loop stood still for {1e-9 * (done - release):.1f} s")
 
     def _fail(self, error: DaqError) -> None:
@@ -144,15 +153,27 @@ class WallClockLoop:
         """Complete a chunk and announce it. Without anybody there the slot is filled again."""
         if self._alone:
             return
-        slot.head[:] = rows, self._samples, self._overruns, self._busy_ns, wall_ns
+        overruns = self._overruns + self._pace.skipped
+        slot.head[:] = rows, self._samples, overruns, self._busy_ns, wall_ns
         counts = list(self.daq.counters.values())[: slot.counters.size]
         slot.counters[: len(counts)] = counts
         slot.state[:] = self._state
         self._memory.publish()
+        self._unsaid = True
+
+    def _announce(self) -> None:
+        """Tell the campaign of a chunk that it has not been told of."""
+        if not self._unsaid:
+            return
+        self._unsaid = False
         try:
-            self._facts.send_bytes(CHUNK_DONE)
+            os.write(self._facts_descriptor, NOTICE)
         except OSError:
             self._alone = True
+
+    def _both(self) -> None:
+        self._look_round()
+        self._announce()
 
     def _look_round(self) -> None:
         """Whether anything asks for the end."""

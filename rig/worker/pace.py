@@ -28,18 +28,29 @@ class Pace(Protocol):
     def begin(self) -> None:
         """The clock runs from now on."""
 
-    def skip(self, late_ns: int) -> None:
-        """What was missed will not be caught up."""
+    @property
+    def skipped(self) -> int:
+        """Periods that were left out so far because the loop came too late for them altogether."""
 
 
 class HostPace:
-    """Absolute deadlines of the host's monotonic clock: block j is due j + 1 periods after the beginning. Never spins."""
+    """Absolute deadlines of the host's monotonic clock: block j is due j + 1 periods after the beginning. Never spins.
+
+    What is late by whole periods goes on from the present, for a burst of blocks would sample at wrong times: these periods
+    are skipped, and counted.
+    """
 
     by_device = False
 
     def __init__(self, period_s: float) -> None:
         self._period_ns = 1e9 * period_s
         self._began = self._due = self._number = 0
+        self._skipped = 0
+
+    @property
+    def skipped(self) -> int:
+        """Periods left out so far."""
+        return self._skipped
 
     def begin(self) -> None:
         """The clock runs from now on."""
@@ -52,14 +63,15 @@ class HostPace:
         early = self._due - _now()
         if early > 0:
             _sleep(1e-9 * early)
+        elif -early > self._period_ns:
+            missed = int(-early // self._period_ns)
+            self._skipped += missed
+            self._number += missed
+            self._due = self._began + int(self._number * self._period_ns)
 
     def release(self, begun_ns: int) -> int:
         """The deadline that was waited for."""
         return self._due
-
-    def skip(self, late_ns: int) -> None:
-        """Move the schedule by as much."""
-        self._began += late_ns
 
 
 class DevicePace:
@@ -70,6 +82,7 @@ class DevicePace:
     """
 
     by_device = True
+    skipped = 0
 
     def __init__(self, period_s: float) -> None:
         self._period_ns = 1e9 * period_s
@@ -91,9 +104,6 @@ class DevicePace:
         due = self._earliest + self._number * self._period_ns
         self._number += 1
         return min(begun_ns, int(due))
-
-    def skip(self, late_ns: int) -> None:
-        """Nothing: the device does not wait."""
 
 
 def pace_of(daq: DAQ) -> Pace:

@@ -20,6 +20,7 @@ __all__ = ["VirtualDAQ"]
 
 FACT_TOLERANCE = 1e-3
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
+FLAG_NAMES = tuple(str(flag.name).lower() for flag in Flag)
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 
 
@@ -133,7 +134,7 @@ class VirtualDAQ(DAQ):
     @property
     def counters(self) -> dict[str, int]:
         """Samples at which each flag of the rig was up."""
-        return {str(flag.name).lower(): int(count) for flag, count in zip(Flag, self._counts, strict=True)}
+        return dict(zip(FLAG_NAMES, self._counts.tolist(), strict=True))
 
     def _open(self) -> None:
         pass
