@@ -147,15 +147,16 @@ def test_a_campaign_that_takes_no_rows_loses_none_and_the_output_comes_down(tmp_
     assert np.allclose(turns, 2 * np.pi * 20.0 / RATE_HZ, atol=1e-5)  # not one is missing
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_to_the_loop_itself_is_a_ramp_and_is_said(tmp_path, noting, number):
+def test_a_signal_to_the_loop_itself_is_a_ramp_and_is_said(tmp_path, noting):
     log = tmp_path / "outputs"
     bench = slow_bench(log=str(log))
     with WorkerSession(bench) as session:
         _, loop = ran(
-            session, tone(bench, 60.0), lambda loop, count: os.kill(session.pid, number) if count == 25 else None
+            session,
+            tone(bench, 60.0),
+            lambda loop, count: os.kill(session.pid, signal.SIGTERM) if count == 25 else None,
         )
-    assert number.name in loop.cause
+    assert "SIGTERM" in loop.cause
     assert ramped(np.fromfile(log, "<f8"))
 
 
