@@ -85,7 +85,7 @@ class RunningLoop(Protocol):
         """Statistics for the record, as plain data."""
 
 
-def end_by_driver(tick: Tick) -> None:
+def end_by_driver(tick: Tick, error: DaqError) -> None:
     """Note in the guard that the driver has failed, with which the output is off."""
     guard = tick.guard
     if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
@@ -187,7 +187,7 @@ class Loop:
 
     def _fail(self, error: DaqError) -> None:
         self.failure = error
-        end_by_driver(self.tick)
+        end_by_driver(self.tick, error)
 
     def _wait_for_the_clock(self, began: float) -> None:
         early = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()

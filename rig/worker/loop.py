@@ -147,7 +147,7 @@ class WallClockLoop:
 
     def _fail(self, error: DaqError) -> None:
         self.failure = error
-        end_by_driver(self.tick)
+        end_by_driver(self.tick, error)
 
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
         """Complete a chunk and announce it. Without anybody there the slot is filled again."""

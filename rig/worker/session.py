@@ -106,12 +106,12 @@ class WorkerLoop:
         else:
             self.failure = _daq_error(facts[0])
         if self.failure is not None:
-            end_by_driver(self.tick)
+            end_by_driver(self.tick, self.failure)
         self.ended = True
 
     def _fail(self, error: DaqError) -> None:
         self.failure = error
-        end_by_driver(self.tick)
+        end_by_driver(self.tick, error)
         self.ended = True
 
 
