@@ -1,42 +1,27 @@
 """Messages as bytes: a header of four bytes, a body of fixed form, all little-endian; see ``docs/wire-protocol.md``."""
 
 import struct
-from enum import IntEnum
 
 import numpy as np
 
 from rig.errors import DaqRefused
 from rig.wire.messages import VERSION, Answer, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
 
-__all__ = ["LARGEST_PAYLOAD", "Codec", "Damaged", "ForeignVersion", "Malformed", "Oversize", "Type"]
+__all__ = ["HEARTBEAT_BODY", "LARGEST_PAYLOAD", "Codec", "Damaged", "ForeignVersion", "Malformed", "Oversize"]
 
 LARGEST_PAYLOAD = 65_536
 """Bytes of the largest header and body, whatever the stream: what bounds a receiver's memory."""
 
 
-class Type(IntEnum):
-    """Second byte of a frame."""
+REQUEST, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP = range(1, 7)  # second byte of a payload
+LASTING = (REQUEST, ANSWER, EMERGENCY_STOP)  # the same in every version, so that versions can be agreed on
 
-    REQUEST = 1
-    ANSWER = 2
-    SAMPLES = 3
-    OUTPUT = 4
-    HEARTBEAT = 5
-    EMERGENCY_STOP = 6
-
-
-LASTING = (
-    Type.REQUEST,
-    Type.ANSWER,
-    Type.EMERGENCY_STOP,
-)  # the same in every version, so that versions can be agreed on
-
-HEADER = struct.Struct("<BBH")  # version, type, sequence
-COMMAND = struct.Struct("<BBHBBBBI")  # header; number, command or status, parameter, item, value
-SAMPLES = struct.Struct("<BBHQQIHxx")  # header; first, clock_us, dropped, flags, two zeros that align the counts
-OUTPUT = struct.Struct("<BBHQ")  # header; first
-HEARTBEAT = struct.Struct("<BBHBBHIQ")  # header; state, boot, flags, dropped, samples
-STOP = struct.Struct("<BBHB")  # header; reason
+HEADER_SIZE = 4  # version, type, sequence: the first three fields of each of these
+COMMAND = struct.Struct("<BBHBBBBI")  # number; command or status; parameter; item; value
+SAMPLES_HEAD = struct.Struct("<BBHQQIHxx")  # first; clock_us; dropped; flags; two zeros that align the counts
+OUTPUT_HEAD = struct.Struct("<BBHQ")  # first
+HEARTBEAT_BODY = struct.Struct("<BBHBBHIQ")  # state; boot; flags; dropped; samples
+STOP = struct.Struct("<BBHB")  # reason
 
 MOST_DROPPED = 2**32 - 1
 
@@ -94,59 +79,60 @@ class Codec:
     def sizes(stream: Stream) -> tuple[int, int]:
         """Bytes of the payload of one block of samples, and of one of outputs."""
         width = stream.bits // 8
-        return SAMPLES.size + width * stream.block * stream.n_channels, OUTPUT.size + width * stream.block
+        return SAMPLES_HEAD.size + width * stream.block * stream.n_channels, OUTPUT_HEAD.size + width * stream.block
 
     def encode(self, message: Message) -> bytes:
         """The payload of a message; counts must have the shape agreed on."""
         if isinstance(message, Samples):
             first, counts, flags, dropped, clock_us, sequence = message
-            self._check(counts, self._shape)
-            dropped = min(dropped, MOST_DROPPED)
-            head = SAMPLES.pack(VERSION, Type.SAMPLES, sequence & 0xFFFF, first, clock_us, dropped, flags)
-            return head + counts.astype(self._counts, copy=False).tobytes()
+            data = self._bytes_of(counts, self._shape)
+            head = (VERSION, SAMPLES, sequence & 0xFFFF, first, clock_us, min(dropped, MOST_DROPPED), flags)
+            return SAMPLES_HEAD.pack(*head) + data
         if isinstance(message, Output):
             first, counts, sequence = message
-            self._check(counts, self._shape[:1])
-            head = OUTPUT.pack(VERSION, Type.OUTPUT, sequence & 0xFFFF, first)
-            return head + counts.astype(self._counts, copy=False).tobytes()
+            data = self._bytes_of(counts, self._shape[:1])
+            return OUTPUT_HEAD.pack(VERSION, OUTPUT, sequence & 0xFFFF, first) + data
         if isinstance(message, Request):
-            return COMMAND.pack(VERSION, Type.REQUEST, 0, *message)
+            return COMMAND.pack(VERSION, REQUEST, 0, *message)
         if isinstance(message, Answer):
-            return COMMAND.pack(VERSION, Type.ANSWER, 0, *message)
+            return COMMAND.pack(VERSION, ANSWER, 0, *message)
         if isinstance(message, Heartbeat):
             state, flags, boot, samples, dropped = message
             dropped = min(dropped, MOST_DROPPED)
-            return HEARTBEAT.pack(VERSION, Type.HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples)
-        return STOP.pack(VERSION, Type.EMERGENCY_STOP, 0, message.reason)
+            return HEARTBEAT_BODY.pack(VERSION, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples)
+        return STOP.pack(VERSION, EMERGENCY_STOP, 0, message.reason)
 
     def decode(self, payload: bytes) -> Message:
         """The message of a payload; counts are views of its bytes. Raises `Malformed`, and nothing else."""
         size = len(payload)
-        if size < HEADER.size:
+        if size < HEADER_SIZE:
             raise Malformed(f"{size} bytes")
-        version, kind, _ = HEADER.unpack_from(payload)
+        version, kind = payload[0], payload[1]
         if version != VERSION and kind not in LASTING:
             raise ForeignVersion(f"version {version}")
-        if kind == Type.SAMPLES and size == self._samples_size:
-            _, _, sequence, first, clock_us, dropped, flags = SAMPLES.unpack_from(payload)
-            counts = np.frombuffer(payload, self._counts, -1, SAMPLES.size).reshape(self._shape)
+        if kind == SAMPLES and size == self._samples_size:
+            _, _, sequence, first, clock_us, dropped, flags = SAMPLES_HEAD.unpack_from(payload)
+            counts = np.frombuffer(payload, self._counts, -1, SAMPLES_HEAD.size).reshape(self._shape)
             return Samples(first, counts, flags, dropped, clock_us, sequence)
-        if kind == Type.OUTPUT and size == self._output_size:
-            _, _, sequence, first = OUTPUT.unpack_from(payload)
-            return Output(first, np.frombuffer(payload, self._counts, -1, OUTPUT.size), sequence)
-        if kind == Type.REQUEST and size == COMMAND.size:
+        if kind == OUTPUT and size == self._output_size:
+            _, _, sequence, first = OUTPUT_HEAD.unpack_from(payload)
+            return Output(first, np.frombuffer(payload, self._counts, -1, OUTPUT_HEAD.size), sequence)
+        if kind == REQUEST and size == COMMAND.size:
             return Request(*COMMAND.unpack(payload)[3:])
-        if kind == Type.ANSWER and size == COMMAND.size:
+        if kind == ANSWER and size == COMMAND.size:
             return Answer(*COMMAND.unpack(payload)[3:])
-        if kind == Type.HEARTBEAT and size == HEARTBEAT.size:
-            _, _, _, state, boot, flags, dropped, samples = HEARTBEAT.unpack(payload)
+        if kind == HEARTBEAT and size == HEARTBEAT_BODY.size:
+            _, _, _, state, boot, flags, dropped, samples = HEARTBEAT_BODY.unpack(payload)
             return Heartbeat(state, flags, boot, samples, dropped)
-        if kind == Type.EMERGENCY_STOP and size == STOP.size:
+        if kind == EMERGENCY_STOP and size == STOP.size:
             return EmergencyStop(STOP.unpack(payload)[3])
         raise Malformed(f"type {kind} with {size} bytes")
 
-    def _check(self, counts: np.ndarray, shape: tuple[int, ...]) -> None:
+    def _bytes_of(self, counts: np.ndarray, shape: tuple[int, ...]) -> bytes:
         if not self._samples_size:
             raise DaqRefused("samples and outputs are sent once their shape has been agreed on (configure)")
         if counts.shape != shape:
             raise DaqRefused(f"counts of shape {counts.shape}: allowed is {shape}, the stream agreed on")
+        if counts.dtype != self._counts:
+            counts = counts.astype(self._counts)
+        return counts.tobytes()

@@ -13,6 +13,7 @@ from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Ov
 __all__ = ["COUNTERS", "FrameReader", "frame", "largest_frame", "payload_of"]
 
 CRC_SIZE = 4
+RESIDUE = crc32(bytes(CRC_SIZE))  # of any bytes with their CRC-32 behind them, low byte first
 LONGEST_RUN = 254  # bytes of a COBS block
 
 COUNTERS = ("crc_errors", "oversize_frames", "malformed", "foreign_versions", "garbage_bytes")
@@ -30,10 +31,9 @@ def payload_of(encoded: bytes) -> bytes:
         data: bytes = cobs.decode(encoded)
     except cobs.DecodeError as error:
         raise Damaged(str(error)) from error
-    payload = data[:-CRC_SIZE]
-    if crc32(payload).to_bytes(CRC_SIZE, "little") != data[-CRC_SIZE:]:
-        raise Damaged(f"CRC-32 of {len(payload)} bytes")
-    return payload
+    if crc32(data) != RESIDUE or len(data) < CRC_SIZE:
+        raise Damaged(f"CRC-32 of {len(data)} bytes")
+    return data[:-CRC_SIZE]
 
 
 def largest_frame(payload_size: int) -> int:

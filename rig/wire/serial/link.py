@@ -19,6 +19,7 @@ from rig.wire.serial.pty import is_pseudo_terminal
 
 __all__ = ["SerialLink"]
 
+STREAMED = (Samples, Output)
 CHUNK = 4096  # bytes a read; a pseudo-terminal holds no more
 PATIENCE_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
 
@@ -86,7 +87,7 @@ class SerialLink(Link):
     def send(self, message: Message) -> None:
         """Send one message; `DaqTimeout` says that the line takes no more, and that nothing of it was sent."""
         data = frame(self._codec.encode(message))
-        if not isinstance(message, Samples | Output):
+        if not isinstance(message, STREAMED):
             data = b"\0" + data  # ends what noise on an idle line may have begun
         if self._unfinished:
             data = self._unfinished + data

@@ -4,7 +4,7 @@ import math
 
 from rig.wire.link import Load
 from rig.wire.messages import Stream
-from rig.wire.serial.codec import HEARTBEAT, Codec
+from rig.wire.serial.codec import HEARTBEAT_BODY, Codec
 from rig.wire.serial.frames import largest_frame
 
 __all__ = ["line_load"]
@@ -20,7 +20,7 @@ def line_load(stream: Stream, baud: int | None) -> Load:
     """
     blocks_hz = stream.rate_hz / stream.block
     samples = largest_frame(Codec.sizes(stream)[0])
-    heartbeat = largest_frame(HEARTBEAT.size) + 1  # and the zero before it
+    heartbeat = largest_frame(HEARTBEAT_BODY.size) + 1  # and the zero before it
     needed = BITS_A_BYTE * (blocks_hz * samples + HEARTBEATS_HZ * heartbeat)
     terms = f"{blocks_hz:g}/s x {samples} bytes of samples + {HEARTBEATS_HZ}/s x {heartbeat} bytes of heartbeats"
     carried = "a pseudo-terminal carries any" if baud is None else f"{baud} baud carry {baud / 1e3:g} kbit/s"
