@@ -72,13 +72,13 @@ class WireDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Paced by the device; virtual where the device says that nothing physical moves."""
+        """Paced by the device; virtual where the device says that nothing physical moves; known once open."""
         facts = self._facts
         return Capabilities(
             largest_block=facts.largest_block if facts else LARGEST_UNKNOWN_BLOCK,
             paced=True,
             virtual=facts is not None and facts.simulated,
-            repeatable=False,
+            repeatable=facts is not None and facts.repeatable,
         )
 
     @property

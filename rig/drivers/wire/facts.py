@@ -26,6 +26,8 @@ class DeviceFacts:
     serial_number: str
     boot: int
     simulated: bool
+    repeatable: bool
+    """Whether every START finds the same device, so that the same outputs give the same samples."""
     names: tuple[str, ...]
     units: tuple[str, ...]
     range_v: np.ndarray
@@ -73,7 +75,8 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
         firmware=dialogue.get_text(Parameter.FIRMWARE),
         serial_number=dialogue.get_text(Parameter.SERIAL_NUMBER),
         boot=get(Parameter.BOOT),
-        simulated=get(Parameter.SIMULATED, default=0) == 1,
+        simulated=get(Parameter.SIMULATED, default=0) >= 1,
+        repeatable=get(Parameter.SIMULATED, default=0) == 2,
         names=tuple(dialogue.get_text(Parameter.CHANNEL_NAME, channel) for channel in channels),
         units=tuple(dialogue.get_text(Parameter.CHANNEL_UNIT, channel) for channel in channels),
         range_v=np.array([get_float(Parameter.CHANNEL_RANGE_V, channel) for channel in channels]),
@@ -120,12 +123,14 @@ def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> Non
             )
     if bench.output_range_v > facts.output_range_v * (1.0 + FLOAT_TOLERANCE):
         raise DaqMismatch(
-            f"{name}: output_range_v = {bench.output_range_v:g} in the bench, the device puts out up to {facts.output_range_v:g} V"
+            f"{name}: output_range_v = {bench.output_range_v:g} in the bench, "
+            f"the device puts out up to {facts.output_range_v:g} V"
         )
     lowest, highest = facts.rate_hz
     if not lowest * (1.0 - FLOAT_TOLERANCE) <= bench.sample_rate_hz <= highest * (1.0 + FLOAT_TOLERANCE):
         raise DaqMismatch(
-            f"{name}: sample_rate_hz = {bench.sample_rate_hz:g} in the bench, the device samples at {lowest:g} to {highest:g} Hz"
+            f"{name}: sample_rate_hz = {bench.sample_rate_hz:g} in the bench, "
+            f"the device samples at {lowest:g} to {highest:g} Hz"
         )
 
 

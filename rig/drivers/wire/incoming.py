@@ -59,8 +59,8 @@ class Incoming:
         while True:
             early = self._dialogue.early
             message: Message | None = early.popleft() if early else self._link.receive(left_s)
-            if message.__class__ is Samples and self._is_good(message):  # type: ignore[arg-type]
-                return message  # type: ignore[return-value]
+            if message.__class__ is Samples and self._is_good(message):
+                return message
             if message is not None and message.__class__ is not Samples:
                 self._other(message)
             now = self._clock()

@@ -1,4 +1,4 @@
-"""`Device`: the device's half of the protocol, over any link and in front of any plant; it knows no clock, time is handed in."""
+"""`Device`: the device's half of the protocol, over any link, in front of any plant, without a clock: time is handed in."""
 
 import math
 from collections import Counter
@@ -66,7 +66,16 @@ class Device:
         self._last: tuple[Request, Answer] | None = None
         self._reset_s = math.inf
         self._deaf_s = math.inf
+        self._pressed = False
         self._lie()
+        self._at_rest = False
+        self._rest()
+
+    def _rest(self) -> None:
+        """Bring the plant to rest while there is time: it may take long, and START has none."""
+        if not self._at_rest:
+            self.plant.reset()
+        self._at_rest = True
 
     def _lie(self) -> None:
         if self.faults.version is not None:
@@ -187,7 +196,6 @@ class Device:
         block, queue = self.setting(Parameter.BLOCK), self.setting(Parameter.QUEUE)
         self._rate_hz = 1e-3 * self.setting(Parameter.RATE_MHZ)
         self.link.configure(Stream(len(self.plant.names), block, self._rate_hz, self.plant.bits, queue))
-        self.plant.reset()
         self._outputs = OutputQueue(block, queue)
         self._has_output = False
         self.measured = 0
@@ -218,6 +226,7 @@ class Device:
         self.sampling = False
         self._fed_s = self._reset_s = math.inf
         self.output_v = np.zeros(1)
+        self._rest()
         if self.state is not DeviceState.LATCHED:
             self._become(DeviceState.IDLE, now_s)
 
@@ -244,6 +253,14 @@ class Device:
         self._fed_s = math.inf
         self._become(state, at_s)
 
+    def press_emergency_stop(self) -> None:
+        """The device's own emergency stop; it acts with the next `advance`, and may be pressed from a signal handler."""
+        self._pressed = True
+
+    def switch_off(self, now_s: float) -> None:
+        """Switch off: 0 V."""
+        self._stop(now_s)
+
     def emergency_stop(self, now_s: float) -> None:
         """0 V at once, and latch: by a message, or by the device's own input."""
         self.counts["emergency_stops"] += 1
@@ -264,6 +281,9 @@ class Device:
 
     def advance(self, now_s: float) -> None:
         """Measure and send what is due, let the watchdog bite, send heartbeats."""
+        if self._pressed:
+            self._pressed = False
+            self.emergency_stop(now_s)
         if now_s >= self._reset_s:
             self.reset(now_s)
         self._watch(now_s)
@@ -314,6 +334,7 @@ class Device:
         if held and asked_for and self.state is DeviceState.ARMED:
             flags |= DeviceFlag.OUTPUT_HELD
             self.counts["held_blocks"] += 1
+        self._at_rest = False
         readings, seen = self.plant.step(volts)
         self.output_v = volts
         self.measured = first + block

@@ -79,7 +79,9 @@ class VirtualPlant:
 
     def __init__(self, bench: Bench, seed: int = 0, wiring: Wiring | None = None) -> None:
         if bench.driver.name != "virtual":
-            raise ConfigurationError(f"driver.name = {bench.driver.name!r}: allowed is 'virtual', what is emulated is a virtual rig")
+            raise ConfigurationError(
+                f"driver.name = {bench.driver.name!r}: allowed is 'virtual', for what is emulated is a virtual rig"
+            )
         options: Mapping[str, object] = {
             key: value for key, value in bench.driver.options.items() if key not in ("queue_blocks", "delay_samples")
         }
