@@ -260,7 +260,7 @@ class WireDAQ(DAQ):
         link.send(Output(self._due, scaled.astype(self._dtype), self._blocks_out & 0xFFFF))
         self._due += self.block
         self._blocks_out += 1
-        if self._blocks_out % self._blocks_between_pings == 0:
+        if self._blocks_out % self._blocks_between_pings == 0 and self._ping is None:
             request = self._dialogue.next_request(Command.GET, Parameter.PING, self._blocks_out & 0xFF)
             self._ping = request.number, self.clock()
             link.send(request)

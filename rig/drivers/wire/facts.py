@@ -65,7 +65,9 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
     get, get_float = dialogue.get, dialogue.get_float
     count = get(Parameter.N_CHANNELS)
     if not 1 <= count <= MOST_CHANNELS:
-        raise DaqProtocol(f"{dialogue.link.name}: the device says it has {count} channels: allowed is 1 to {MOST_CHANNELS}")
+        raise DaqProtocol(
+            f"{dialogue.link.name}: the device says it has {count} channels: allowed is 1 to {MOST_CHANNELS}"
+        )
     bits = get(Parameter.BITS)
     if bits not in (16, 32):
         raise DaqProtocol(f"{dialogue.link.name}: the device counts in {bits} bits: allowed is 16 or 32")
@@ -108,7 +110,9 @@ def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> Non
     ours = [channel.name for channel in bench.channels]
     if ours != list(facts.names):
         how = "in another order" if sorted(ours) == sorted(facts.names) else "and not these"
-        raise DaqMismatch(f"{name}: the device has the channels {', '.join(facts.names)}, the bench {', '.join(ours)}: {how}")
+        raise DaqMismatch(
+            f"{name}: the device has the channels {', '.join(facts.names)}, the bench {', '.join(ours)}: {how}"
+        )
     if layout_crc != facts.layout_crc:
         raise DaqMismatch(
             f"{name}: the device's definition of its messages has the CRC {facts.layout_crc:08x}, "

@@ -15,17 +15,17 @@ from rig.bench import Bench, DriverChoice
 from rig.configuration import validated
 from rig.wire.device.settings import EmulatorSettings
 
-__all__ = ["Emulator", "bench_for", "emulated"]
+__all__ = ["Emulator", "driver_options", "emulated"]
 
 ENDING_S = 10.0
 LOCKSTEP_S = 60.0
 """Watchdog and time-out of a bench whose device waits for the host: nothing is in a hurry, and nothing waits for ever."""
 
 
-def bench_for(bench: Bench, wire: str, options: dict[str, Any], *, lockstep: bool) -> Bench:
-    """The same bench with the driver that reaches an emulator."""
+def driver_options(options: dict[str, Any], *, lockstep: bool) -> dict[str, Any]:
+    """Options of a driver that reaches an emulator: patient ones where the device waits for the host."""
     patience = {"watchdog_s": LOCKSTEP_S, "timeout_s": LOCKSTEP_S} if lockstep else {}
-    return bench.model_copy(update={"driver": DriverChoice(name=wire, options={**patience, **options})})
+    return {**patience, **options}
 
 
 class Emulator:
@@ -35,7 +35,9 @@ class Emulator:
     Errors: `ConfigurationError` or a `DaqError` for what the emulator refuses.
     """
 
-    def __init__(self, bench: Bench, wire: str = "serial", *, options: dict[str, Any] | None = None, **settings: Any) -> None:
+    def __init__(
+        self, bench: Bench, wire: str = "serial", *, options: dict[str, Any] | None = None, **settings: Any
+    ) -> None:
         table = {"wire": wire, "bench": bench.model_dump(), **settings}
         self._settings = validated(EmulatorSettings, table, "emulator")
         self._options = options or {}
@@ -58,7 +60,8 @@ class Emulator:
         ready = self._heard()["ready"]
         lockstep = self._settings.lockstep
         options = {**ready["options"], **self._options}
-        self.bench = bench_for(self._settings.bench, self._settings.wire, options, lockstep=lockstep)
+        driver = DriverChoice(name=self._settings.wire, options=driver_options(options, lockstep=lockstep))
+        self.bench = self._settings.bench.model_copy(update={"driver": driver})
         return self
 
     def _heard(self) -> dict[str, Any]:

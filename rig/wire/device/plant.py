@@ -53,7 +53,9 @@ class Wiring:
         for key, given in {"flip": flip, "dead": dead, "swap": tuple(name for pair in swap for name in pair)}.items():
             for name in given:
                 if name not in names:
-                    raise ConfigurationError(f"{key} = {name!r}: there is no such channel, allowed is {', '.join(names)}")
+                    raise ConfigurationError(
+                        f"{key} = {name!r}: there is no such channel, allowed is {', '.join(names)}"
+                    )
         at = {name: index for index, name in enumerate(names)}
         self._order = np.arange(len(names))
         for first, second in swap:
@@ -138,4 +140,6 @@ class VirtualPlant:
         scaled = self._volts / self.v_per_count
         if raised & Flag.DIVERGED:
             scaled = np.nan_to_num(scaled, nan=np.inf)
-        return np.rint(np.clip(scaled, -(2.0 ** (self.bits - 1)), 2.0 ** (self.bits - 1) - 1.0)).astype(self._dtype), flags
+        return np.rint(np.clip(scaled, -(2.0 ** (self.bits - 1)), 2.0 ** (self.bits - 1) - 1.0)).astype(
+            self._dtype
+        ), flags
