@@ -183,8 +183,8 @@ class WireDAQ(DAQ):
         self._sustainable_hz = min(highest_hz, MOST_LOAD * self.sample_rate_hz / load.share if load.share else math.inf)
         if load.share >= MOST_LOAD:
             raise DaqRefused(
-                f"{link.name}: {self.sample_rate_hz:g} Hz in blocks of {block} would take {100.0 * load.share:.0f} % of the wire, "
-                f"allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
+                f"{link.name}: {self.sample_rate_hz:g} Hz in blocks of {block} would take {100.0 * load.share:.0f} % "
+                f"of the wire, allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
             )
 
     def _stream(self, block: int) -> Stream:

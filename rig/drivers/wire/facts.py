@@ -123,7 +123,8 @@ def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> Non
             raise DaqMismatch(f"{name}: channel {channel.name}: the device scales it to {unit!r}, allowed is 'V'")
         if channel.range_v > range_v * (1.0 + FLOAT_TOLERANCE):
             raise DaqMismatch(
-                f"{name}: channel {channel.name}: range_v = {channel.range_v:g} in the bench, the device reads up to {range_v:g} V"
+                f"{name}: channel {channel.name}: range_v = {channel.range_v:g} in the bench, "
+                f"the device reads up to {range_v:g} V"
             )
     if bench.output_range_v > facts.output_range_v * (1.0 + FLOAT_TOLERANCE):
         raise DaqMismatch(

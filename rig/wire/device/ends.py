@@ -1,6 +1,5 @@
 """The device's end of every wire that can be emulated, and how a bench reaches it."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -41,7 +40,7 @@ def _pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
             if link.is_symlink():
                 link.unlink()
             try:
-                os.symlink(line.path, link)
+                link.symlink_to(line.path)
             except OSError as error:
                 raise ConfigurationError(f"link = {str(link)!r}: cannot be made: {error.strerror}") from error
         yield line.descriptor, str(link.absolute()) if link is not None else line.path
