@@ -1,11 +1,10 @@
 """CAN frames to messages and back, for either end."""
 
-from struct import error as StructError
+import struct
 
 import numpy as np
 
 from rig.errors import DaqMismatch, DaqRefused
-from rig.wire.can.definition import Shape
 from rig.wire.can.frames import Frame, padded_length
 from rig.wire.can.groups import Blocks
 from rig.wire.can.protocol import Kind, Protocol
@@ -13,8 +12,8 @@ from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Message, Output,
 
 __all__ = ["COUNTERS", "CanCodec"]
 
-COUNTERS = ("foreign_frames", "damaged_frames", "repeated_frames", "incomplete_blocks", "resynchronised", "misplaced_frames")
-"""What a codec counts: frames of somebody else, of a wrong length, come twice; blocks with a frame missing; indices put right."""
+COUNTERS = ("foreign_frames", "damaged_frames", "repeated_frames", "incomplete_blocks", "resynchronised")
+"""What a codec counts: frames of others, of a wrong length, come twice; blocks with a frame missing; indices put right."""
 
 _LARGEST_DROPPED = 255
 _COUNT = np.dtype("<i2")
@@ -39,6 +38,7 @@ class CanCodec:
         self._index = protocol.packing(Kind.OUTPUT_INDEX)
         self._stream: Stream | None = None
         self._last_beat: Heartbeat | None = None
+        self._flags_told = 0
 
     def configure(self, stream: Stream) -> None:
         """Agree on the shape of samples and outputs; both begin anew.
@@ -62,9 +62,7 @@ class CanCodec:
             self._incoming = Blocks(self._counters, shape.output_wrap, 1, shape.output_rows, stream.block, 1)
             self._incoming.begin(stream.queue)
         else:
-            self._incoming = Blocks(
-                self._counters, shape.wrap, shape.parts, shape.rows, stream.block, shape.n_channels
-            )
+            self._incoming = Blocks(self._counters, shape.wrap, shape.parts, shape.rows, stream.block, shape.n_channels)
 
     def encode(self, message: Message) -> list[Frame]:
         """The frames of a message, in the order in which they must be sent."""
@@ -95,7 +93,9 @@ class CanCodec:
         beat = self._last_beat
         stale = first + groups - self._reported > shape.wrap // 2
         if beat is not None and (stale or (not shape.fd and message.flags != self._flags_told)):
-            frames.append(self._heartbeat(beat._replace(flags=message.flags, samples=message.first, dropped=message.dropped)))
+            frames.append(
+                self._heartbeat(beat._replace(flags=message.flags, samples=message.first, dropped=message.dropped))
+            )
             self._reported = first
         for group in range(groups):
             rows = message.counts[group * shape.rows : (group + 1) * shape.rows]
@@ -140,7 +140,7 @@ class CanCodec:
             return self._decode_stream(frame, number)
         try:
             return self._decode_command(kind, frame.data)
-        except StructError:
+        except struct.error:
             self._counters["damaged_frames"] += 1
             return None
 
@@ -195,16 +195,3 @@ class CanCodec:
         if self._stream is None:
             raise DaqRefused("samples and outputs cannot be sent before the stream is configured")
         return self._stream
-
-
-def frames_of_block(shape: Shape, block: int, outputs: bool) -> list[int]:
-    """Bytes of every frame that a block takes, samples or outputs."""
-    rows = shape.output_rows if outputs else shape.rows
-    out = []
-    for first in range(0, block, rows):
-        for part in range(1 if outputs else shape.parts):
-            columns = shape.columns(part)
-            width = 1 if outputs else columns.stop - columns.start
-            n_bytes = shape.header + 2 * width * min(rows, block - first)
-            out.append(padded_length(n_bytes) if shape.fd else n_bytes)
-    return out

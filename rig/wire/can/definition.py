@@ -1,6 +1,6 @@
 """The protocol's definition on CAN for any number of channels: which identifiers, how many frames, and the DBC file of it.
 
-An identifier of 11 bits is 16 times a function plus the node (0 to 15). The lower the function, the sooner a frame wins the bus:
+An identifier of 11 bits is 16 times a function plus the node (0 to 15). The lower it is, the sooner a frame wins the bus:
 
     0x000        EmergencyStop (of all nodes: not shifted)
     0x010        Heartbeat
@@ -129,9 +129,7 @@ def _counts(shape: Shape, part: int) -> list[tuple[str, int, bool]]:
     return [(name, 16, True) for name in names]
 
 
-def _message(
-    frame_id: int, name: str, sender: str, signals: list[tuple[str, int, bool]], fd: bool
-) -> tuple[str, str]:
+def _message(frame_id: int, name: str, sender: str, signals: list[tuple[str, int, bool]], fd: bool) -> tuple[str, str]:
     """A message with its signals one behind the other, and the note that it is of CAN FD."""
     receiver = "Device" if sender == "Host" else "Host"
     lines, end = [], 0

@@ -29,9 +29,9 @@ def frame_seconds(n_bytes: int, fd: bool, bit_rate_hz: float, data_bit_rate_hz: 
     """Longest time on the bus of a frame with an 11-bit identifier, with all stuff bits and the pause behind it, s.
 
     Classical (ISO 11898-1): 34 + 8 n bits from the start of frame to the end of the checksum can be stuffed, one in four
-    after the first; 13 more bits with the pause of 3 are not. CAN FD: 17 bits up to the switch of rate, stuffed as above; then at
-    the data bit rate 5 bits of control, the data, a stuff count of 4 bits and a checksum of 17 (up to 16 bytes) or 21 bits,
-    the last two with a fixed stuff bit before every fourth; 13 more bits at the slow rate.
+    after the first; 13 more bits with the pause of 3 are not. CAN FD: 17 bits up to the switch of rate, stuffed as above; then
+    at the data bit rate 5 bits of control and the data, stuffed, and a stuff count of 4 bits and a checksum of 17 (up to 16
+    bytes) or 21 bits with a fixed stuff bit before every fourth; 13 more bits at the slow rate.
     """
     if not fd:
         stuffed = 34 + 8 * n_bytes

@@ -24,9 +24,9 @@ class _Open:
 class Blocks:
     """Puts blocks together from frames that may be lost, doubled or swapped.
 
-    A frame says its sequence number, modulo ``wrap``, and its part. It is taken for the nearest group ahead of the last one if that
-    is less than half a wrap away, else for one behind. A whole block ends all older ones: time does not go back. A group index from
-    elsewhere (`mark`) puts right what a loss of half a wrap or more has confused, once the next frame agrees with it.
+    A frame says its sequence number, modulo ``wrap``, and its part. It is taken for the nearest group ahead of the last one if
+    that is less than half a wrap away, else for one behind. A whole block ends all older ones: time does not go back. A group
+    index from elsewhere (`mark`) puts right what a loss of half a wrap or more has confused, once the next frame agrees with it.
     """
 
     def __init__(self, counters: dict[str, int], wrap: int, parts: int, rows: int, n: int, n_channels: int) -> None:
@@ -62,8 +62,10 @@ class Blocks:
         row = self._group(sequence) % self._per_block * self._rows
         return min(self._rows, self._shape[0] - row)
 
-    def put(self, sequence: int, part: int, columns: slice, counts: np.ndarray, flags: int) -> tuple[int, np.ndarray, int] | None:
-        """Take the counts (int16, rows by columns) of a frame; return block number, counts and flags of a block that is whole now."""
+    def put(
+        self, sequence: int, part: int, columns: slice, counts: np.ndarray, flags: int
+    ) -> tuple[int, np.ndarray, int] | None:
+        """Take the counts (int16, rows by columns) of a frame; return number, counts and flags of a block that is whole now."""
         group = self._group(sequence)
         if self._mark is not None and group == self._mark:
             self._count("resynchronised")

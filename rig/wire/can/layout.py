@@ -13,7 +13,18 @@ from rig.errors import ConfigurationError
 
 __all__ = ["CompiledMessage", "Layout", "compile_layout", "compile_text"]
 
-_STRUCT_CODES = {"u1": "B", "i1": "b", "u2": "H", "i2": "h", "u4": "I", "i4": "i", "u8": "Q", "i8": "q", "f4": "f", "f8": "d"}
+_STRUCT_CODES = {
+    "u1": "B",
+    "i1": "b",
+    "u2": "H",
+    "i2": "h",
+    "u4": "I",
+    "i4": "i",
+    "u8": "Q",
+    "i8": "q",
+    "f4": "f",
+    "f8": "d",
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +60,8 @@ class CompiledMessage:
             raw = np.frombuffer(data, alike, count, first)
         else:
             raw = np.array(self.decode(data).tolist(), np.float64)
-        return raw * self.scale + self.offset
+        values: np.ndarray = raw * self.scale + self.offset
+        return values
 
     def encode(self, *values: int | float) -> bytes:
         """A frame's data from raw values in the order of `signals`; bytes of no signal are 0."""
@@ -121,7 +133,7 @@ def compile_layout(path: str | Path) -> Layout:
 def compile_text(text: str, source: str = "definition") -> Layout:
     """The layout in the text of a DBC file; ``source`` names it in errors."""
     try:
-        database = cantools.database.load_string(text, "dbc")
+        database: Any = cantools.database.load_string(text, "dbc")
     except Exception as error:  # cantools has no common base for what a broken file may raise
         line = " ".join(str(error).split())
         raise ConfigurationError(f"{source}: is not a DBC file: {line}") from None
@@ -154,7 +166,9 @@ def _first_byte(signal: Any, where: str) -> int:
     """Place of a signal; a big-endian one starts at the highest bit of its first byte."""
     little = signal.byte_order == "little_endian"
     if signal.start % 8 != (0 if little else 7):
-        raise ConfigurationError(f"{where}, signal {signal.name}: starts at bit {signal.start}, allowed is a whole byte")
+        raise ConfigurationError(
+            f"{where}, signal {signal.name}: starts at bit {signal.start}, allowed is a whole byte"
+        )
     return int(signal.start) // 8
 
 

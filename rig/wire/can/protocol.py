@@ -74,7 +74,9 @@ def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None
         other = theirs.messages[name]
         wanted, found = message.canonical.split(" ", 1)[1], other.canonical.split(" ", 1)[1]
         if wanted != found:
-            raise ConfigurationError(f"{dbc}: message {name}: is [{_short(found, wanted)}], wanted is [{_short(wanted, found)}]")
+            raise ConfigurationError(
+                f"{dbc}: message {name}: is [{_short(found, wanted)}], wanted is [{_short(wanted, found)}]"
+            )
         if other.frame_id & NODE_MASK:
             raise ConfigurationError(
                 f"{dbc}: message {name}: has the identifier 0x{other.frame_id:03X}, allowed are multiples of 16, for nodes"
