@@ -31,6 +31,7 @@ from rig.wire.messages import (
 __all__ = ["Device"]
 
 BEAT_S = 0.1
+ROUNDING_SAMPLES = 1e-6  # an instant that falls on a sample is that sample's
 
 
 class Device:
@@ -132,7 +133,7 @@ class Device:
         """Index of the first sample whose output is not on the converter yet."""
         if self.lockstep:
             return self.measured
-        return max(self.measured, math.ceil((now_s - self._origin_s) * self._rate_hz - 1e-9))
+        return max(self.measured, math.ceil((now_s - self._origin_s) * self._rate_hz - ROUNDING_SAMPLES))
 
     def _answer(self, request: Request, now_s: float) -> None:
         if self._last is not None and request == self._last[0]:
@@ -248,7 +249,7 @@ class Device:
         if self.lockstep:
             self._cut = float(self.measured)
         else:
-            self._cut = max(0.0, (at_s - self._origin_s) * self._rate_hz)
+            self._cut = max(0.0, (at_s - self._origin_s) * self._rate_hz - ROUNDING_SAMPLES)
         self._ramp_samples = ramp_s * self._rate_hz
         self._fed_s = math.inf
         self._become(state, at_s)
