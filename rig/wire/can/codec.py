@@ -8,7 +8,7 @@ from rig.errors import DaqMismatch, DaqRefused
 from rig.wire.can.frames import Frame, padded_length
 from rig.wire.can.groups import Blocks
 from rig.wire.can.protocol import Kind, Protocol
-from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
+from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
 
 __all__ = ["COUNTERS", "CanCodec"]
 
@@ -40,11 +40,8 @@ class CanCodec:
         self._last_beat: Heartbeat | None = None
         self._flags_told = 0
 
-    def configure(self, stream: Stream) -> None:
-        """Agree on the shape of samples and outputs; both begin anew.
-
-        Raises `DaqRefused` for a block or a resolution that frames cannot carry, `DaqMismatch` for other channels.
-        """
+    def check(self, stream: Stream) -> None:
+        """Raise `DaqRefused` for a block or a resolution that frames cannot carry, `DaqMismatch` for other channels."""
         shape = self._shape
         if stream.n_channels != shape.n_channels:
             raise DaqMismatch(f"{stream.n_channels} channels, but the bus is defined for {shape.n_channels}")
@@ -55,6 +52,11 @@ class CanCodec:
                 f"block = {stream.block}: allowed over {'CAN FD' if shape.fd else 'classical CAN'} with "
                 f"{shape.n_channels} channels is 1 to {shape.largest_block} samples"
             )
+
+    def configure(self, stream: Stream) -> None:
+        """Agree on the shape of samples and outputs; both begin anew. Errors: those of `check`."""
+        self.check(stream)
+        shape = self._shape
         self._stream = stream
         self._flags, self._dropped = 0, 0
         self._reported = -(1 << 30)  # group at which the receiver was last told its index
@@ -156,7 +158,7 @@ class CanCodec:
         elif kind is Kind.HEARTBEAT:
             state, flags, boot, dropped, samples = self._beat.unpack(data)
             self._flags, self._dropped = flags, dropped
-            if self._stream is not None:
+            if self._stream is not None and state != DeviceState.IDLE:
                 self._incoming.mark(samples)
             return Heartbeat(state, flags, boot, samples, dropped)
         self._counters["foreign_frames"] += 1
