@@ -60,11 +60,18 @@ class CanCodec:
         self._stream = stream
         self._flags, self._dropped = 0, 0
         self._reported = -(1 << 30)  # group at which the receiver was last told its index
+        # Whole blocks, so that a loss of a whole wrap cannot make one block of the frames of two.
+        self._sample_groups = -(-stream.block // shape.rows)
+        self._sample_wrap = shape.wrap - shape.wrap % self._sample_groups
+        self._output_groups = -(-stream.block // shape.output_rows)
+        self._output_wrap = shape.output_wrap - shape.output_wrap % self._output_groups
         if self._device:
-            self._incoming = Blocks(self._counters, shape.output_wrap, 1, shape.output_rows, stream.block, 1)
+            self._incoming = Blocks(self._counters, self._output_wrap, 1, shape.output_rows, stream.block, 1)
             self._incoming.begin(stream.queue)
         else:
-            self._incoming = Blocks(self._counters, shape.wrap, shape.parts, shape.rows, stream.block, shape.n_channels)
+            self._incoming = Blocks(
+                self._counters, self._sample_wrap, shape.parts, shape.rows, stream.block, shape.n_channels
+            )
 
     def encode(self, message: Message) -> list[Frame]:
         """The frames of a message, in the order in which they must be sent."""
@@ -87,13 +94,11 @@ class CanCodec:
         return Frame(self._identifiers[Kind.HEARTBEAT, 0], data)
 
     def _encode_samples(self, message: Samples) -> list[Frame]:
-        stream, shape = self._streaming(), self._shape
-        n = stream.block
-        groups = -(-n // shape.rows)
-        first = message.first // n * groups
+        stream, shape, groups, wrap = self._streaming(), self._shape, self._sample_groups, self._sample_wrap
+        first = message.first // stream.block * groups
         frames = []
         beat = self._last_beat
-        stale = first + groups - self._reported > shape.wrap // 2
+        stale = first + groups - self._reported > wrap // 2
         if beat is not None and (stale or (not shape.fd and message.flags != self._flags_told)):
             frames.append(
                 self._heartbeat(beat._replace(flags=message.flags, samples=message.first, dropped=message.dropped))
@@ -101,7 +106,7 @@ class CanCodec:
             self._reported = first
         for group in range(groups):
             rows = message.counts[group * shape.rows : (group + 1) * shape.rows]
-            sequence = (first + group) % shape.wrap
+            sequence = (first + group) % wrap
             for part in range(shape.parts):
                 counts = rows if shape.parts == 1 else rows[:, shape.columns(part)]
                 number = part if shape.fd else sequence * shape.parts + part
@@ -109,15 +114,14 @@ class CanCodec:
         return frames
 
     def _encode_output(self, message: Output) -> list[Frame]:
-        stream, shape = self._streaming(), self._shape
-        groups = -(-stream.block // shape.output_rows)
+        stream, shape, groups, wrap = self._streaming(), self._shape, self._output_groups, self._output_wrap
         first = message.first // stream.block * groups
         frames = []
-        if first + groups - self._reported > shape.output_wrap // 2:
+        if first + groups - self._reported > wrap // 2:
             frames.append(Frame(self._identifiers[Kind.OUTPUT_INDEX, 0], self._index.pack(message.first & 0xFFFFFFFF)))
             self._reported = first
         for group in range(groups):
-            sequence = (first + group) % shape.output_wrap
+            sequence = (first + group) % wrap
             counts = message.counts[group * shape.output_rows : (group + 1) * shape.output_rows]
             frames.append(self._stream_frame(Kind.OUTPUT, 0 if shape.fd else sequence, sequence, 0, counts))
         return frames
@@ -187,11 +191,10 @@ class CanCodec:
 
     def _block(self, block: int, counts: np.ndarray, flags: int) -> Message:
         assert self._stream is not None
-        first, n = block * self._stream.block, self._stream.block
+        first = block * self._stream.block
         if self._device:
-            return Output(first, counts[:, 0], block * -(-n // self._shape.output_rows) % self._shape.output_wrap)
-        sequence = block * -(-n // self._shape.rows) % self._shape.wrap
-        return Samples(first, counts, flags, self._dropped, 0, sequence)
+            return Output(first, counts[:, 0], block * self._output_groups % self._output_wrap)
+        return Samples(first, counts, flags, self._dropped, 0, block * self._sample_groups % self._sample_wrap)
 
     def _streaming(self) -> Stream:
         if self._stream is None:

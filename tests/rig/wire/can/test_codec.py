@@ -79,7 +79,9 @@ def test_an_emergency_stop_is_for_all_nodes_and_needs_no_data() -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(st.sampled_from(BUSES), st.data())
-def test_every_block_whose_frames_all_come_is_recovered_and_no_other(bus: tuple[int, bool, int], data: st.DataObject) -> None:
+def test_every_block_whose_frames_all_come_is_recovered_and_no_other(
+    bus: tuple[int, bool, int], data: st.DataObject
+) -> None:
     n_channels, fd, n = bus
     device, host = ends(n_channels, fd, n)
     blocks = sent(device, range(60), n, n_channels)
@@ -101,7 +103,9 @@ def test_every_block_whose_frames_all_come_is_recovered_and_no_other(bus: tuple[
 
 @settings(deadline=None, max_examples=30)
 @given(st.sampled_from([bus for bus in BUSES if bus[2] > 1]), st.randoms(use_true_random=False))
-def test_frames_that_change_places_within_a_block_and_with_the_next_cost_nothing(bus: tuple[int, bool, int], random: object) -> None:
+def test_frames_that_change_places_within_a_block_and_with_the_next_cost_nothing(
+    bus: tuple[int, bool, int], random: object
+) -> None:
     n_channels, fd, n = bus
     device, host = ends(n_channels, fd, n)
     device._reported = 1 << 30  # no heartbeats in between
@@ -123,7 +127,9 @@ def mutated(frames: list[Frame], data: st.DataObject) -> list[Frame]:
     for _ in range(data.draw(st.integers(0, 20))):
         at = data.draw(st.integers(0, len(out) - 1))
         frame = out[at]
-        kind = data.draw(st.sampled_from(["cut", "long", "data", "identifier", "foreign", "extended", "format", "move", "drop"]))
+        kind = data.draw(
+            st.sampled_from(["cut", "long", "data", "identifier", "foreign", "extended", "format", "move", "drop"])
+        )
         bit = data.draw(st.integers(0, 10))
         if kind == "cut":
             frame = frame._replace(data=frame.data[: bit % (len(frame.data) + 1)])
@@ -153,7 +159,9 @@ def mutated(frames: list[Frame], data: st.DataObject) -> list[Frame]:
 
 @settings(deadline=None, max_examples=150)
 @given(st.sampled_from(BUSES), st.booleans(), st.data())
-def test_whatever_comes_nothing_breaks_and_memory_stays_bounded(bus: tuple[int, bool, int], samples: bool, data: st.DataObject) -> None:
+def test_whatever_comes_nothing_breaks_and_memory_stays_bounded(
+    bus: tuple[int, bool, int], samples: bool, data: st.DataObject
+) -> None:
     n_channels, fd, n = bus
     device, host = ends(n_channels, fd, n)
     if samples:
@@ -171,7 +179,9 @@ def test_whatever_comes_nothing_breaks_and_memory_stays_bounded(bus: tuple[int, 
 
 @settings(deadline=None, max_examples=60)
 @given(st.sampled_from(BUSES), st.data())
-def test_frames_of_wrong_length_or_format_are_never_taken_for_good_ones(bus: tuple[int, bool, int], data: st.DataObject) -> None:
+def test_frames_of_wrong_length_or_format_are_never_taken_for_good_ones(
+    bus: tuple[int, bool, int], data: st.DataObject
+) -> None:
     n_channels, fd, n = bus
     device, host = ends(n_channels, fd, n)
     blocks = sent(device, range(30), n, n_channels)
@@ -202,7 +212,7 @@ def test_a_loss_longer_than_the_wrap_is_put_right_by_the_next_heartbeat(n_channe
     device, host = ends(n_channels, fd, n)
     shape = host.protocol.shape
     groups = -(-n // shape.rows)
-    wrap = shape.wrap // groups + 1  # in blocks
+    wrap = shape.wrap // groups  # in blocks
     blocks = sent(device, range(5 * wrap), n, n_channels)
     lost = range(wrap // 3, 3 * wrap + 1)
     got = received(host, flat([block for j, block in enumerate(blocks) if j not in lost]))

@@ -66,13 +66,19 @@ def test_the_same_holds_behind_an_adapter_on_a_pseudo_terminal() -> None:
 
 def test_a_rate_that_the_bus_cannot_carry_is_refused_with_the_sum() -> None:
     channel = uuid4().hex
-    with device_on(virtual_bus(channel, False), False), pytest.raises(DaqRefused, match=r"samples 5000/s x 135 us.*: 110%"):
+    with (
+        device_on(virtual_bus(channel, False), False),
+        pytest.raises(DaqRefused, match=r"samples 5000/s x 135 us.*: 110%"),
+    ):
         CanDAQ(bench_on("virtual", channel, 1, fd=False)).open()
 
 
 def test_a_block_beyond_the_sequence_numbers_is_refused_when_opening() -> None:
     channel = uuid4().hex
-    with device_on(virtual_bus(channel, False), False), pytest.raises(DaqRefused, match="block = 64: allowed .* is 1 to 32"):
+    with (
+        device_on(virtual_bus(channel, False), False),
+        pytest.raises(DaqRefused, match="block = 64: allowed .* is 1 to 32"),
+    ):
         CanDAQ(bench_on("virtual", channel, 64, fd=False)).open()
 
 
@@ -85,7 +91,10 @@ def test_two_devices_under_one_node_are_noticed() -> None:
 
 def test_two_devices_under_different_nodes_do_not_hear_each_other() -> None:
     channel = uuid4().hex
-    with device_on(virtual_bus(channel, True), True), device_on(virtual_bus(channel, True, 2), True, 2, serial_number="0002"):
+    with (
+        device_on(virtual_bus(channel, True), True),
+        device_on(virtual_bus(channel, True, 2), True, 2, serial_number="0002"),
+    ):
         with CanDAQ(bench_on("virtual", channel, node=2)) as daq:
             assert daq.identity["serial_number"] == "0002"
 
@@ -111,7 +120,7 @@ def test_a_missing_interface_port_or_backend_is_one_clear_line() -> None:
         CanDAQ(bench_on("socketcan", "nocan7")).open()
     with pytest.raises(DaqRefused, match="no such backend"):
         CanDAQ(bench_on("carrier-pigeon", "0")).open()
-    with pytest.raises(ConfigurationError, match=r"driver\.options\.node = 16"):
+    with pytest.raises(ConfigurationError, match="node = 16"):
         CanDAQ(bench_on("virtual", "x", node=16))
 
 

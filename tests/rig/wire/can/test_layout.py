@@ -14,7 +14,9 @@ from rig.wire.can.definition import definition, shape_of
 from rig.wire.can.layout import compile_layout, compile_text
 from rig.wire.can.protocol import protocol
 
-SHIPPED = {fd: Path(rig.wire.can.__file__).parent / f"vibrolock-4-{'fd' if fd else 'classical'}.dbc" for fd in (True, False)}
+SHIPPED = {
+    fd: Path(rig.wire.can.__file__).parent / f"vibrolock-4-{'fd' if fd else 'classical'}.dbc" for fd in (True, False)
+}
 
 FOREIGN = """VERSION ""
 
@@ -40,7 +42,9 @@ def test_the_shipped_files_are_what_the_generator_writes_for_four_channels(fd: b
     assert SHIPPED[fd].read_text() == definition(4, fd)
 
 
-@pytest.mark.parametrize(("n_channels", "fd"), [(4, True), (4, False), (1, False), (7, False), (16, False), (31, True), (100, True)])
+@pytest.mark.parametrize(
+    ("n_channels", "fd"), [(4, True), (4, False), (1, False), (7, False), (16, False), (31, True), (100, True)]
+)
 def test_random_frames_decode_to_the_values_of_cantools(n_channels: int, fd: bool) -> None:
     text = definition(n_channels, fd)
     ours, theirs = compile_text(text), cantools.database.load_string(text, "dbc")
@@ -71,7 +75,10 @@ def test_other_files_with_scales_floats_and_big_endian_signals_decode_as_cantool
     [
         (message("x : 3|8@1+"), "message M, signal x: starts at bit 3"),
         (message("x : 0|12@1+"), "message M, signal x: has 12 bits"),
-        (message("x m0 : 0|8@1+").replace("SG_", 'SG_ s M : 8|8@1+ (1,0) [0|0] "" B\n SG_', 1), "message M: is multiplexed"),
+        (
+            message("x m0 : 0|8@1+").replace("SG_", 'SG_ s M : 8|8@1+ (1,0) [0|0] "" B\n SG_', 1),
+            "message M: is multiplexed",
+        ),
         (message("x : 0|8@1+").replace("BO_ 7", f"BO_ {7 + (1 << 31)}"), "message M: has an identifier of 29 bits"),
         ("nothing of the kind", "is not a DBC file"),
     ],
