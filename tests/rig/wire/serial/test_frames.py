@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rig.wire.messages import Request, Stream
 from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec
 from rig.wire.serial.frames import FrameReader, frame, largest_frame
+from rig.wire.serial.frames import payload_of as product_payload_of
 from tests.docs.wire import on_the_line, payload_of
 from tests.rig.wire.serial.strategies import messages, same
 
@@ -91,6 +92,13 @@ def test_runs_longer_than_a_block_are_framed_as_the_page_says():
         payload = bytes([7]) * size
         assert payload_of(frame(payload)[:-1]) == payload == payload_of(on_the_line(payload)[:-1])
         assert len(frame(payload)) <= largest_frame(size)
+
+
+def test_an_empty_piece_behind_one_of_254_bytes_changes_nothing():
+    payloads = (bytes([byte]) * 250 for byte in range(1, 256))
+    payload, encoded = next((one, code) for one in payloads if (code := frame(one)[:-1])[0] == 255)
+    assert len(encoded) == 255
+    assert product_payload_of(encoded + b"\1") == product_payload_of(encoded) == payload
 
 
 def test_what_is_skipped_is_counted_by_its_reason():
