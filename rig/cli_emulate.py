@@ -28,7 +28,9 @@ def emulate(
     interface: Annotated[str | None, typer.Option(help="CAN: python-can's; slcan over a port if left out.")] = None,
     channel: Annotated[str | None, typer.Option(help="CAN: channel of that interface.")] = None,
     fd: Annotated[bool, typer.Option("--fd/--classic", help="CAN: frames of up to 64 or 8 bytes.")] = True,
-    node: Annotated[int, typer.Option(help="CAN: number of the device on its bus.", min=1, max=63)] = 1,
+    node: Annotated[int, typer.Option(help="CAN: number of the device on its bus.", min=0, max=15)] = 1,
+    bitrate: Annotated[int, typer.Option(help="CAN: bit/s.")] = 1_000_000,
+    data_bitrate: Annotated[int, typer.Option(help="CAN FD: bit/s within the data.")] = 8_000_000,
     log_output: Annotated[Path | None, typer.Option(help="File for the device's output, a line a block.")] = None,
     json: Json = False,
 ) -> None:
@@ -53,6 +55,8 @@ def emulate(
         "channel": channel,
         "fd": fd,
         "node": node,
+        "bitrate": bitrate,
+        "data_bitrate": data_bitrate,
     }
     settings = validated(EmulatorSettings, table, "rig emulate")
     _check_bench_file(bench_file)

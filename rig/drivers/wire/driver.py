@@ -73,9 +73,9 @@ class WireDAQ(DAQ):
     @property
     def capabilities(self) -> Capabilities:
         """Paced by the device; virtual where the device says that nothing physical moves; known once open."""
-        facts = self._facts
+        facts, link = self._facts, self._link
         return Capabilities(
-            largest_block=facts.largest_block if facts else LARGEST_UNKNOWN_BLOCK,
+            largest_block=min(facts.largest_block, link.largest_block) if facts and link else LARGEST_UNKNOWN_BLOCK,
             paced=True,
             virtual=facts is not None and facts.simulated,
             repeatable=facts is not None and facts.repeatable,

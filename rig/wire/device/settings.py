@@ -44,7 +44,11 @@ class EmulatorSettings(Configured):
     """CAN: channel of that interface."""
     fd: bool = True
     """CAN: frames of up to 64 bytes."""
-    node: int = Field(1, ge=1, le=63)
+    bitrate: int = Field(1_000_000, ge=10_000, le=1_000_000)
+    """CAN: bit rate of the bus, bit/s."""
+    data_bitrate: int = Field(8_000_000, ge=1_000_000, le=8_000_000)
+    """CAN FD: bit rate within the data, bit/s."""
+    node: int = Field(1, ge=0, le=15)
     """CAN: number of the device on its bus."""
     faults: dict[str, Any] = Field(default_factory=dict)
     """What the device shall do wrong; see `Faults`."""
@@ -56,4 +60,6 @@ class EmulatorSettings(Configured):
             raise ValueError(f"faults: {unknown[0]!r}: allowed is {', '.join(asdict(Faults()))}")
         if self.wire == "serial" and self.interface is not None:
             raise ValueError(f"interface = {self.interface!r}: a serial device has none")
+        if self.interface not in (None, "slcan") and self.channel is None:
+            raise ValueError(f"channel: is missing, interface {self.interface!r} has several")
         return self
