@@ -219,12 +219,12 @@ def test_the_watchdog_ramps_the_output_down_from_its_very_instant_and_latches(ra
     fed_s = bench.now_s - BLOCK / RATE_HZ
     bench.pass_time(0.4)
     beyond_s = began_s + np.arange(bench.plant.output_v.size) / RATE_HZ - (fed_s + WATCHDOG_S)
-    share = np.where(beyond_s < 0.0, 1.0, 0.0) if ramp_s == 0.0 else np.clip(1.0 - beyond_s / ramp_s, 0.0, 1.0)
+    share = np.where(beyond_s < -1e-9, 1.0, 0.0) if ramp_s == 0.0 else np.clip(1.0 - beyond_s / ramp_s, 0.0, 1.0)
     share[: QUEUE * BLOCK] = 0.0
     np.testing.assert_allclose(bench.plant.output_v, 2.0 * share, atol=1e-6)
     assert bench.device.state is DeviceState.LATCHED
     flagged = [samples.first for samples in bench.link.of(Samples) if samples.flags & DeviceFlag.WATCHDOG]
-    first_bitten = int(np.flatnonzero(beyond_s >= 0.0)[0])
+    first_bitten = int(np.flatnonzero(beyond_s >= -1e-9)[0])
     assert flagged[0] <= first_bitten < flagged[0] + BLOCK
     assert bench.link.of(Heartbeat)[-1].flags == DeviceFlag.WATCHDOG
 
