@@ -1,5 +1,6 @@
 """Frames to messages and back, and what becomes of streams that are dropped, doubled, swapped, cut, flipped or foreign."""
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -112,7 +113,7 @@ def test_frames_that_change_places_within_a_block_and_with_the_next_cost_nothing
     blocks = sent(device, range(40), n, n_channels)
     for block in blocks:
         random.shuffle(block)  # type: ignore[attr-defined]
-    for earlier, later in zip(blocks, blocks[1:], strict=False):
+    for earlier, later in itertools.pairwise(blocks):
         if len(earlier) > 1 and len(later) > 1:
             earlier[-1], later[0] = later[0], earlier[-1]
     got = received(host, flat(blocks))
