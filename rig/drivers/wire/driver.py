@@ -72,13 +72,13 @@ class WireDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Paced by the device; virtual where the device says that nothing physical moves."""
-        facts = self._facts
+        """Paced by the device; virtual where the device says that nothing physical moves; known once open."""
+        facts, link = self._facts, self._link
         return Capabilities(
-            largest_block=facts.largest_block if facts else LARGEST_UNKNOWN_BLOCK,
+            largest_block=min(facts.largest_block, link.largest_block) if facts and link else LARGEST_UNKNOWN_BLOCK,
             paced=True,
             virtual=facts is not None and facts.simulated,
-            repeatable=False,
+            repeatable=facts is not None and facts.repeatable,
         )
 
     @property
@@ -171,7 +171,7 @@ class WireDAQ(DAQ):
         if state in (DeviceState.RUNNING, DeviceState.ARMED):
             self._found_running = 1
         dialogue.do(Command.STOP)
-        dialogue.early.clear()
+        dialogue.forget()
 
     def _check_capacity(self, block: int) -> None:
         link, facts = self._link, self._facts
@@ -183,8 +183,8 @@ class WireDAQ(DAQ):
         self._sustainable_hz = min(highest_hz, MOST_LOAD * self.sample_rate_hz / load.share if load.share else math.inf)
         if load.share >= MOST_LOAD:
             raise DaqRefused(
-                f"{link.name}: {self.sample_rate_hz:g} Hz in blocks of {block} would take {100.0 * load.share:.0f} % of the wire, "
-                f"allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
+                f"{link.name}: {self.sample_rate_hz:g} Hz in blocks of {block} would take {100.0 * load.share:.0f} % "
+                f"of the wire, allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
             )
 
     def _stream(self, block: int) -> Stream:
@@ -243,6 +243,7 @@ class WireDAQ(DAQ):
             )
 
     def _begin(self) -> None:
+        self._dialogue.forget()
         self._dialogue.do(Command.START)
         self._dialogue.do(Command.ARM, value=ARM_KEY)
         self._sampling = True
@@ -260,7 +261,7 @@ class WireDAQ(DAQ):
         link.send(Output(self._due, scaled.astype(self._dtype), self._blocks_out & 0xFFFF))
         self._due += self.block
         self._blocks_out += 1
-        if self._blocks_out % self._blocks_between_pings == 0:
+        if self._blocks_out % self._blocks_between_pings == 0 and self._ping is None:
             request = self._dialogue.next_request(Command.GET, Parameter.PING, self._blocks_out & 0xFF)
             self._ping = request.number, self.clock()
             link.send(request)

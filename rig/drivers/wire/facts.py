@@ -26,6 +26,8 @@ class DeviceFacts:
     serial_number: str
     boot: int
     simulated: bool
+    repeatable: bool
+    """Whether every START finds the same device, so that the same outputs give the same samples."""
     names: tuple[str, ...]
     units: tuple[str, ...]
     range_v: np.ndarray
@@ -63,7 +65,9 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
     get, get_float = dialogue.get, dialogue.get_float
     count = get(Parameter.N_CHANNELS)
     if not 1 <= count <= MOST_CHANNELS:
-        raise DaqProtocol(f"{dialogue.link.name}: the device says it has {count} channels: allowed is 1 to {MOST_CHANNELS}")
+        raise DaqProtocol(
+            f"{dialogue.link.name}: the device says it has {count} channels: allowed is 1 to {MOST_CHANNELS}"
+        )
     bits = get(Parameter.BITS)
     if bits not in (16, 32):
         raise DaqProtocol(f"{dialogue.link.name}: the device counts in {bits} bits: allowed is 16 or 32")
@@ -73,7 +77,8 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
         firmware=dialogue.get_text(Parameter.FIRMWARE),
         serial_number=dialogue.get_text(Parameter.SERIAL_NUMBER),
         boot=get(Parameter.BOOT),
-        simulated=get(Parameter.SIMULATED, default=0) == 1,
+        simulated=get(Parameter.SIMULATED, default=0) >= 1,
+        repeatable=get(Parameter.SIMULATED, default=0) == 2,
         names=tuple(dialogue.get_text(Parameter.CHANNEL_NAME, channel) for channel in channels),
         units=tuple(dialogue.get_text(Parameter.CHANNEL_UNIT, channel) for channel in channels),
         range_v=np.array([get_float(Parameter.CHANNEL_RANGE_V, channel) for channel in channels]),
@@ -105,7 +110,9 @@ def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> Non
     ours = [channel.name for channel in bench.channels]
     if ours != list(facts.names):
         how = "in another order" if sorted(ours) == sorted(facts.names) else "and not these"
-        raise DaqMismatch(f"{name}: the device has the channels {', '.join(facts.names)}, the bench {', '.join(ours)}: {how}")
+        raise DaqMismatch(
+            f"{name}: the device has the channels {', '.join(facts.names)}, the bench {', '.join(ours)}: {how}"
+        )
     if layout_crc != facts.layout_crc:
         raise DaqMismatch(
             f"{name}: the device's definition of its messages has the CRC {facts.layout_crc:08x}, "
@@ -116,16 +123,19 @@ def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> Non
             raise DaqMismatch(f"{name}: channel {channel.name}: the device scales it to {unit!r}, allowed is 'V'")
         if channel.range_v > range_v * (1.0 + FLOAT_TOLERANCE):
             raise DaqMismatch(
-                f"{name}: channel {channel.name}: range_v = {channel.range_v:g} in the bench, the device reads up to {range_v:g} V"
+                f"{name}: channel {channel.name}: range_v = {channel.range_v:g} in the bench, "
+                f"the device reads up to {range_v:g} V"
             )
     if bench.output_range_v > facts.output_range_v * (1.0 + FLOAT_TOLERANCE):
         raise DaqMismatch(
-            f"{name}: output_range_v = {bench.output_range_v:g} in the bench, the device puts out up to {facts.output_range_v:g} V"
+            f"{name}: output_range_v = {bench.output_range_v:g} in the bench, "
+            f"the device puts out up to {facts.output_range_v:g} V"
         )
     lowest, highest = facts.rate_hz
     if not lowest * (1.0 - FLOAT_TOLERANCE) <= bench.sample_rate_hz <= highest * (1.0 + FLOAT_TOLERANCE):
         raise DaqMismatch(
-            f"{name}: sample_rate_hz = {bench.sample_rate_hz:g} in the bench, the device samples at {lowest:g} to {highest:g} Hz"
+            f"{name}: sample_rate_hz = {bench.sample_rate_hz:g} in the bench, "
+            f"the device samples at {lowest:g} to {highest:g} Hz"
         )
 
 

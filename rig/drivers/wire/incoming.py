@@ -59,8 +59,8 @@ class Incoming:
         while True:
             early = self._dialogue.early
             message: Message | None = early.popleft() if early else self._link.receive(left_s)
-            if message.__class__ is Samples and self._is_good(message):  # type: ignore[arg-type]
-                return message  # type: ignore[return-value]
+            if message.__class__ is Samples and self._is_good(message):
+                return message
             if message is not None and message.__class__ is not Samples:
                 self._other(message)
             now = self._clock()
@@ -89,7 +89,9 @@ class Incoming:
         self._old_in_a_row = self._old_in_a_row + 1 if follows and self._old_in_a_row else 1
         self._last_old = first
         if self._old_in_a_row >= OLD_BLOCKS_IN_A_ROW:
-            raise DaqReset(f"{self._link.name}: the device counts its samples anew, from {first}: it was started by another")
+            raise DaqReset(
+                f"{self._link.name}: the device counts its samples anew, from {first}: it was started by another"
+            )
         return False
 
     def _other(self, message: Message) -> None:
@@ -97,7 +99,9 @@ class Incoming:
             self._on_answer(message)
         elif isinstance(message, Heartbeat):
             if message.boot != self._boot:
-                raise DaqReset(f"{self._link.name}: the device has started anew in the middle of the run; its output is 0 V")
+                raise DaqReset(
+                    f"{self._link.name}: the device has started anew in the middle of the run; its output is 0 V"
+                )
             if message.flags & STOPPED:
                 self._raise_stopped(message.flags)
             self._idle_beats = self._idle_beats + 1 if message.state == DeviceState.IDLE else 0
@@ -106,7 +110,9 @@ class Incoming:
 
     def _raise_stopped(self, flags: int) -> None:
         if flags & DeviceFlag.EMERGENCY_STOP:
-            raise DaqEmergencyStop(f"{self._link.name}: the emergency stop has brought the output to 0 V; release it first")
+            raise DaqEmergencyStop(
+                f"{self._link.name}: the emergency stop has brought the output to 0 V; release it first"
+            )
         raise DaqWatchdog(
             f"{self._link.name}: the device's watchdog has brought the output to 0 V, for no output had come in time "
             "(driver.options.watchdog_s)"

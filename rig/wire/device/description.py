@@ -32,6 +32,7 @@ def described(
     serial_number: str = "0001",
     simulated: int = 1,
     layout_crc: int = 0,
+    boot: int = 1,
 ) -> Words:
     """The words of a device in front of a plant."""
     words: Words = {}
@@ -70,5 +71,5 @@ def described(
         put(parameter, word)
     put(Parameter.RAMP_US, 50_000)
     put(Parameter.LAYOUT_CRC, layout_crc)
-    put(Parameter.BOOT, 1)
+    put(Parameter.BOOT, boot)
     return words

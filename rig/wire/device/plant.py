@@ -53,7 +53,9 @@ class Wiring:
         for key, given in {"flip": flip, "dead": dead, "swap": tuple(name for pair in swap for name in pair)}.items():
             for name in given:
                 if name not in names:
-                    raise ConfigurationError(f"{key} = {name!r}: there is no such channel, allowed is {', '.join(names)}")
+                    raise ConfigurationError(
+                        f"{key} = {name!r}: there is no such channel, allowed is {', '.join(names)}"
+                    )
         at = {name: index for index, name in enumerate(names)}
         self._order = np.arange(len(names))
         for first, second in swap:
@@ -79,7 +81,9 @@ class VirtualPlant:
 
     def __init__(self, bench: Bench, seed: int = 0, wiring: Wiring | None = None) -> None:
         if bench.driver.name != "virtual":
-            raise ConfigurationError(f"driver.name = {bench.driver.name!r}: allowed is 'virtual', what is emulated is a virtual rig")
+            raise ConfigurationError(
+                f"driver.name = {bench.driver.name!r}: allowed is 'virtual', for what is emulated is a virtual rig"
+            )
         options: Mapping[str, object] = {
             key: value for key, value in bench.driver.options.items() if key not in ("queue_blocks", "delay_samples")
         }
@@ -128,12 +132,13 @@ class VirtualPlant:
         return counts, flags
 
     def _counted(self) -> tuple[np.ndarray, int]:
-        raised = int(np.bitwise_or.reduce(self._daq.flags))
+        """The readings as counts: they lie on the converter's steps and within its range, so nothing is lost."""
+        raised = int(self._daq.flags[0]) if self._daq.flags.size == 1 else int(np.bitwise_or.reduce(self._daq.flags))
+        scaled = self._volts / self.v_per_count
         flags = 0
         if raised:
             for bit, device_bit in self._flags.items():
                 flags |= device_bit if raised & bit else 0
-        scaled = self._volts / self.v_per_count
-        if raised & Flag.DIVERGED:
-            scaled = np.nan_to_num(scaled, nan=np.inf)
-        return np.rint(np.clip(scaled, -(2.0 ** (self.bits - 1)), 2.0 ** (self.bits - 1) - 1.0)).astype(self._dtype), flags
+            if raised & Flag.DIVERGED:
+                scaled = np.nan_to_num(scaled, nan=2.0 ** (self.bits - 1) - 1.0)
+        return np.rint(scaled, out=scaled).astype(self._dtype), flags

@@ -20,7 +20,7 @@ HEADER_SIZE = 4  # version, type, sequence: the first three fields of each of th
 COMMAND = struct.Struct("<BBHBBBBI")  # number; command or status; parameter; item; value
 SAMPLES_HEAD = struct.Struct("<BBHQQIHxx")  # first; clock_us; dropped; flags; two zeros that align the counts
 OUTPUT_HEAD = struct.Struct("<BBHQ")  # first
-HEARTBEAT_BODY = struct.Struct("<BBHBBHIQ")  # state; boot; flags; dropped; samples
+HEARTBEAT_BODY = struct.Struct("<BBHBBHII")  # state; boot; flags; dropped; samples
 STOP = struct.Struct("<BBHB")  # reason
 
 MOST_DROPPED = 2**32 - 1
@@ -99,7 +99,7 @@ class Codec:
         if isinstance(message, Heartbeat):
             state, flags, boot, samples, dropped = message
             dropped = min(dropped, MOST_DROPPED)
-            return HEARTBEAT_BODY.pack(VERSION, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples)
+            return HEARTBEAT_BODY.pack(VERSION, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples & 0xFFFFFFFF)
         return STOP.pack(VERSION, EMERGENCY_STOP, 0, message.reason)
 
     def decode(self, payload: bytes) -> Message:
