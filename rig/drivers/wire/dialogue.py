@@ -81,6 +81,13 @@ class Dialogue:
                 self.early.append(message)
         return None
 
+    def forget(self) -> None:
+        """Drop what has come so far: heartbeats of an idle device, blocks for a host that is no more."""
+        for _ in range(WAITING_BLOCKS):
+            if self.link.receive(0.0) is None:
+                break
+        self.early.clear()
+
     def note_stray(self, answer: Answer) -> None:
         """Count an answer that nobody waits for; `DaqProtocol` once it is plain that two devices answer."""
         self.stray_answers += 1

@@ -171,7 +171,7 @@ class WireDAQ(DAQ):
         if state in (DeviceState.RUNNING, DeviceState.ARMED):
             self._found_running = 1
         dialogue.do(Command.STOP)
-        dialogue.early.clear()
+        dialogue.forget()
 
     def _check_capacity(self, block: int) -> None:
         link, facts = self._link, self._facts
@@ -243,6 +243,7 @@ class WireDAQ(DAQ):
             )
 
     def _begin(self) -> None:
+        self._dialogue.forget()
         self._dialogue.do(Command.START)
         self._dialogue.do(Command.ARM, value=ARM_KEY)
         self._sampling = True

@@ -8,7 +8,7 @@ from rig.errors import DaqMismatch, DaqRefused
 from rig.wire.can.frames import Frame, padded_length
 from rig.wire.can.groups import Blocks
 from rig.wire.can.protocol import Kind, Protocol
-from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
+from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
 
 __all__ = ["COUNTERS", "CanCodec"]
 
@@ -40,11 +40,8 @@ class CanCodec:
         self._last_beat: Heartbeat | None = None
         self._flags_told = 0
 
-    def configure(self, stream: Stream) -> None:
-        """Agree on the shape of samples and outputs; both begin anew.
-
-        Raises `DaqRefused` for a block or a resolution that frames cannot carry, `DaqMismatch` for other channels.
-        """
+    def check(self, stream: Stream) -> None:
+        """Raise `DaqRefused` for a block or a resolution that frames cannot carry, `DaqMismatch` for other channels."""
         shape = self._shape
         if stream.n_channels != shape.n_channels:
             raise DaqMismatch(f"{stream.n_channels} channels, but the bus is defined for {shape.n_channels}")
@@ -55,14 +52,26 @@ class CanCodec:
                 f"block = {stream.block}: allowed over {'CAN FD' if shape.fd else 'classical CAN'} with "
                 f"{shape.n_channels} channels is 1 to {shape.largest_block} samples"
             )
+
+    def configure(self, stream: Stream) -> None:
+        """Agree on the shape of samples and outputs; both begin anew. Errors: those of `check`."""
+        self.check(stream)
+        shape = self._shape
         self._stream = stream
         self._flags, self._dropped = 0, 0
         self._reported = -(1 << 30)  # group at which the receiver was last told its index
+        # Whole blocks, so that a loss of a whole wrap cannot make one block of the frames of two.
+        self._sample_groups = -(-stream.block // shape.rows)
+        self._sample_wrap = shape.wrap - shape.wrap % self._sample_groups
+        self._output_groups = -(-stream.block // shape.output_rows)
+        self._output_wrap = shape.output_wrap - shape.output_wrap % self._output_groups
         if self._device:
-            self._incoming = Blocks(self._counters, shape.output_wrap, 1, shape.output_rows, stream.block, 1)
+            self._incoming = Blocks(self._counters, self._output_wrap, 1, shape.output_rows, stream.block, 1)
             self._incoming.begin(stream.queue)
         else:
-            self._incoming = Blocks(self._counters, shape.wrap, shape.parts, shape.rows, stream.block, shape.n_channels)
+            self._incoming = Blocks(
+                self._counters, self._sample_wrap, shape.parts, shape.rows, stream.block, shape.n_channels
+            )
 
     def encode(self, message: Message) -> list[Frame]:
         """The frames of a message, in the order in which they must be sent."""
@@ -85,13 +94,11 @@ class CanCodec:
         return Frame(self._identifiers[Kind.HEARTBEAT, 0], data)
 
     def _encode_samples(self, message: Samples) -> list[Frame]:
-        stream, shape = self._streaming(), self._shape
-        n = stream.block
-        groups = -(-n // shape.rows)
-        first = message.first // n * groups
+        stream, shape, groups, wrap = self._streaming(), self._shape, self._sample_groups, self._sample_wrap
+        first = message.first // stream.block * groups
         frames = []
         beat = self._last_beat
-        stale = first + groups - self._reported > shape.wrap // 2
+        stale = first + groups - self._reported > wrap // 2
         if beat is not None and (stale or (not shape.fd and message.flags != self._flags_told)):
             frames.append(
                 self._heartbeat(beat._replace(flags=message.flags, samples=message.first, dropped=message.dropped))
@@ -99,7 +106,7 @@ class CanCodec:
             self._reported = first
         for group in range(groups):
             rows = message.counts[group * shape.rows : (group + 1) * shape.rows]
-            sequence = (first + group) % shape.wrap
+            sequence = (first + group) % wrap
             for part in range(shape.parts):
                 counts = rows if shape.parts == 1 else rows[:, shape.columns(part)]
                 number = part if shape.fd else sequence * shape.parts + part
@@ -107,15 +114,14 @@ class CanCodec:
         return frames
 
     def _encode_output(self, message: Output) -> list[Frame]:
-        stream, shape = self._streaming(), self._shape
-        groups = -(-stream.block // shape.output_rows)
+        stream, shape, groups, wrap = self._streaming(), self._shape, self._output_groups, self._output_wrap
         first = message.first // stream.block * groups
         frames = []
-        if first + groups - self._reported > shape.output_wrap // 2:
+        if first + groups - self._reported > wrap // 2:
             frames.append(Frame(self._identifiers[Kind.OUTPUT_INDEX, 0], self._index.pack(message.first & 0xFFFFFFFF)))
             self._reported = first
         for group in range(groups):
-            sequence = (first + group) % shape.output_wrap
+            sequence = (first + group) % wrap
             counts = message.counts[group * shape.output_rows : (group + 1) * shape.output_rows]
             frames.append(self._stream_frame(Kind.OUTPUT, 0 if shape.fd else sequence, sequence, 0, counts))
         return frames
@@ -156,7 +162,7 @@ class CanCodec:
         elif kind is Kind.HEARTBEAT:
             state, flags, boot, dropped, samples = self._beat.unpack(data)
             self._flags, self._dropped = flags, dropped
-            if self._stream is not None:
+            if self._stream is not None and state != DeviceState.IDLE:
                 self._incoming.mark(samples)
             return Heartbeat(state, flags, boot, samples, dropped)
         self._counters["foreign_frames"] += 1
@@ -185,11 +191,10 @@ class CanCodec:
 
     def _block(self, block: int, counts: np.ndarray, flags: int) -> Message:
         assert self._stream is not None
-        first, n = block * self._stream.block, self._stream.block
+        first = block * self._stream.block
         if self._device:
-            return Output(first, counts[:, 0], block * -(-n // self._shape.output_rows) % self._shape.output_wrap)
-        sequence = block * -(-n // self._shape.rows) % self._shape.wrap
-        return Samples(first, counts, flags, self._dropped, 0, sequence)
+            return Output(first, counts[:, 0], block * self._output_groups % self._output_wrap)
+        return Samples(first, counts, flags, self._dropped, 0, block * self._sample_groups % self._sample_wrap)
 
     def _streaming(self) -> Stream:
         if self._stream is None:

@@ -26,7 +26,7 @@ class Blocks:
 
     A frame says its sequence number, modulo ``wrap``, and its part. It is taken for the nearest group ahead of the last one if
     that is less than half a wrap away, else for one behind. A whole block ends all older ones: time does not go back. A group
-    index from elsewhere (`mark`) puts right what a loss of half a wrap or more has confused, once the next frame agrees with it.
+    index from elsewhere (`mark`) puts right what a loss of half a wrap or more has confused, once a frame agrees with it.
     """
 
     def __init__(self, counters: dict[str, int], wrap: int, parts: int, rows: int, n: int, n_channels: int) -> None:
@@ -54,8 +54,8 @@ class Blocks:
         """Somebody who knows says that this sample is next. Believed if it cannot be told from the sequence numbers."""
         n = self._shape[0]
         group = sample // n * self._per_block
-        if sample % n == 0 and group - self._next >= self._wrap // 2:
-            self._mark = group
+        far = sample % n == 0 and group - self._next >= self._wrap // 2
+        self._mark = group if far else None
 
     def rows_of(self, sequence: int) -> int:
         """Rows in the group of this number."""

@@ -1,16 +1,14 @@
 """`CanLink`: one end of the protocol on a bus, host or device."""
 
 import time
-from collections import OrderedDict
 from pathlib import Path
 
-from rig.errors import DaqProtocol
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.load import bus_load
 from rig.wire.can.protocol import protocol
 from rig.wire.link import Link, Load
-from rig.wire.messages import Answer, Message, Output, Request, Samples, Stream
+from rig.wire.messages import Message, Output, Samples, Stream
 
 __all__ = ["CanLink"]
 
@@ -18,15 +16,13 @@ COMMAND_S = 0.1
 """How long a command may wait for the bus."""
 SHORTEST_DEADLINE_S = 0.005
 _FRAMES_A_CALL = 256  # a bus full of strangers does not keep a call that must not wait
-_REMEMBERED = 32
-_DOUBLED = 8
 
 
 class CanLink(Link):
     """The protocol on a bus, for a number of channels and a node.
 
     Samples and outputs that cannot be sent within the time of a block expire: they are dropped and counted ("expired_frames").
-    At the host's end two devices under one node are noticed by their answers: `DaqProtocol`.
+    A device's answers to one host are its own business: two devices under one node are noticed by who asks them.
     """
 
     def __init__(
@@ -44,15 +40,12 @@ class CanLink(Link):
         self._bus = bus
         self._protocol = protocol(n_channels, fd, node, dbc)
         self.counters = bus.counters
-        self.counters["doubled_answers"] = 0
         self._codec = CanCodec(self._protocol, device, self.counters)
         self._rates_hz = (bit_rate_hz, data_bit_rate_hz)
         self._deadline_s = COMMAND_S
-        self._asked: OrderedDict[int, _Asked] = OrderedDict()
 
     def open(self) -> None:
         """Open the bus."""
-        self._asked.clear()
         self._bus.open()
 
     def configure(self, stream: Stream) -> None:
@@ -63,8 +56,6 @@ class CanLink(Link):
     def send(self, message: Message) -> None:
         """Send one message; one that cannot be sent in time is dropped, for what it says will be out of date."""
         streamed = isinstance(message, Samples | Output)
-        if isinstance(message, Request):
-            self._remember(message)
         deadline = time.monotonic() + (self._deadline_s if streamed else COMMAND_S)
         for frame in self._codec.encode(message):
             if not self._bus.send(frame, max(deadline - time.monotonic(), 0.0)):
@@ -79,8 +70,6 @@ class CanLink(Link):
             if frame is not None:
                 message = self._codec.decode(frame)
                 if message is not None:
-                    if isinstance(message, Answer):
-                        self._compare(message)
                     return message
             wait_s = max(deadline - time.monotonic(), 0.0) if timeout_s else 0.0
             if frame is None and wait_s == 0.0:
@@ -88,7 +77,11 @@ class CanLink(Link):
         return None
 
     def load(self, stream: Stream) -> Load:
-        """Both directions, with worst-case stuffing, heartbeats and indices."""
+        """Both directions, with worst-case stuffing, heartbeats and indices.
+
+        Raises `DaqRefused` for a stream that no frames can carry, however fast the bus.
+        """
+        self._codec.check(stream)
         return bus_load(self._protocol.shape, stream, *self._rates_hz)
 
     @property
@@ -104,39 +97,3 @@ class CanLink(Link):
     def close(self) -> None:
         """Let go of the bus."""
         self._bus.close()
-
-    def _remember(self, request: Request) -> None:
-        known = self._asked.get(request.number)
-        if known is not None and known.request == request:
-            known.times += 1
-            return
-        self._asked[request.number] = _Asked(request)
-        self._asked.move_to_end(request.number)
-        if len(self._asked) > _REMEMBERED:
-            self._asked.popitem(last=False)
-
-    def _compare(self, answer: Answer) -> None:
-        """Notice a second device: it answers a request once more, and sooner or later otherwise."""
-        asked = self._asked.get(answer.number)
-        if asked is None:
-            return
-        asked.answered += 1
-        if asked.answer is None:
-            asked.answer = answer
-            return
-        if asked.answered > asked.times:
-            self.counters["doubled_answers"] += 1
-        if asked.answer != answer or self.counters["doubled_answers"] >= _DOUBLED:
-            raise DaqProtocol(
-                f"{self.name}: two devices answer as node {self._protocol.node}; give one of them another node"
-            )
-
-
-class _Asked:
-    """A request under way: how often it was sent, and answered."""
-
-    def __init__(self, request: Request) -> None:
-        self.request = request
-        self.times = 1
-        self.answered = 0
-        self.answer: Answer | None = None

@@ -42,14 +42,17 @@ def traffic(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: 
         lengths = frame_lengths(shape, stream.block, outputs)
         seconds = sum(frame_seconds(length, shape.fd, bit_rate_hz, data_bit_rate_hz) for length in lengths)
         out.append(Traffic(name, blocks_hz * len(lengths), blocks_hz * seconds))
-    groups = len(frame_lengths(shape, stream.block, False)) // shape.parts
-    marks_hz = blocks_hz * groups / max(shape.wrap // 2 - groups + 1, groups)
-    beats_hz = HEARTBEATS_HZ + marks_hz
+    groups, wrap = len(frame_lengths(shape, stream.block, False)) // shape.parts, shape.wrap
+    beats_hz = HEARTBEATS_HZ + _marks_hz(blocks_hz, groups, wrap)
     out.append(Traffic("heartbeats", beats_hz, beats_hz * frame_seconds(8, False, bit_rate_hz)))
-    groups = len(frame_lengths(shape, stream.block, True))
-    marks_hz = blocks_hz * groups / max(shape.output_wrap // 2 - groups + 1, groups)
+    marks_hz = _marks_hz(blocks_hz, len(frame_lengths(shape, stream.block, True)), shape.output_wrap)
     out.append(Traffic("indices", marks_hz, marks_hz * frame_seconds(4, False, bit_rate_hz)))
     return out
+
+
+def _marks_hz(blocks_hz: float, groups: int, wrap: int) -> float:
+    """How often the other end is told an index: with the first block that would end beyond half a wrap after the last one."""
+    return blocks_hz / max((wrap - wrap % groups) // 2 // groups, 1)
 
 
 def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float) -> Load:

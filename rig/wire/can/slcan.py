@@ -13,7 +13,7 @@ import time
 from collections import deque
 from typing import Any
 
-from rig.errors import DaqBusy, DaqDisconnected, DaqRefused
+from rig.errors import DaqDisconnected, DaqRefused
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.frames import FD_LENGTHS, Frame
 
@@ -127,7 +127,9 @@ class SlcanBus(FrameBus):
         if isinstance(self._given, int):
             self._descriptor = self._given
         else:
-            self._port = _open_port(self._given, self._baud)
+            from rig.wire.serial.port import open_port
+
+            self._port = open_port(self._given, self._baud)
             self._descriptor = self._port.fileno()
         os.set_blocking(self._descriptor, False)
         self._poll = select.poll()
@@ -250,16 +252,3 @@ class SlcanBus(FrameBus):
             self._on_bus = False
             return
         raise DaqDisconnected(f"{self.name}: is gone ({error.strerror or error})") from None
-
-
-def _open_port(path: str, baud: int) -> Any:
-    import serial
-
-    try:
-        return serial.Serial(path, baud, timeout=0, exclusive=True)
-    except (serial.SerialException, OSError, ValueError) as error:
-        if getattr(error, "errno", None) == errno.EWOULDBLOCK or "exclusively lock" in str(error):
-            raise DaqBusy(f"{path}: another program holds the port") from None
-        if getattr(error, "errno", None) == errno.EACCES:
-            raise DaqRefused(f"{path}: may not be opened (permission denied; group dialout?)") from None
-        raise DaqDisconnected(f"{path}: cannot be opened: {' '.join(str(error).split())}") from None
