@@ -1,10 +1,11 @@
 """What the serial link costs, beside a bare echo of the same bytes: ``python -m benchmarks.serial_wire [--json]``.
 
-Two processes and one pseudo-terminal. The host sends the outputs of a block and waits for the samples of a block, the device
-answers each with the other; 4 channels, 16 bits. *Bare*: ``os.read`` and ``os.write`` of as many bytes in blocking mode, with no
-frames, no checks and no time-outs. *Link*: `SerialLink` at both ends. *Host*: `SerialLink` at the host's end, where the driver is,
-and a bare device. CPU is what both processes used, by ``getrusage``. Rounds alternate, so that what else the machine does falls on all
-alike; each number is the median of the rounds, each ratio the median of the ratios to bare in the same round.
+Two processes and one pseudo-terminal. The host sends the outputs of a block and waits for the samples of a block, the
+device answers each with the other; 4 channels, 16 bits. *Bare*: ``os.read`` and ``os.write`` of as many bytes in blocking
+mode, with no frames, no checks and no time-outs. *Link*: `SerialLink` at both ends. *Host*: `SerialLink` at the host's end,
+where the driver is, and a bare device. CPU is what both processes used, by ``getrusage``. Rounds alternate, so that what
+else the machine does falls on all alike; each number is the median of the rounds, each ratio the median of the ratios to
+bare in the same round.
 """
 
 import json
