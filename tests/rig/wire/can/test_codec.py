@@ -256,3 +256,12 @@ def test_stream_frames_before_the_stream_is_agreed_on_are_none() -> None:
     host = CanCodec(protocol(4, True, 3), False, {})
     assert received(host, flat(sent(device, range(3), 1, 4))) == []
     assert host._counters["foreign_frames"] == 3
+
+
+def test_frames_of_ones_own_that_a_bus_returns_are_counted_apart() -> None:
+    device, host = ends(4, True, 1)
+    for frame in host.encode(Request(1, 1)) + host.encode(Output(1, np.zeros(1, np.int16))):
+        assert host.decode(frame) is None
+    assert host._counters["own_frames"] == 3  # with the index of the first output
+    assert host._counters["foreign_frames"] == 0
+    assert device.decode(device.encode(Answer(1, 0))[0]) is None
