@@ -1,6 +1,8 @@
 """python-can as a bus: what its backends raise and return becomes ours."""
 
 import errno
+import socket
+from collections.abc import Iterator
 from typing import Any
 
 import can
@@ -20,6 +22,7 @@ class Backend:
         self.received: list[Any] = []
         self.errors: list[Exception] = []
         self.sent: list[can.Message] = []
+        self.socket = socket.socket()
 
     def recv(self, timeout: float | None) -> Any:
         message = self.received.pop(0) if self.received else None
@@ -32,17 +35,28 @@ class Backend:
             raise self.errors.pop(0)
         self.sent.append(message)
 
+    def fileno(self) -> int:
+        return self.socket.fileno()
+
     def shutdown(self) -> None:
+        self.socket.close()
         raise can.CanOperationError("gone before")
 
 
 @pytest.fixture
-def bus(monkeypatch: pytest.MonkeyPatch) -> PythonCanBus:
+def bus(monkeypatch: pytest.MonkeyPatch) -> Iterator[PythonCanBus]:
     backend = Backend()
     monkeypatch.setattr(can, "Bus", lambda **_: backend)
     bus = PythonCanBus("socketcan", "can0", True, 1_000_000, 2_000_000, 1)
     bus.open()
-    return bus
+    yield bus
+    bus.close()
+
+
+def test_a_socket_gets_more_room_for_frames_that_come_while_the_host_stalls(bus: PythonCanBus) -> None:
+    with socket.socket() as plain:
+        usual = plain.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+    assert bus._bus.socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) > usual
 
 
 def test_the_bus_being_off_ends_the_connection_and_other_error_frames_are_counted(bus: PythonCanBus) -> None:
