@@ -15,7 +15,7 @@ class SerialOptions(WireOptions):
 
     port: str = Field(min_length=1)
     """Name of the port, such as ``/dev/ttyACM0``; names under ``/dev/serial/by-id`` stay with the device."""
-    baud: int = Field(3_000_000, ge=9600, le=50_000_000)
+    baud: int = Field(3_000_000, ge=9600, le=12_000_000)
     """Bits per second, 8N1; what carries the stream. A USB device that is its own serial port has no use for it."""
 
 

@@ -1,6 +1,8 @@
 """Where frames go in and out: any backend of python-can. A sibling for adapters on a serial line is in `rig.wire.can.slcan`."""
 
+import contextlib
 import errno
+import os
 import socket
 import time
 from abc import ABC, abstractmethod
@@ -17,6 +19,9 @@ BUS_COUNTERS = ("error_frames", "expired_frames", "foreign_frames", "send_errors
 
 _BUS_OFF = 0x40  # class of an error frame, in its identifier (Linux: can/error.h)
 _RETRY_S = 2e-4
+_SOCKETS = ("socketcan", "udp_multicast")
+_ROOM_BYTES = 4 << 20
+_FORCED = 33  # SO_RCVBUFFORCE of Linux, beyond the system's limit where permitted
 _GONE = {errno.ENODEV, errno.ENETDOWN, errno.ENXIO, errno.EIO, errno.EBADF}
 
 
@@ -98,6 +103,8 @@ class PythonCanBus(FrameBus):
             raise DaqDisconnected(f"{self.name}: cannot be opened: {_line(error)}") from None
         except (can.CanError, ValueError, TypeError) as error:
             raise DaqRefused(f"{self.name}: python-can refuses it: {_line(error)}") from None
+        if self._interface in _SOCKETS:
+            _enlarge(self._bus.fileno())
 
     def send(self, frame: Frame, timeout_s: float) -> bool:
         """Hand a frame to the backend; a full queue is tried again until the time is over."""
@@ -154,6 +161,15 @@ class PythonCanBus(FrameBus):
             try:
                 bus.shutdown()
             except Exception:  # whatever a backend says of an interface that is gone, it is closed
+                return
+
+
+def _enlarge(descriptor: int) -> None:
+    """More room for frames that come while we stall, as much as the system grants."""
+    with socket.socket(fileno=os.dup(descriptor)) as copy:
+        for option in (_FORCED, socket.SO_RCVBUF):
+            with contextlib.suppress(OSError):
+                copy.setsockopt(socket.SOL_SOCKET, option, _ROOM_BYTES)
                 return
 
 

@@ -12,8 +12,8 @@ from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Mes
 
 __all__ = ["COUNTERS", "CanCodec"]
 
-COUNTERS = ("foreign_frames", "damaged_frames", "repeated_frames", "incomplete_blocks", "resynchronised")
-"""What a codec counts: frames of others, of a wrong length, come twice; blocks with a frame missing; indices put right."""
+COUNTERS = ("foreign_frames", "own_frames", "damaged_frames", "repeated_frames", "incomplete_blocks", "resynchronised")
+"""What a codec counts: frames of others, our own come back, of a wrong length, come twice; torn blocks; indices put right."""
 
 _LARGEST_DROPPED = 255
 _COUNT = np.dtype("<i2")
@@ -165,7 +165,7 @@ class CanCodec:
             if self._stream is not None and state != DeviceState.IDLE:
                 self._incoming.mark(samples)
             return Heartbeat(state, flags, boot, samples, dropped)
-        self._counters["foreign_frames"] += 1
+        self._counters["own_frames"] += 1  # some buses return what one sends
         return None
 
     def _decode_stream(self, frame: Frame, number: int) -> Message | None:

@@ -60,8 +60,8 @@ class CompiledMessage:
             raw = np.frombuffer(data, alike, count, first)
         else:
             raw = np.array(self.decode(data).tolist(), np.float64)
-        values: np.ndarray = raw * self.scale + self.offset
-        return values
+        values: np.ndarray = raw * self.scale
+        return values + self.offset if self._has_offset else values
 
     def encode(self, *values: int | float) -> bytes:
         """A frame's data from raw values in the order of `signals`; bytes of no signal are 0."""
@@ -87,6 +87,10 @@ class CompiledMessage:
     def _described(self, name: str) -> str:
         kind, at = self._field(name)
         return f"{name}:{'big-endian ' * (kind.byteorder == '>')}{kind.name}@{at}"
+
+    @cached_property
+    def _has_offset(self) -> bool:
+        return bool(self.offset.any())
 
     @cached_property
     def _alike(self) -> tuple[np.dtype[Any] | None, int, int]:

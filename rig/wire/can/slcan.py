@@ -165,11 +165,19 @@ class SlcanBus(FrameBus):
     def receive(self, timeout_s: float) -> Frame | None:
         """The next frame of the line."""
         frames = self._lines.frames
-        if not frames:
-            self._read(timeout_s)
+        if frames:
+            return frames.popleft()
+        until = time.monotonic() + timeout_s
+        left_s = timeout_s
+        while True:
+            self._read(left_s)
             if self._lines.commands:
                 self._obey()
-        return frames.popleft() if frames else None
+            if frames:
+                return frames.popleft()
+            left_s = until - time.monotonic()
+            if left_s <= 0.0:  # also after half a line
+                return None
 
     def close(self) -> None:
         """Close adapter and port; a descriptor that was given stays open."""

@@ -57,7 +57,8 @@ class Device:
         """Output of the block that was measured last, V."""
         self._sender = FaultySender(link, self.faults)
         self._latch = 0
-        self._rate_hz = 1.0
+        self._rate_hz = self._watchdog_s = 1.0
+        self._block = self._queue = 1
         self._origin_s = 0.0
         self._beat_s = -math.inf
         self._fed_s = math.inf
@@ -95,14 +96,13 @@ class Device:
     @property
     def wake_s(self) -> float:
         """When `advance` wants to be called."""
-        wake_s = min(self._beat_s + BEAT_S, self._fed_s + 1e-6 * self.setting(Parameter.WATCHDOG_US))
-        wake_s = min(wake_s, self._reset_s, self._sender.wake_s)
-        return min(wake_s, self.due_s) if self.sampling and not self.lockstep else wake_s
+        due_s = self.due_s if self.sampling and not self.lockstep else math.inf
+        return min(due_s, self._beat_s + BEAT_S, self._fed_s + self._watchdog_s, self._reset_s, self._sender.wake_s)
 
     @property
     def due_s(self) -> float:
         """When the block that is under way will be measured."""
-        return self._origin_s + (self.measured + self.setting(Parameter.BLOCK)) / self._rate_hz
+        return self._origin_s + (self.measured + self._block) / self._rate_hz
 
     # -- messages in --------------------------------------------------------------------------------------------------
 
@@ -196,6 +196,8 @@ class Device:
             return Status.WRONG_STATE, int(self.state)
         block, queue = self.setting(Parameter.BLOCK), self.setting(Parameter.QUEUE)
         self._rate_hz = 1e-3 * self.setting(Parameter.RATE_MHZ)
+        self._block, self._queue = block, queue
+        self._watchdog_s = 1e-6 * self.setting(Parameter.WATCHDOG_US)
         self.link.configure(Stream(len(self.plant.names), block, self._rate_hz, self.plant.bits, queue))
         self._outputs = OutputQueue(block, queue)
         self._has_output = False
@@ -300,7 +302,7 @@ class Device:
     def _keep_pace(self, now_s: float) -> None:
         """Measure what is due; a stall of our own beyond the queue stops the device's clock, for the host is not to blame."""
         late_s = now_s - self.due_s
-        allowed_s = self.setting(Parameter.QUEUE) * self.setting(Parameter.BLOCK) / self._rate_hz
+        allowed_s = self._queue * self._block / self._rate_hz
         if late_s > allowed_s:
             self._origin_s += late_s
             self.counts["stalls"] += 1
@@ -310,20 +312,20 @@ class Device:
 
     def _may_measure(self) -> bool:
         """In lockstep: whether the outputs of the next block are there, or not needed."""
-        block = self._outputs.block
-        if self.measured < self.setting(Parameter.QUEUE) * block or self._outputs.is_there(self.measured):
+        block = self._block
+        if self.measured < self._queue * block or self._outputs.is_there(self.measured):
             return True
         return self._cut < math.inf and self.measured < self._cut + self._ramp_samples + block  # goes down by itself
 
     def _watch(self, now_s: float) -> None:
-        bites_s = self._fed_s + 1e-6 * self.setting(Parameter.WATCHDOG_US)
+        bites_s = self._fed_s + self._watchdog_s
         if now_s >= bites_s and self.state is DeviceState.ARMED:
             self.counts["watchdog_trips"] += 1
             self._latch |= DeviceFlag.WATCHDOG
             self._bring_down(bites_s, DeviceState.LATCHED, 1e-6 * self.setting(Parameter.RAMP_US))
 
     def _measure(self, now_s: float) -> None:
-        first, block = self.measured, self._outputs.block
+        first, block = self.measured, self._block
         counts, held = self._outputs.take(first)
         volts = counts * self.plant.output_v_per_count
         if first < self._through:
@@ -331,7 +333,7 @@ class Device:
         if first + block > self._cut:
             volts *= self._share_of_output(np.arange(first, first + block))
         flags = self._latch
-        asked_for = self._has_output and first >= self.setting(Parameter.QUEUE) * block
+        asked_for = self._has_output and first >= self._queue * block
         if held and asked_for and self.state is DeviceState.ARMED:
             flags |= DeviceFlag.OUTPUT_HELD
             self.counts["held_blocks"] += 1

@@ -68,19 +68,18 @@ class FrameReader:
         if self._skipping and parts:
             self._counters["garbage_bytes"] += len(parts.pop(0))
             self._skipping = False
-        messages = [message for part in parts if part and (message := self._message(part)) is not None]
+        messages: list[Message] = []
+        for part in parts:
+            try:
+                if len(part) >= self._longest:
+                    raise Oversize
+                if part:
+                    messages.append(self._codec.decode(payload_of(part)))
+            except Malformed as remark:
+                self._counters[remark.counter] += 1
+                self._counters["garbage_bytes"] += len(part)
         if self._skipping or len(self._rest) >= self._longest:
             self._counters["oversize_frames"] += not self._skipping
             self._counters["garbage_bytes"] += len(self._rest)
             self._rest, self._skipping = b"", True
         return messages
-
-    def _message(self, encoded: bytes) -> Message | None:
-        try:
-            if len(encoded) >= self._longest:
-                raise Oversize
-            return self._codec.decode(payload_of(encoded))
-        except Malformed as remark:
-            self._counters[remark.counter] += 1
-            self._counters["garbage_bytes"] += len(encoded)
-            return None

@@ -1,7 +1,8 @@
 """Frames to messages and back, and what becomes of streams that are dropped, doubled, swapped, cut, flipped or foreign."""
 
-import itertools
 from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,9 +19,12 @@ BUSES = [(4, True, 1), (4, True, 10), (4, False, 1), (4, False, 5), (9, False, 3
 BEAT = Heartbeat(int(DeviceState.ARMED), 0, 7, 0)
 
 
+defined = cache(protocol)
+
+
 def ends(n_channels: int, fd: bool, block: int, queue: int = 1, node: int = 3) -> tuple[CanCodec, CanCodec]:
     """Device and host, configured, the device's first heartbeat sent."""
-    both = [CanCodec(protocol(n_channels, fd, node), device, {}) for device in (True, False)]
+    both = [CanCodec(defined(n_channels, fd, node), device, {}) for device in (True, False)]
     for end in both:
         end.configure(Stream(n_channels, block, 1000.0, 16, queue))
     both[0].encode(BEAT)
@@ -60,6 +64,7 @@ def test_streams_arrive_as_they_were_sent_far_beyond_the_wrap(n_channels: int, f
     assert not any(device._counters.values()) and not any(host._counters.values())  # noqa: PT018
 
 
+@settings(max_examples=50)
 @given(*[st.integers(0, 255)] * 4, st.integers(0, 2**32 - 1))
 def test_commands_arrive_as_they_were_sent(number: int, command: int, parameter: int, item: int, value: int) -> None:
     device, host = ends(4, True, 1)
@@ -113,7 +118,7 @@ def test_frames_that_change_places_within_a_block_and_with_the_next_cost_nothing
     blocks = sent(device, range(40), n, n_channels)
     for block in blocks:
         random.shuffle(block)  # type: ignore[attr-defined]
-    for earlier, later in itertools.pairwise(blocks):
+    for earlier, later in pairwise(blocks):
         if len(earlier) > 1 and len(later) > 1:
             earlier[-1], later[0] = later[0], earlier[-1]
     got = received(host, flat(blocks))
@@ -158,7 +163,7 @@ def mutated(frames: list[Frame], data: st.DataObject) -> list[Frame]:
     return out
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=100)
 @given(st.sampled_from(BUSES), st.booleans(), st.data())
 def test_whatever_comes_nothing_breaks_and_memory_stays_bounded(
     bus: tuple[int, bool, int], samples: bool, data: st.DataObject
@@ -251,3 +256,12 @@ def test_stream_frames_before_the_stream_is_agreed_on_are_none() -> None:
     host = CanCodec(protocol(4, True, 3), False, {})
     assert received(host, flat(sent(device, range(3), 1, 4))) == []
     assert host._counters["foreign_frames"] == 3
+
+
+def test_frames_of_ones_own_that_a_bus_returns_are_counted_apart() -> None:
+    device, host = ends(4, True, 1)
+    for frame in host.encode(Request(1, 1)) + host.encode(Output(1, np.zeros(1, np.int16))):
+        assert host.decode(frame) is None
+    assert host._counters["own_frames"] == 3  # with the index of the first output
+    assert host._counters["foreign_frames"] == 0
+    assert device.decode(device.encode(Answer(1, 0))[0]) is None

@@ -77,16 +77,19 @@ def test_a_block_beyond_the_sequence_numbers_is_refused_when_opening() -> None:
     channel = uuid4().hex
     with (
         device_on(virtual_bus(channel, False), False),
-        pytest.raises(DaqRefused, match="block = 64: allowed .* is 1 to 32"),
+        pytest.raises(DaqRefused, match=r"block = 64: allowed .* is 1 to 32"),
     ):
         CanDAQ(bench_on("virtual", channel, 64, fd=False)).open()
 
 
 def test_two_devices_under_one_node_are_noticed() -> None:
     channel = uuid4().hex
-    with device_on(virtual_bus(channel, True), True), device_on(virtual_bus(channel, True), True, serial_number="0002"):
-        with pytest.raises(DaqProtocol, match="two devices"):
-            CanDAQ(bench_on("virtual", channel)).open()
+    with (
+        device_on(virtual_bus(channel, True), True),
+        device_on(virtual_bus(channel, True), True, serial_number="0002"),
+        pytest.raises(DaqProtocol, match="two devices"),
+    ):
+        CanDAQ(bench_on("virtual", channel)).open()
 
 
 def test_two_devices_under_different_nodes_do_not_hear_each_other() -> None:
@@ -94,9 +97,9 @@ def test_two_devices_under_different_nodes_do_not_hear_each_other() -> None:
     with (
         device_on(virtual_bus(channel, True), True),
         device_on(virtual_bus(channel, True, 2), True, 2, serial_number="0002"),
+        CanDAQ(bench_on("virtual", channel, node=2)) as daq,
     ):
-        with CanDAQ(bench_on("virtual", channel, node=2)) as daq:
-            assert daq.identity["serial_number"] == "0002"
+        assert daq.identity["serial_number"] == "0002"
 
 
 def test_a_device_with_another_definition_is_refused(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_what_cannot_be_compiled_is_named(text: str, said: str) -> None:
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="none.dbc"):
+    with pytest.raises(ConfigurationError, match=r"none\.dbc"):
         compile_layout(tmp_path / "none.dbc")
 
 
