@@ -13,6 +13,7 @@ from rig.wire.device.sending import FaultySender
 from rig.wire.link import Link
 from rig.wire.messages import (
     ARM_KEY,
+    NAME_WORDS,
     Answer,
     Command,
     DeviceFlag,
@@ -26,6 +27,7 @@ from rig.wire.messages import (
     Samples,
     Status,
     Stream,
+    text_words,
 )
 
 __all__ = ["Device"]
@@ -83,6 +85,9 @@ class Device:
         if self.faults.version is not None:
             for parameter in (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION):
                 self.words[parameter, 0] = self.faults.version
+        for channel, name in enumerate(self.faults.channel_names or ()):
+            for number, word in enumerate(text_words(name)):
+                self.words[Parameter.CHANNEL_NAME, NAME_WORDS * channel + number] = word
 
     def setting(self, parameter: Parameter) -> int:
         """The value of a parameter in force."""
@@ -198,7 +203,8 @@ class Device:
         self._rate_hz = 1e-3 * self.setting(Parameter.RATE_MHZ)
         self._block, self._queue = block, queue
         self._watchdog_s = 1e-6 * self.setting(Parameter.WATCHDOG_US)
-        self.link.configure(Stream(len(self.plant.names), block, self._rate_hz, self.plant.bits, queue))
+        channels = self.faults.channels_sent or len(self.plant.names)
+        self.link.configure(Stream(channels, block, self._rate_hz, self.plant.bits, queue))
         self._outputs = OutputQueue(block, queue)
         self._has_output = False
         self.measured = 0
@@ -339,6 +345,8 @@ class Device:
             self.counts["held_blocks"] += 1
         self._at_rest = False
         readings, seen = self.plant.step(volts)
+        if self.faults.channels_sent is not None:
+            readings = readings[:, : self.faults.channels_sent]
         self.output_v = volts
         self.measured = first + block
         self._blocks += 1
