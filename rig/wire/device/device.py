@@ -115,6 +115,8 @@ class Device:
         """Do what a message asks for."""
         if now_s >= self._deaf_s:
             return
+        if self.sampling and not self.lockstep:
+            self._mind_a_stall(now_s)
         self._watch(now_s)
         if isinstance(message, Output):
             self._take_output(message, now_s)
@@ -295,26 +297,27 @@ class Device:
             self.emergency_stop(now_s)
         if now_s >= self._reset_s:
             self.reset(now_s)
+        if self.sampling and not self.lockstep:
+            self._mind_a_stall(now_s)
         self._watch(now_s)
         if self.sampling and self.lockstep:
             while self._may_measure():
                 self._measure(now_s)
         elif self.sampling:
-            self._keep_pace(now_s)
+            while self.due_s <= now_s:
+                self._measure(now_s)
         if now_s >= self._beat_s + BEAT_S:
             self._beat(now_s)
         self._sender.flush(now_s)
 
-    def _keep_pace(self, now_s: float) -> None:
-        """Measure what is due; a stall of our own beyond the queue stops the device's clock, for the host is not to blame."""
+    def _mind_a_stall(self, now_s: float) -> None:
+        """Where nobody let us run for longer than the queue, our clock stood still: the host could do nothing meanwhile."""
         late_s = now_s - self.due_s
-        allowed_s = self._queue * self._block / self._rate_hz
-        if late_s > allowed_s:
+        if late_s > self._queue * self._block / self._rate_hz:
             self._origin_s += late_s
+            self._fed_s += late_s
             self.counts["stalls"] += 1
             self.counts["stalled_us"] += round(1e6 * late_s)
-        while self.due_s <= now_s:
-            self._measure(now_s)
 
     def _may_measure(self) -> bool:
         """In lockstep: whether the outputs of the next block are there, or not needed."""
