@@ -13,6 +13,7 @@ from rig.wire.device.sending import FaultySender
 from rig.wire.link import Link
 from rig.wire.messages import (
     ARM_KEY,
+    NAME_WORDS,
     Answer,
     Command,
     DeviceFlag,
@@ -26,6 +27,7 @@ from rig.wire.messages import (
     Samples,
     Status,
     Stream,
+    text_words,
 )
 
 __all__ = ["Device"]
@@ -83,6 +85,9 @@ class Device:
         if self.faults.version is not None:
             for parameter in (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION):
                 self.words[parameter, 0] = self.faults.version
+        for channel, name in enumerate(self.faults.channel_names or ()):
+            for number, word in enumerate(text_words(name)):
+                self.words[Parameter.CHANNEL_NAME, NAME_WORDS * channel + number] = word
 
     def setting(self, parameter: Parameter) -> int:
         """The value of a parameter in force."""
@@ -110,6 +115,8 @@ class Device:
         """Do what a message asks for."""
         if now_s >= self._deaf_s:
             return
+        if self.sampling and not self.lockstep:
+            self._mind_a_stall(now_s)
         self._watch(now_s)
         if isinstance(message, Output):
             self._take_output(message, now_s)
@@ -198,7 +205,8 @@ class Device:
         self._rate_hz = 1e-3 * self.setting(Parameter.RATE_MHZ)
         self._block, self._queue = block, queue
         self._watchdog_s = 1e-6 * self.setting(Parameter.WATCHDOG_US)
-        self.link.configure(Stream(len(self.plant.names), block, self._rate_hz, self.plant.bits, queue))
+        channels = self.faults.channels_sent or len(self.plant.names)
+        self.link.configure(Stream(channels, block, self._rate_hz, self.plant.bits, queue))
         self._outputs = OutputQueue(block, queue)
         self._has_output = False
         self.measured = 0
@@ -289,26 +297,27 @@ class Device:
             self.emergency_stop(now_s)
         if now_s >= self._reset_s:
             self.reset(now_s)
+        if self.sampling and not self.lockstep:
+            self._mind_a_stall(now_s)
         self._watch(now_s)
         if self.sampling and self.lockstep:
             while self._may_measure():
                 self._measure(now_s)
         elif self.sampling:
-            self._keep_pace(now_s)
+            while self.due_s <= now_s:
+                self._measure(now_s)
         if now_s >= self._beat_s + BEAT_S:
             self._beat(now_s)
         self._sender.flush(now_s)
 
-    def _keep_pace(self, now_s: float) -> None:
-        """Measure what is due; a stall of our own beyond the queue stops the device's clock, for the host is not to blame."""
+    def _mind_a_stall(self, now_s: float) -> None:
+        """Where nobody let us run for longer than the queue, our clock stood still: the host could do nothing meanwhile."""
         late_s = now_s - self.due_s
-        allowed_s = self._queue * self._block / self._rate_hz
-        if late_s > allowed_s:
+        if late_s > self._queue * self._block / self._rate_hz:
             self._origin_s += late_s
+            self._fed_s += late_s
             self.counts["stalls"] += 1
             self.counts["stalled_us"] += round(1e6 * late_s)
-        while self.due_s <= now_s:
-            self._measure(now_s)
 
     def _may_measure(self) -> bool:
         """In lockstep: whether the outputs of the next block are there, or not needed."""
@@ -339,6 +348,8 @@ class Device:
             self.counts["held_blocks"] += 1
         self._at_rest = False
         readings, seen = self.plant.step(volts)
+        if self.faults.channels_sent is not None:
+            readings = readings[:, : self.faults.channels_sent]
         self.output_v = volts
         self.measured = first + block
         self._blocks += 1
