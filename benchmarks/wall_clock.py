@@ -145,19 +145,20 @@ def at_rate(rate_hz: float, minutes: float, privileged: bool) -> dict[str, Any]:
     """Loop and cyclictest in turns at one rate, for so many minutes each."""
     bench = bench_at(rate_hz)
     times: dict[str, Counter[float]] = {name: Counter() for name in ("wake_up", "execution", "response", "cyclictest")}
-    missed = samples = 0
+    missed, samples, periods = 0, 0, 0.0
     said: dict[str, str] = {}
     with tempfile.TemporaryDirectory() as name, busy_thread():
         for _ in range(max(1, round(60.0 * minutes / TURN_S))):
             report, chunks = loop_turn(bench, Path(name), privileged)
             for kind, bins in report["histograms"].items():
                 times[kind].update(dict(zip(bins["upper_edge_us"], bins["count"], strict=True)))
+            periods += rate_hz * report["wall_s"]
             missed, samples, said = missed + report["overruns"], samples + report["samples"], report["real_time"]
             times["cyclictest"].update(cyclictest_turn(rate_hz, chunks, bench, Path(name), privileged))
     out: dict[str, Any] = {f"{name}_us": quantiles(counts) for name, counts in times.items()}
     loop, other = out["wake_up_us"], out["cyclictest_us"]
     out["wake_up_over_cyclictest"] = {key: loop[key] / max(1.0, other[key]) for key in loop}
-    out["missed_percent"] = 100.0 * missed / samples
+    out["missed_percent"] = 100.0 * missed / periods
     out["stall_ms"] = {"loop": 1e-3 * loop["largest"], "cyclictest": 1e-3 * other["largest"]}
     out["collections_in_the_loop"] = int(said["collections"])
     out["imports_in_the_loop"] = int(said["imports"])

@@ -26,6 +26,7 @@ CHUNK_DONE = b"."
 NOTICE = struct.pack("!i", len(CHUNK_DONE)) + CHUNK_DONE  # as `Connection.send_bytes` has it, without its detours
 LONGEST_STALL_S = 1.0
 """A loop paced by the host that comes later than this, or ten blocks, ends with a ramp."""
+AHEAD_S = 1.0
 OFF = int(GuardMode.OFF)
 
 _now = time.monotonic_ns
@@ -74,7 +75,7 @@ class WallClockLoop:
         # Spread over the blocks of a chunk, for each costs as much as a block does; a chunk of one block does both in one.
         chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
         self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
-        self._begun_ns = self._release_ns = 0
+        self._began_ns = self._begun_ns = self._release_ns = 0
         self._samples = self._overruns = self._busy_ns = 0
         self.imports = self.collections = 0
         histograms = memory.histograms
@@ -88,7 +89,7 @@ class WallClockLoop:
     def run(self) -> None:
         """Until the output is off."""
         modules, collections = len(sys.modules), _collections()
-        began = _now()
+        began = self._began_ns = _now()
         self._pace.begin()
         over = False
         while not over:
@@ -181,7 +182,7 @@ class WallClockLoop:
             self._alone = True
         if self._alone:
             self._end("the campaign's process is gone")
-        elif self._memory.free <= self._memory.layout.reserve:
+        elif self._memory.free <= self._memory.layout.reserve and not self._waited_for_room():
             self._end("the campaign did not take its rows, and the output was brought down before any was lost")
             if self._memory.free < 1:  # it has had the time of a ramp and more
                 self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
@@ -192,6 +193,17 @@ class WallClockLoop:
         if slept - self._slept_s > 0.05:
             self._end(f"the computer was suspended for {slept - self._slept_s:.1f} s")
         self._slept_s = slept
+
+    def _waited_for_room(self) -> bool:
+        """Wait for the campaign where there is no hurry: a device far ahead of its nominal rate has no clock that runs on."""
+        ahead_s = self._samples / self.daq.sample_rate_hz - 1e-9 * (_now() - self._began_ns)
+        if not self._pace.by_device or ahead_s < AHEAD_S:
+            return False
+        while self._memory.free <= self._memory.layout.reserve:
+            if os.getppid() != self._parent or self._asked() or self._memory.words[STOP]:
+                break
+            time.sleep(0.01)
+        return True
 
     def _end(self, cause: str) -> None:
         """Ask for the ramp, for a cause of the loop's own; the first one stays."""

@@ -1,5 +1,6 @@
 """When a block of the loop is due: by the host's clock, or by the device's."""
 
+import math
 import time
 from typing import Protocol
 
@@ -8,6 +9,8 @@ from rig.daq import DAQ
 __all__ = ["DevicePace", "HostPace", "Pace", "pace_of"]
 
 DRIFT = 2e-4  # crystals of host and device differ by less
+WINDOW_S = 0.2  # of which no block was on time, before a device is thought to have stood still
+WINDOW_BLOCKS = 20
 
 _now = time.monotonic_ns
 _sleep = time.sleep
@@ -78,7 +81,8 @@ class DevicePace:
     """The device's clock: block j was due j periods after the earliest arrival that any block so far allows.
 
     The earliest is renewed by every block that comes earlier still, and grows by 200 ppm of the time to follow a device whose
-    clock is slower than its nominal rate. So what is late is what came late over the wire or was picked up late.
+    clock is slower than its nominal rate. So what is late is what came late over the wire or was picked up late. Where every
+    block of a fifth of a second came later by half a period, the device's own clock has stood still: it counts anew.
     """
 
     by_device = True
@@ -86,11 +90,13 @@ class DevicePace:
 
     def __init__(self, period_s: float) -> None:
         self._period_ns = 1e9 * period_s
-        self._earliest = 0.0
+        self._window = max(WINDOW_BLOCKS, round(WINDOW_S / period_s))
+        self._earliest = self._lately = math.inf
         self._number = 0
 
     def begin(self) -> None:
         """The next block is the first."""
+        self._earliest = self._lately = math.inf
         self._number = 0
 
     def wait(self) -> None:
@@ -99,10 +105,14 @@ class DevicePace:
     def release(self, begun_ns: int) -> int:
         """When the block was due that has arrived at a time."""
         since = begun_ns - self._number * self._period_ns
-        grown = self._earliest + DRIFT * self._period_ns
-        self._earliest = since if self._number == 0 else min(grown, since)
+        self._earliest = min(self._earliest + DRIFT * self._period_ns, since)
+        self._lately = min(self._lately, since)
         due = self._earliest + self._number * self._period_ns
         self._number += 1
+        if self._number % self._window == 0:
+            if self._lately - self._earliest > 0.5 * self._period_ns:
+                self._earliest = self._lately
+            self._lately = math.inf
         return min(begun_ns, int(due))
 
 
