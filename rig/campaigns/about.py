@@ -25,6 +25,8 @@ class About:
     """Serial number of the specimen."""
     notes: tuple[str, ...] = ()
     """Anything else, one line each."""
+    purpose: str = ""
+    """What the run belongs to: ``check`` or ``tuning``; empty for a campaign on its own."""
 
     def __post_init__(self) -> None:
         texts = [("operator", self.operator or ""), ("specimen_serial", self.specimen_serial)]
@@ -38,6 +40,7 @@ class About:
             "operator": self.operator or user_name(),
             "specimen_serial": self.specimen_serial,
             "notes": list(self.notes),
+            "purpose": self.purpose,
         }
 
 

@@ -66,7 +66,7 @@ def carry_out(
         with set_aside(output), JournalWriter.create(journal_path(output), header) as journal:
             execution = Execution(plan, bench, loop, journal, progress or Silent())
             with _trip_remembered(bench, session, loop, output):
-                execution.go({"first_sample": 0, "seed": seed, "about": facts})
+                execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
     finalise(journal_path(output), output)
     return Recording(output)
 
@@ -106,7 +106,7 @@ def take_up(
             with continue_recording(output, row_dtype=loop.tick.row_dtype, columns=columns) as journal:
                 execution = Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers)
                 with _trip_remembered(bench, session, loop, output):
-                    execution.go({**information, "about": facts})
+                    execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
     elif not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
@@ -120,15 +120,22 @@ def _facts(
     plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress | None
 ) -> dict[str, Any]:
     """Arm the bench; who did, who runs the test on what, and what stands behind the driver."""
+    about = about or About()
     facts = {
-        **(about or About()).facts(),
-        "armed": armed(bench, session, plan.kind, arm),
+        **about.facts(),
+        "armed": armed(bench, session, about.purpose or plan.kind, arm),
         "device": session.identity,
         "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
     }
     for remark in facts["remarks"]:
         (progress or Silent()).remark(remark)
     return facts
+
+
+def _lead(loop: RunningLoop) -> float:
+    """Samples from an output to the input that shows it."""
+    record = loop.tick.arrays.loop
+    return float(record["lead_whole"][0] + record["lead_fraction"][0])
 
 
 @contextmanager
