@@ -36,6 +36,7 @@ def check(
     bench: Bench | str | Path,
     recording: str | Path,
     *,
+    named: str | None = None,
     reference: str | Path | None = None,
     seed: int = 0,
     realtime: bool = False,
@@ -46,13 +47,14 @@ def check(
 ) -> Assessment:
     """Check a bench, record it in ``recording``, and remember the result for arming unless the rig is virtual.
 
+    ``named`` is what the recorded plan calls the bench.
     ``reference`` is the recording of an earlier check. ``arm`` and ``about`` as for `rig.campaigns.runner.carry_out`: a check
     moves the rig, gently, and so it must be armed too.
 
     Raises `rig.errors.ConfigurationError`, `rig.errors.RecordingError`, `rig.errors.DaqError` and `rig.errors.NotArmed`
     where nothing could be checked; what is wrong with the rig are findings.
     """
-    name = str(bench.name if isinstance(bench, Bench) else bench)
+    name = named or str(bench.name if isinstance(bench, Bench) else bench)
     bench = bench if isinstance(bench, Bench) else load_bench(bench)
     path, about = Path(recording), replace(about or About(), purpose=PURPOSE)
     if reference is not None:

@@ -30,7 +30,7 @@ def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], 
     names = responses.names
     if names[force] in dead or names[drive] in dead:
         text = "force or drive channel is dead"
-        return [*out, Finding("polarity", names[drive], "not tested", text=text)], None
+        return [*out, Finding("power", names[drive], "not tested", text=text)], None
     alive = [i for i in _accelerations(bench) if names[i] not in dead]
     mode = fit_mode(responses.frequency_hz, responses.per(force)[alive], bench.specimen.linear_frequency_hz)
     out.append(_power(bench, responses))
@@ -90,14 +90,12 @@ def _power(bench: Bench, responses: Responses) -> Finding:
     share = float(power.sum() / max(np.abs(power).sum(), 1e-300))
     name, allowed = responses.names[drive], f"from {POWER:g}"
     if share >= POWER:
-        return Finding(
-            "polarity", name, "ok", share, "power in", allowed, "against the force; both reversed would not show"
-        )
+        return Finding("power", name, "ok", share, "of all, into the specimen", allowed)
     if share > -POWER:
-        text = "power goes in at some frequencies and out at others: the drive channel is not at the drive point, or swapped"
-        return Finding("polarity", name, "warn", share, "power in", allowed, text)
-    text = "power comes out of the specimen: force or drive is reversed (or the two are swapped); turn one sensitivity's sign"
-    return Finding("polarity", name, "fail", share, "power in", allowed, text)
+        text = "goes in at some frequencies and out at others: the drive channel is not at the drive point"
+        return Finding("power", name, "warn", share, "of all, into the specimen", allowed, text)
+    text = "power comes out of the specimen: force or drive is reversed, or the two are swapped"
+    return Finding("power", name, "fail", share, "of all, into the specimen", allowed, text)
 
 
 def _near(bench: Bench, mode: Mode) -> bool:
@@ -140,14 +138,22 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
     if swapped is not None:
         return [*out, *_misplaced([names[i] for i in known], swapped)]
     out += _look_alike([names[i] for i in known], np.abs(expected))
-    for i, residue, wanted in zip(known, residues, expected, strict=True):
-        ratio = float(abs(residue) / abs(wanted))
-        reversed_ = residue.real * wanted < 0.0
-        if channels[i].role == "response":
-            text = "moves against the mode's shape: reversed; turn its sensitivity's sign" if reversed_ else ""
-            verdict = "fail" if reversed_ else "ok"
-            out.append(Finding("polarity", names[i], verdict, -1.0 if reversed_ else 1.0, "sign", "1", text))  # type: ignore[arg-type]
-        out.append(_size(names[i], ratio))
+    out += _polarities(bench, known, np.sign(residues.real * expected))
+    return [*out, *(_size(names[i], float(r)) for i, r in zip(known, np.abs(residues / expected), strict=True))]
+
+
+def _polarities(bench: Bench, known: Sequence[int], signs: np.ndarray) -> list[Finding]:
+    """Signs of the accelerations against the force; where most of them are against it, it is the force that is reversed."""
+    force = bench.channels[bench.index_of("force")].name
+    names = [bench.channels[i].name for i in known]
+    turned = len(known) > 2 and int(np.sum(signs < 0.0)) > len(known) / 2
+    against = signs > 0.0 if turned else signs < 0.0
+    text = "reversed against the accelerations: turn the sign of its sensitivity" if turned else ""
+    out = [Finding("polarity", force, "fail" if turned else "ok", -1.0 if turned else 1.0, "sign", "1", text)]
+    unsure = "" if len(known) > 2 else ", or the force is"
+    for name, wrong in zip(names, against, strict=True):
+        text = f"reversed{unsure}: turn the sign of its sensitivity" if wrong else ""
+        out.append(Finding("polarity", name, "fail" if wrong else "ok", -1.0 if wrong else 1.0, "sign", "1", text))
     return out
 
 

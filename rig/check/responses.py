@@ -11,6 +11,7 @@ are left complex, for delay between channels turns them.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +90,7 @@ def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode 
     sizes = np.sqrt(np.mean(np.abs(values) ** 2, axis=1))
     if not (np.isfinite(values).all() and np.all(sizes > 0.0)):
         return None
-    pole = _pole(s, np.asarray(values / sizes[:, None], complex))
+    pole = _pole(s, values / sizes[:, None])
     if pole is None:
         return None
     omega = math.sqrt(pole[0])
@@ -99,7 +100,7 @@ def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode 
     return Mode(omega * near_hz, pole[1] / (2.0 * omega), np.asarray(found[0]), float(left.max()))
 
 
-def _pole(s: Complex, values: Complex) -> tuple[float, float] | None:
+def _pole(s: Complex, values: NDArray[Any]) -> tuple[float, float] | None:
     """Stiffness and damping term of the common denominator, frequencies relative to the one looked near."""
     rows, powers = [], s[:, None] ** np.arange(5)[None, :]
     weight = np.ones(s.size)
@@ -118,7 +119,7 @@ def _pole(s: Complex, values: Complex) -> tuple[float, float] | None:
     return (float(stiffness), float(damping)) if inside else None
 
 
-def _reduced(numerator: Complex, value: Complex, s: Complex) -> tuple[Complex, Complex]:
+def _reduced(numerator: Complex, value: NDArray[Any], s: Complex) -> tuple[Complex, Complex]:
     """The equations ``value (s^2 + a s + b) = numerator coefficients`` less what the numerator's own unknowns explain."""
     basis, _ = np.linalg.qr(numerator)
     columns = np.column_stack([value, value * s, -value * s**2])
