@@ -86,7 +86,8 @@ def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode 
     around = (frequency_hz > BAND[0] * near_hz) & (frequency_hz < BAND[1] * near_hz)
     if np.count_nonzero(around) < 12:
         return None
-    s, values = 1j * frequency_hz[around] / near_hz, accelerance[:, around]
+    s: Complex = np.asarray(1j * frequency_hz[around] / near_hz, np.complex128)
+    values = accelerance[:, around]
     sizes = np.sqrt(np.mean(np.abs(values) ** 2, axis=1))
     if not (np.isfinite(values).all() and np.all(sizes > 0.0)):
         return None
@@ -100,7 +101,7 @@ def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode 
     return Mode(omega * near_hz, pole[1] / (2.0 * omega), np.asarray(found[0]), float(left.max()))
 
 
-def _pole(s: Complex, values: NDArray[Any]) -> tuple[float, float] | None:
+def _pole(s: NDArray[Any], values: NDArray[Any]) -> tuple[float, float] | None:
     """Stiffness and damping term of the common denominator, frequencies relative to the one looked near."""
     rows, powers = [], s[:, None] ** np.arange(5)[None, :]
     weight = np.ones(s.size)
@@ -119,7 +120,7 @@ def _pole(s: Complex, values: NDArray[Any]) -> tuple[float, float] | None:
     return (float(stiffness), float(damping)) if inside else None
 
 
-def _reduced(numerator: Complex, value: NDArray[Any], s: Complex) -> tuple[Complex, Complex]:
+def _reduced(numerator: NDArray[Any], value: NDArray[Any], s: NDArray[Any]) -> tuple[Complex, Complex]:
     """The equations ``value (s^2 + a s + b) = numerator coefficients`` less what the numerator's own unknowns explain."""
     basis, _ = np.linalg.qr(numerator)
     columns = np.column_stack([value, value * s, -value * s**2])

@@ -35,7 +35,10 @@ def write_check(found: Assessment, figure: Path) -> None:
 
 
 def draw_check(page: "Figure", found: Assessment) -> None:
-    """Accelerations per force and force per volt, dashed those of the reference; findings that are not ok."""
+    """Accelerations per force, phase of the velocity, force per volt, dashed those of the reference; what is not in order.
+
+    The velocity of a passive structure's drive point keeps within 90 degrees of the force.
+    """
     axes = page.subplots(2, 2)
     title(page, f"{found.bench.specimen.name}: check {found.verdict}")
     _say_findings(axes[1, 1], found)
@@ -56,12 +59,17 @@ def _draw_accelerances(size: "Axes", phase: "Axes", found: Assessment) -> None:
     for colour, i in zip(COLOURS, moving, strict=False):
         name = found.responses.names[i]
         size.semilogy(frequency, np.abs(now[i]), color=colour, label=name)
-        phase.plot(frequency, np.degrees(np.angle(now[i])), color=colour, label=name)
+        phase.plot(frequency, np.degrees(np.angle(now[i] / 1j)), color=colour, label=name)
         if name in known:
             size.semilogy(frequency, np.abs(known[name]), "--", color=colour, lw=0.8)
-            phase.plot(frequency, np.degrees(np.angle(known[name])), "--", color=colour, lw=0.8)
+            phase.plot(frequency, np.degrees(np.angle(known[name] / 1j)), "--", color=colour, lw=0.8)
     size.set(xlabel="frequency, Hz", ylabel="acceleration per force, 1/kg")
-    phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+    phase.set(
+        xlabel="frequency, Hz",
+        ylabel="phase of velocity per force, deg",
+        ylim=(-190, 190),
+        yticks=(-180, -90, 0, 90, 180),
+    )
     if moving:
         size.legend(fontsize=8)
 
