@@ -109,3 +109,26 @@ class RewiredDAQ(DAQ):
 def rewire(patch: pytest.MonkeyPatch, rewiring: Rewiring | None, *, virtual: bool = True) -> None:
     """Have every bench that is opened from now on rewired."""
     patch.setattr("rig.session.make_daq", lambda bench, seed: RewiredDAQ(bench, seed, rewiring, virtual=virtual))
+
+
+Column = Callable[[int, np.ndarray], np.ndarray]
+"""Readings, V, of a channel from the first instant of a block and the outputs on the converter in it."""
+
+
+class ExtraChannelDAQ(RewiredDAQ):
+    """A virtual rig with one more channel, the last of the bench, that the rig knows nothing of."""
+
+    def __init__(self, bench: Bench, seed: int, column: Column, *, virtual: bool = True) -> None:
+        super().__init__(bench.model_copy(update={"channels": bench.channels[:-1]}), seed, None, virtual=virtual)
+        self.channels = bench.channels
+        self.column, self.first = column, 0
+
+    def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
+        inputs[:, :-1] = self.inner.exchange(voltages)
+        inputs[:, -1] = self.column(self.first, voltages)
+        self.first += len(voltages)
+
+
+def add_channel(patch: pytest.MonkeyPatch, column: Column, *, virtual: bool = True) -> None:
+    """Have every bench that is opened from now on deliver its last channel from elsewhere."""
+    patch.setattr("rig.session.make_daq", lambda bench, seed: ExtraChannelDAQ(bench, seed, column, virtual=virtual))
