@@ -90,12 +90,12 @@ def _power(bench: Bench, responses: Responses) -> Finding:
     share = float(power.sum() / max(np.abs(power).sum(), 1e-300))
     name, allowed = responses.names[drive], f"from {POWER:g}"
     if share >= POWER:
-        return Finding("power", name, "ok", share, "of all, into the specimen", allowed)
+        return Finding("power", name, "ok", share, "into specimen", allowed)
     if share > -POWER:
         text = "goes in at some frequencies and out at others: the drive channel is not at the drive point"
-        return Finding("power", name, "warn", share, "of all, into the specimen", allowed, text)
+        return Finding("power", name, "warn", share, "into specimen", allowed, text)
     text = "power comes out of the specimen: force or drive is reversed, or the two are swapped"
-    return Finding("power", name, "fail", share, "of all, into the specimen", allowed, text)
+    return Finding("power", name, "fail", share, "into specimen", allowed, text)
 
 
 def _near(bench: Bench, mode: Mode) -> bool:
