@@ -40,6 +40,7 @@ class EndReason(IntEnum):
     NON_FINITE_OUTPUT = 18
     LOST_LOCK = 19
     DRIVER_FAILED = 20
+    EMERGENCY_STOP = 22
 
     @property
     def is_trip(self) -> bool:
@@ -65,6 +66,7 @@ TEXT = {
     EndReason.NON_FINITE_OUTPUT: "the law's output is not a number",
     EndReason.LOST_LOCK: "phase lock lost",
     EndReason.DRIVER_FAILED: "the driver failed",
+    EndReason.EMERGENCY_STOP: "emergency stop",
 }
 """One line for each reason."""
 
@@ -98,9 +100,13 @@ INPUT = np.dtype(
         ("role", "i8"),
         ("skew_samples", "f8"),
         ("watch_displacement", "i8"),
+        ("emergency_stop", "i8"),
+        ("stop_below_v", "f8"),
+        ("stop_above_v", "f8"),
     ]
 )
-"""What the tick needs to know of an input channel (one record a channel)."""
+"""What the tick needs to know of an input channel (one record a channel). One with ``emergency_stop`` is a switch: it drops the
+output outside ``stop_below_v`` to ``stop_above_v`` and may stand still otherwise."""
 
 INPUT_WATCH = np.dtype(
     [
