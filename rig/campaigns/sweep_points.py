@@ -63,7 +63,11 @@ def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
     usual = float(np.median(np.diff(transient.time_s))) if transient.time_s.size > 1 else 0.0
     holes = np.flatnonzero(np.diff(transient.time_s) > 1.5 * usual)
     where = ", ".join(f"{transient.frequency_hz[hole]:.3f}" for hole in holes[:5])
-    return [f"nothing is known about {where}{' Hz and more' if holes.size > 5 else ' Hz'}: samples were lost"] if where else []
+    return (
+        [f"nothing is known about {where}{' Hz and more' if holes.size > 5 else ' Hz'}: samples were lost"]
+        if where
+        else []
+    )
 
 
 def _level_objection(plan: SweepPlan, error: float | None) -> str:

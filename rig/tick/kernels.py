@@ -105,8 +105,12 @@ def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
 
 
 @kernel
-def pass_over(t: TickArrays, readings: np.ndarray) -> int:
-    """A sample that was lost on its way: nothing is read, the motion goes on as it was, a long gap trips."""
+def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
+    """A sample that was lost on its way: nothing is read, the motion goes on as it was, a long gap trips.
+
+    For force and drive stand the fundamentals as they are known: so a detector's ripple goes on as well, and does not turn
+    into an error of the phase by stopping anywhere.
+    """
     loop, limits, dt = t.loop[0], t.limits[0], t.law[0].dt_s
     readings[:] = math.nan
     loop.lost += 1
@@ -115,6 +119,9 @@ def pass_over(t: TickArrays, readings: np.ndarray) -> int:
     for index in range(t.inputs.size):
         if t.inputs[index].watch_displacement == 1:
             carry_motion(t.watches[index], cos_step, sin_step, omega)
+    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
+    loop.force = force.real * cos_theta - force.imag * sin_theta
+    loop.drive_motion = drive.real * cos_theta - drive.imag * sin_theta
     watch_gap(t.guard[0], limits, loop.lost, loop.sample, dt)
     return 0
 
@@ -172,7 +179,7 @@ def oscillate(t: TickArrays, amplitude: float) -> float:
 def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row: Record) -> float:
     """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``.
 
-    Of a sample that is ``lost`` the volts are not looked at: estimates hold, oscillator, plan, laws and output go on.
+    Of a sample that is ``lost`` the volts are not looked at: estimates hold but for their ripple, oscillator, plan, laws and output go on.
     """
     law, loop, guard, progress = t.law[0], t.loop[0], t.guard[0], t.progress[0]
     now = loop.sample
@@ -189,12 +196,14 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         else complex(seen.amplitude_v, 0.0)
     )
 
+    cos_theta, sin_theta = math.cos(theta_in), math.sin(theta_in)
     if lost:
-        flags = pass_over(t, readings)
+        flags = pass_over(t, readings, cos_theta, sin_theta)
     else:
         loop.lost = 0
         flags = take_in(t, volts, readings)
-        demodulate_inputs(t, math.cos(theta_in), math.sin(theta_in))
+    if not lost or law.detector != ADAPTIVE:
+        demodulate_inputs(t, cos_theta, sin_theta)
     thresholds = t.thresholds[0]
     present = loop.force_size >= thresholds.smallest_force_n and loop.response_size >= thresholds.smallest_response
     closed = present and loop.drive == LOOP_DRIVE
