@@ -118,7 +118,7 @@ def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: 
     cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
     for index in range(t.inputs.size):
         if t.inputs[index].watch_displacement == 1:
-            carry_motion(t.watches[index], cos_step, sin_step, omega)
+            carry_motion(limits, t.watches[index], cos_step, sin_step, omega)
     force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
     loop.force = force.real * cos_theta - force.imag * sin_theta
     loop.drive_motion = drive.real * cos_theta - drive.imag * sin_theta

@@ -23,7 +23,7 @@ from tests.rig.test_runs import plan_with
 RATE_HZ = 5000
 SCATTERED = [(k, k + 1) for k in range(997, 200_000, 1009)]  # one in a thousand
 BURSTS = [(k, k + 60) for k in range(5003, 200_000, 6007)]  # 1 % in pieces of 12 ms, a third of a period
-PLAN = {"levels_v": (0.8, 1.6), "record_periods": 30}
+PLAN = {"levels_v": (0.6, 1.0), "record_periods": 30}
 
 
 @pytest.fixture(scope="module")
