@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from rig.cli_analyse import app as analyse_app
+from rig.cli_emulate import emulate
 from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
@@ -38,6 +39,7 @@ app.command()(predict)
 app.command("import")(import_)
 app.command("export")(export_)
 app.command("tune")(tune_)
+app.command()(emulate)
 
 
 @app.command()
