@@ -9,7 +9,8 @@ import numpy as np
 
 from rig.daq import DAQ
 from rig.errors import DaqError
-from rig.safety.layout import EndReason, GuardMode
+from rig.safety.layout import GuardMode
+from rig.safety.limits import end_reason_of
 from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
@@ -175,7 +176,7 @@ class Loop:
         self.failure = error
         guard = self.tick.guard
         if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
-            guard["reason"] = EndReason.DRIVER_FAILED
+            guard["reason"] = end_reason_of(error)
             guard["sample"] = self.tick.sample
         guard["mode"] = GuardMode.OFF
         guard["amplitude_v"] = 0.0

@@ -19,6 +19,7 @@ SENSOR_STUCK = int(EndReason.SENSOR_STUCK)
 NON_FINITE_INPUT = int(EndReason.NON_FINITE_INPUT)
 NON_FINITE_OUTPUT = int(EndReason.NON_FINITE_OUTPUT)
 SAMPLES_LOST = int(EndReason.SAMPLES_LOST)
+EMERGENCY_STOP = int(EndReason.EMERGENCY_STOP)
 
 
 @kernel
@@ -45,10 +46,20 @@ def is_over(guard: Record, lead: int) -> bool:
 
 
 @kernel
+def watch_switch(guard: Record, channel: Record, index: int, volts: float, sample: int) -> None:
+    """Drop to 0 V where the emergency stop is pressed; its reading standing still is in order, its being no number is not."""
+    if not channel.stop_below_v <= volts <= channel.stop_above_v:
+        shut_down(guard, EMERGENCY_STOP, index, volts * channel.unit_per_volt, sample, True)
+
+
+@kernel
 def watch_input(
     guard: Record, limits: Record, channel: Record, watch: Record, index: int, volts: float, sample: int, driven: bool
 ) -> bool:
     """Check one raw reading (V) before it is used; False where it must not be (not a number)."""
+    if channel.emergency_stop == 1:
+        watch_switch(guard, channel, index, volts, sample)
+        return math.isfinite(volts)
     if not math.isfinite(volts):
         shut_down(guard, NON_FINITE_INPUT, index, volts, sample, False)
         return False

@@ -41,6 +41,7 @@ class EndReason(IntEnum):
     LOST_LOCK = 19
     DRIVER_FAILED = 20
     SAMPLES_LOST = 21
+    EMERGENCY_STOP = 22
 
     @property
     def is_trip(self) -> bool:
@@ -67,6 +68,7 @@ TEXT = {
     EndReason.LOST_LOCK: "phase lock lost",
     EndReason.DRIVER_FAILED: "the driver failed",
     EndReason.SAMPLES_LOST: "samples were lost for longer than is allowed",
+    EndReason.EMERGENCY_STOP: "emergency stop",
 }
 """One line for each reason."""
 
@@ -102,9 +104,13 @@ INPUT = np.dtype(
         ("role", "i8"),
         ("skew_samples", "f8"),
         ("watch_displacement", "i8"),
+        ("emergency_stop", "i8"),
+        ("stop_below_v", "f8"),
+        ("stop_above_v", "f8"),
     ]
 )
-"""What the tick needs to know of an input channel (one record a channel)."""
+"""What the tick needs to know of an input channel (one record a channel). One with ``emergency_stop`` is a switch: it drops the
+output outside ``stop_below_v`` to ``stop_above_v`` and may stand still otherwise."""
 
 INPUT_WATCH = np.dtype(
     [

@@ -6,11 +6,12 @@ import numpy as np
 
 from controller.layout import LockState
 from rig.bench import Bench
+from rig.errors import DaqEmergencyStop, DaqError
 from rig.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_HINT, TEXT, EndReason, GuardMode
 
 INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
 
-__all__ = ["describe_end", "guard_record", "input_records", "limits_record", "watch_records"]
+__all__ = ["describe_end", "end_reason_of", "guard_record", "input_records", "limits_record", "watch_records"]
 
 
 def limits_record(bench: Bench) -> np.ndarray:
@@ -49,6 +50,12 @@ def input_records(bench: Bench) -> np.ndarray:
         record["role"] = channel.role_code
         record["skew_samples"] = channel.skew_samples
         record["watch_displacement"] = accelerates
+        stop = bench.emergency_stop
+        if stop is not None and stop.channel == channel.name:
+            record["emergency_stop"] = 1
+            record["stop_below_v"] = -math.inf if stop.below_v is None else stop.below_v
+            record["stop_above_v"] = math.inf if stop.above_v is None else stop.above_v
+            record["alarm_v"] = 0.0  # every reading is looked at, none passes as plainly in order
     return out
 
 
@@ -65,6 +72,11 @@ def guard_record(armed: bool) -> np.ndarray:
     out["mode"] = GuardMode.ARMED if armed else GuardMode.DISARMED
     out["channel"] = -1
     return out
+
+
+def end_reason_of(error: DaqError) -> EndReason:
+    """What a run ends with when its driver raises this error."""
+    return EndReason.EMERGENCY_STOP if isinstance(error, DaqEmergencyStop) else EndReason.DRIVER_FAILED
 
 
 def describe_end(guard: np.ndarray, bench: Bench) -> str:
