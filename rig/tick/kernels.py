@@ -179,7 +179,7 @@ def oscillate(t: TickArrays, amplitude: float) -> float:
 def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row: Record) -> float:
     """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``.
 
-    Of a sample that is ``lost`` the volts are not looked at: estimates hold but for their ripple, oscillator, plan, laws and output go on.
+    Of a sample that is ``lost`` the volts are not looked at: estimates hold, but for their ripple; all else goes on.
     """
     law, loop, guard, progress = t.law[0], t.loop[0], t.guard[0], t.progress[0]
     now = loop.sample

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-import pyuff
 
 import rig
 from rig.bench import Bench
 from rig.campaigns.gaps import bridged, lost_rows
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.sweep import SweepPlan
+from rig.errors import RecordingError
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
 from rig.measurements import point_rows
@@ -43,7 +43,7 @@ def test_a_point_with_lost_samples_is_the_point_without(monkeypatch, whole, gaps
         for point, sound in zip(points, whole, strict=True):
             assert point["lost_samples"] > 0
             assert any("lost on their way" in warning for warning in point["warnings"])
-            assert point["frequency_hz"] == pytest.approx(sound["frequency_hz"], rel=2e-5)
+            assert point["frequency_hz"] == pytest.approx(sound["frequency_hz"], rel=1e-4)
             assert point["damping_ratio"] == pytest.approx(sound["damping_ratio"], rel=2e-3)
             assert point["amplitude_m"] == pytest.approx(sound["amplitude_m"], rel=1e-3)
             rows = point_rows(run.recording, point["number"])
@@ -61,7 +61,7 @@ def test_a_run_without_loss_says_so(whole):
 @pytest.mark.parametrize(("gap_s", "ends"), [(0.045, EndReason.COMPLETED), (0.055, EndReason.SAMPLES_LOST)])
 def test_a_gap_is_ridden_out_up_to_its_limit_and_trips_beyond(monkeypatch, gap_s, ends):
     """In the middle of a vibration of 2 mm: integrated with a hole, its acceleration would pass for overtravel."""
-    lose(monkeypatch, [(40_000, 40_000 + round(gap_s * RATE_HZ))])
+    lose(monkeypatch, [(25_000, 25_000 + round(gap_s * RATE_HZ))])
     bench = bench_with({"limits": {"displacement_m": 0.0025}})
     with rig.run(plan_with(levels_v=(1.6,), record_periods=100), bench=bench, seed=1) as run:
         part = run.recording.parts[-1]
@@ -74,7 +74,7 @@ def test_a_gap_is_ridden_out_up_to_its_limit_and_trips_beyond(monkeypatch, gap_s
 
 
 def test_rows_without_the_flag_are_still_refused_where_they_are_no_numbers(monkeypatch):
-    lose(monkeypatch, [(40_000, 40_001)])
+    lose(monkeypatch, [(10_000, 10_001)])
     monkeypatch.setattr("tests.rig.lossy.LOST", 0)
     with rig.run(plan_with(levels_v=(0.8,)), seed=1) as run:
         assert run.recording.parts[-1].end["reason"] == "non_finite_input"
@@ -142,7 +142,7 @@ def test_a_sweep_has_no_instants_where_samples_were_lost(monkeypatch):
     np.testing.assert_allclose(np.abs(found.force), force, rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize("suffix", ["csv", "mat", "uff"])
+@pytest.mark.parametrize("suffix", ["csv", "mat"])
 def test_exported_samples_keep_their_gaps(monkeypatch, tmp_path, suffix):
     lose(monkeypatch, [(k, k + 1) for k in range(997, 100_000, 101)])
     with rig.run(plan_with(levels_v=(0.8,), record_periods=10), output=tmp_path / "run.h5", seed=1) as run:
@@ -151,12 +151,17 @@ def test_exported_samples_keep_their_gaps(monkeypatch, tmp_path, suffix):
     assert lost.any()
     target = tmp_path / f"samples.{suffix}"
     export_file(tmp_path / "run.h5", target, suffix, data="time")
-    if suffix == "uff":
-        force = pyuff.UFF(str(target)).read_sets(1)["data"]  # the header is dataset 151
-    else:
-        force = import_file(target).samples[0]
+    force = import_file(target).samples[0]
     np.testing.assert_array_equal(np.isnan(force), lost)
     np.testing.assert_allclose(force[~lost], rows["inputs"][~lost, 0], rtol=1e-5)
+
+
+def test_universal_files_say_that_they_cannot_hold_gaps(monkeypatch, tmp_path):
+    lose(monkeypatch, [(k, k + 1) for k in range(997, 100_000, 101)])
+    with rig.run(plan_with(levels_v=(0.8,), record_periods=10), output=tmp_path / "run.h5", seed=1):
+        pass
+    with pytest.raises(RecordingError, match="not finite, which universal files cannot"):
+        export_file(tmp_path / "run.h5", tmp_path / "samples.uff", "uff", data="time")
 
 
 def test_too_many_lost_samples_refuse_the_point(monkeypatch):
