@@ -1,6 +1,6 @@
 """pytest against a bench: options, fixtures for an armed and safe rig, markers for what a bench must have, a result file.
 
-Loaded by every pytest in an environment where this package is installed: nothing heavy is imported before a fixture is asked for.
+Every pytest beside which this package is installed loads it: nothing heavy is imported before a fixture is asked for.
 """
 
 from collections.abc import Generator, Iterator

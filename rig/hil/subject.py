@@ -70,8 +70,8 @@ class Subject:
 def subject(name: str | Path, *, wire: str | None = None, arm: bool = False) -> Iterator[Subject]:
     """The bench of that name or file, reached once to see that it is there; over an emulated ``wire`` if asked for.
 
-    Raises `ConfigurationError` for what is no bench, or no virtual one where it is to be emulated, `rig.errors.DaqError` for one
-    that is out of reach.
+    Raises `ConfigurationError` for what is no bench, or no virtual one where it is to be emulated, `rig.errors.DaqError` for
+    one that is out of reach.
     """
     bench = load_bench(name)
     behind = make_daq(bench) if bench.driver.name == "virtual" else None

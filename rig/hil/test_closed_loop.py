@@ -72,11 +72,12 @@ def test_the_bench_agrees_with_itself(backbone_run: Run, repeated_run: Run, arme
 def test_a_virtual_rig_is_measured_as_it_is(
     backbone_run: Run, rig_bench: Bench, rig_truth: VirtualRig, armed_rig: ArmedRig
 ) -> None:
-    """Frequencies against harmonic balance of the same rig, by the displacement reached."""
+    """Frequencies against harmonic balance of the same rig, at the displacements reached."""
     points = backbone_run.recording.points
-    low, high = (points[index]["level"] for index in (0, -1))
-    known = phase_resonance_backbone(rig_truth, np.linspace(0.5 * low, 1.5 * high, 9))
-    true_hz = np.interp([p["amplitude_m"] for p in points], known.amplitude_m, known.frequency_hz)
+    known = phase_resonance_backbone(
+        rig_truth, amplitudes_m=[p["amplitude_m"] for p in points], near_hz=rig_bench.specimen.linear_frequency_hz
+    )
+    true_hz = known.frequency_hz
     measured_hz = np.array([p["frequency_hz"] for p in points])
     armed_rig.notes({"frequency_error": list(measured_hz / true_hz - 1.0)})
     np.testing.assert_allclose(measured_hz, true_hz, rtol=1e-3)
