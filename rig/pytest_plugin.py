@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.daq import DAQ
     from rig.hil.subject import ArmedRig, Subject
-    from simulators import VirtualRig
+    from simulators.virtual_rig import VirtualRig
 
 DEFAULT_BENCH = "magnet-beam"
 RESULTS = pytest.StashKey["Results"]()

@@ -13,7 +13,7 @@ from rig.daq import Capabilities
 from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, NotArmed
-from simulators import VirtualRig
+from simulators.virtual_rig import VirtualRig
 
 __all__ = ["ArmedRig", "Subject", "subject"]
 

@@ -7,7 +7,7 @@ from rig.api import Run
 from rig.bench import Bench
 from rig.hil.conftest import backbone_plan
 from rig.hil.subject import ArmedRig
-from simulators import VirtualRig
+from simulators.virtual_rig import VirtualRig
 from simulators.analysis import phase_resonance_backbone
 
 REPEATS = {"frequency_hz": 1e-3, "damping_ratio": 0.1, "force_n": 0.1}
