@@ -17,6 +17,8 @@ from simulators.virtual_rig import VirtualRig
 
 __all__ = ["ArmedRig", "Subject", "subject"]
 
+EMULATED_BLOCK_S = 0.004  # a wire carries blocks, no single samples at the rate of a virtual rig
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -84,7 +86,8 @@ def subject(name: str | Path, *, wire: str | None = None, arm: bool = False) -> 
         if wire is not None:
             from rig.wire.device.emulator import emulated
 
-            bench = stack.enter_context(emulated(bench, wire, lockstep=True))
+            block = max(bench.block, round(EMULATED_BLOCK_S * bench.sample_rate_hz))
+            bench = stack.enter_context(emulated(bench.model_copy(update={"block": block}), wire, lockstep=True))
         with make_daq(bench) as daq:
             found = Subject(bench, daq.capabilities, dict(daq.identity), truth, wire, arm)
         yield found

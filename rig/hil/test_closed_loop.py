@@ -7,8 +7,8 @@ from rig.api import Run
 from rig.bench import Bench
 from rig.hil.conftest import backbone_plan
 from rig.hil.subject import ArmedRig
-from simulators.virtual_rig import VirtualRig
 from simulators.analysis import phase_resonance_backbone
+from simulators.virtual_rig import VirtualRig
 
 REPEATS = {"frequency_hz": 1e-3, "damping_ratio": 0.1, "force_n": 0.1}
 """How well a bench is expected to agree with itself, relative."""
