@@ -220,7 +220,9 @@ class WireDAQ(DAQ):
         dialogue.link.configure(self._stream(self.block))
         timeout_s = options.timeout_s or max(0.25, 10.0 * block_s)
         dialogue.early.clear()
-        self._incoming = Incoming(dialogue, self.block, facts.boot, timeout_s, self._take_answer)
+        longest_gap = math.ceil((watchdog_s + timeout_s) * self.sample_rate_hz) + self.block
+        self._incoming = Incoming(dialogue, (self.block, len(self.channels)), longest_gap, timeout_s, facts.boot)
+        self._incoming.on_answer = self._take_answer
         self._flag_counts = dict.fromkeys(self._flag_counts, 0)
         self._counts_per_v = 1.0 / facts.output_v_per_count
         largest = 2.0 ** (facts.bits - 1)

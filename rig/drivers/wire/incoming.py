@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from rig.drivers.wire.dialogue import Dialogue
-from rig.errors import DaqEmergencyStop, DaqReset, DaqTimeout, DaqWatchdog
+from rig.errors import DaqEmergencyStop, DaqProtocol, DaqReset, DaqTimeout, DaqWatchdog
 from rig.wire.messages import Answer, DeviceFlag, DeviceState, Heartbeat, Message, Samples
 
 __all__ = ["Incoming"]
@@ -16,15 +16,19 @@ STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
 class Incoming:
     """What comes in while a device streams.
 
-    ``take`` returns one block after the other. Errors: `DaqTimeout`, `DaqReset`, `DaqWatchdog`, `DaqEmergencyStop`.
+    ``take`` returns one block after the other. ``shape`` is a block's; a gap of more than ``longest_gap`` samples cannot be,
+    for the watchdog would have ended the stream.
+
+    Errors: `DaqTimeout`, `DaqProtocol`, `DaqReset`, `DaqWatchdog`, `DaqEmergencyStop`.
     """
 
     def __init__(
-        self, dialogue: Dialogue, block: int, boot: int, timeout_s: float, on_answer: Callable[[Answer], None]
+        self, dialogue: Dialogue, shape: tuple[int, int], longest_gap: int, timeout_s: float, boot: int
     ) -> None:
         self._dialogue, self._link, self._clock = dialogue, dialogue.link, dialogue.clock
-        self._block, self._boot, self._timeout_s = block, boot & 0xFF, timeout_s
-        self._on_answer = on_answer
+        self._shape, self._block, self._longest_gap = shape, shape[0], longest_gap
+        self._boot, self._timeout_s = boot & 0xFF, timeout_s
+        self.on_answer: Callable[[Answer], None] = dialogue.note_stray
         self.expected = 0
         """Index of the first sample of the next block."""
         self.blocks = 0
@@ -78,7 +82,12 @@ class Incoming:
             self._raise_stopped(samples.flags)
         if samples.dropped > self.dropped:
             self.dropped = samples.dropped
-        if first >= self.expected and first % block == 0 and samples.counts.shape[0] == block:
+        if first >= self.expected and first % block == 0 and samples.counts.shape == self._shape:
+            if first - self.expected > self._longest_gap:
+                raise DaqProtocol(
+                    f"{self._link.name}: the device jumps from sample {self.expected} to {first}, "
+                    "further than its watchdog lets it run alone"
+                )
             self._old_in_a_row = 0
             return True
         if first >= self.expected:
@@ -96,7 +105,7 @@ class Incoming:
 
     def _other(self, message: Message) -> None:
         if isinstance(message, Answer):
-            self._on_answer(message)
+            self.on_answer(message)
         elif isinstance(message, Heartbeat):
             if message.boot != self._boot:
                 raise DaqReset(

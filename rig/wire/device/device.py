@@ -13,6 +13,7 @@ from rig.wire.device.sending import FaultySender
 from rig.wire.link import Link
 from rig.wire.messages import (
     ARM_KEY,
+    NAME_WORDS,
     Answer,
     Command,
     DeviceFlag,
@@ -26,6 +27,7 @@ from rig.wire.messages import (
     Samples,
     Status,
     Stream,
+    text_words,
 )
 
 __all__ = ["Device"]
@@ -57,7 +59,8 @@ class Device:
         """Output of the block that was measured last, V."""
         self._sender = FaultySender(link, self.faults)
         self._latch = 0
-        self._rate_hz = 1.0
+        self._rate_hz = self._watchdog_s = 1.0
+        self._block = self._queue = 1
         self._origin_s = 0.0
         self._beat_s = -math.inf
         self._fed_s = math.inf
@@ -82,6 +85,9 @@ class Device:
         if self.faults.version is not None:
             for parameter in (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION):
                 self.words[parameter, 0] = self.faults.version
+        for channel, name in enumerate(self.faults.channel_names or ()):
+            for number, word in enumerate(text_words(name)):
+                self.words[Parameter.CHANNEL_NAME, NAME_WORDS * channel + number] = word
 
     def setting(self, parameter: Parameter) -> int:
         """The value of a parameter in force."""
@@ -95,14 +101,13 @@ class Device:
     @property
     def wake_s(self) -> float:
         """When `advance` wants to be called."""
-        wake_s = min(self._beat_s + BEAT_S, self._fed_s + 1e-6 * self.setting(Parameter.WATCHDOG_US))
-        wake_s = min(wake_s, self._reset_s, self._sender.wake_s)
-        return min(wake_s, self.due_s) if self.sampling and not self.lockstep else wake_s
+        due_s = self.due_s if self.sampling and not self.lockstep else math.inf
+        return min(due_s, self._beat_s + BEAT_S, self._fed_s + self._watchdog_s, self._reset_s, self._sender.wake_s)
 
     @property
     def due_s(self) -> float:
         """When the block that is under way will be measured."""
-        return self._origin_s + (self.measured + self.setting(Parameter.BLOCK)) / self._rate_hz
+        return self._origin_s + (self.measured + self._block) / self._rate_hz
 
     # -- messages in --------------------------------------------------------------------------------------------------
 
@@ -110,6 +115,8 @@ class Device:
         """Do what a message asks for."""
         if now_s >= self._deaf_s:
             return
+        if self.sampling and not self.lockstep:
+            self._mind_a_stall(now_s)
         self._watch(now_s)
         if isinstance(message, Output):
             self._take_output(message, now_s)
@@ -196,7 +203,10 @@ class Device:
             return Status.WRONG_STATE, int(self.state)
         block, queue = self.setting(Parameter.BLOCK), self.setting(Parameter.QUEUE)
         self._rate_hz = 1e-3 * self.setting(Parameter.RATE_MHZ)
-        self.link.configure(Stream(len(self.plant.names), block, self._rate_hz, self.plant.bits, queue))
+        self._block, self._queue = block, queue
+        self._watchdog_s = 1e-6 * self.setting(Parameter.WATCHDOG_US)
+        channels = self.faults.channels_sent or len(self.plant.names)
+        self.link.configure(Stream(channels, block, self._rate_hz, self.plant.bits, queue))
         self._outputs = OutputQueue(block, queue)
         self._has_output = False
         self.measured = 0
@@ -287,43 +297,44 @@ class Device:
             self.emergency_stop(now_s)
         if now_s >= self._reset_s:
             self.reset(now_s)
+        if self.sampling and not self.lockstep:
+            self._mind_a_stall(now_s)
         self._watch(now_s)
         if self.sampling and self.lockstep:
             while self._may_measure():
                 self._measure(now_s)
         elif self.sampling:
-            self._keep_pace(now_s)
+            while self.due_s <= now_s:
+                self._measure(now_s)
         if now_s >= self._beat_s + BEAT_S:
             self._beat(now_s)
         self._sender.flush(now_s)
 
-    def _keep_pace(self, now_s: float) -> None:
-        """Measure what is due; a stall of our own beyond the queue stops the device's clock, for the host is not to blame."""
+    def _mind_a_stall(self, now_s: float) -> None:
+        """Where nobody let us run for longer than the queue, our clock stood still: the host could do nothing meanwhile."""
         late_s = now_s - self.due_s
-        allowed_s = self.setting(Parameter.QUEUE) * self.setting(Parameter.BLOCK) / self._rate_hz
-        if late_s > allowed_s:
+        if late_s > self._queue * self._block / self._rate_hz:
             self._origin_s += late_s
+            self._fed_s += late_s
             self.counts["stalls"] += 1
             self.counts["stalled_us"] += round(1e6 * late_s)
-        while self.due_s <= now_s:
-            self._measure(now_s)
 
     def _may_measure(self) -> bool:
         """In lockstep: whether the outputs of the next block are there, or not needed."""
-        block = self._outputs.block
-        if self.measured < self.setting(Parameter.QUEUE) * block or self._outputs.is_there(self.measured):
+        block = self._block
+        if self.measured < self._queue * block or self._outputs.is_there(self.measured):
             return True
         return self._cut < math.inf and self.measured < self._cut + self._ramp_samples + block  # goes down by itself
 
     def _watch(self, now_s: float) -> None:
-        bites_s = self._fed_s + 1e-6 * self.setting(Parameter.WATCHDOG_US)
+        bites_s = self._fed_s + self._watchdog_s
         if now_s >= bites_s and self.state is DeviceState.ARMED:
             self.counts["watchdog_trips"] += 1
             self._latch |= DeviceFlag.WATCHDOG
             self._bring_down(bites_s, DeviceState.LATCHED, 1e-6 * self.setting(Parameter.RAMP_US))
 
     def _measure(self, now_s: float) -> None:
-        first, block = self.measured, self._outputs.block
+        first, block = self.measured, self._block
         counts, held = self._outputs.take(first)
         volts = counts * self.plant.output_v_per_count
         if first < self._through:
@@ -331,12 +342,14 @@ class Device:
         if first + block > self._cut:
             volts *= self._share_of_output(np.arange(first, first + block))
         flags = self._latch
-        asked_for = self._has_output and first >= self.setting(Parameter.QUEUE) * block
+        asked_for = self._has_output and first >= self._queue * block
         if held and asked_for and self.state is DeviceState.ARMED:
             flags |= DeviceFlag.OUTPUT_HELD
             self.counts["held_blocks"] += 1
         self._at_rest = False
         readings, seen = self.plant.step(volts)
+        if self.faults.channels_sent is not None:
+            readings = readings[:, : self.faults.channels_sent]
         self.output_v = volts
         self.measured = first + block
         self._blocks += 1

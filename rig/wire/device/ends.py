@@ -3,16 +3,16 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import ConfigurationError, DaqRefused
-from rig.wire.can.bus import FrameBus, PythonCanBus
-from rig.wire.can.link import CanLink
-from rig.wire.can.slcan import SlcanBus
 from rig.wire.device.settings import EmulatorSettings
 from rig.wire.link import Link
 from rig.wire.serial.link import SerialLink
 from rig.wire.serial.pty import open_pseudo_terminal
+
+if TYPE_CHECKING:
+    from rig.wire.can.bus import FrameBus
 
 __all__ = ["device_end"]
 
@@ -40,11 +40,15 @@ def _serial(descriptor: int, path: str) -> tuple[Link, dict[str, Any]]:
 
 def _slcan(settings: EmulatorSettings, descriptor: int, path: str) -> tuple[Link, dict[str, Any]]:
     """An adapter on a pseudo-terminal, and the device on the bus behind it."""
+    from rig.wire.can.slcan import SlcanBus
+
     bus = SlcanBus(descriptor, settings.fd, data_bit_rate_hz=settings.data_bitrate, adapter=True)
     return _can_link(settings, bus), {"interface": "slcan", "channel": path, **_can_options(settings)}
 
 
 def _can_interface(settings: EmulatorSettings) -> tuple[Link, dict[str, Any]]:
+    from rig.wire.can.bus import PythonCanBus
+
     assert settings.interface is not None
     assert settings.channel is not None
     bus = PythonCanBus(
@@ -54,7 +58,9 @@ def _can_interface(settings: EmulatorSettings) -> tuple[Link, dict[str, Any]]:
     return _can_link(settings, bus), options
 
 
-def _can_link(settings: EmulatorSettings, bus: FrameBus) -> Link:
+def _can_link(settings: EmulatorSettings, bus: "FrameBus") -> Link:
+    from rig.wire.can.link import CanLink
+
     channels = len(settings.bench.channels)
     return CanLink(bus, channels, settings.fd, settings.node, settings.bitrate, settings.data_bitrate, device=True)
 

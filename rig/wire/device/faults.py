@@ -13,6 +13,8 @@ class Faults:
     """Speaks this version of the protocol only."""
     channel_names: tuple[str, ...] | None = None
     """Says that its channels are called so."""
+    channels_sent: int | None = None
+    """Sends so many channels, whatever it says."""
     deaf_after_s: float | None = None
     """Understands nothing any more so long after START, and goes on sampling."""
     silent_after_s: float | None = None

@@ -132,14 +132,13 @@ class VirtualPlant:
         return counts, flags
 
     def _counted(self) -> tuple[np.ndarray, int]:
-        raised = int(np.bitwise_or.reduce(self._daq.flags))
+        """The readings as counts: they lie on the converter's steps and within its range, so nothing is lost."""
+        raised = int(self._daq.flags[0]) if self._daq.flags.size == 1 else int(np.bitwise_or.reduce(self._daq.flags))
+        scaled = self._volts / self.v_per_count
         flags = 0
         if raised:
             for bit, device_bit in self._flags.items():
                 flags |= device_bit if raised & bit else 0
-        scaled = self._volts / self.v_per_count
-        if raised & Flag.DIVERGED:
-            scaled = np.nan_to_num(scaled, nan=np.inf)
-        return np.rint(np.clip(scaled, -(2.0 ** (self.bits - 1)), 2.0 ** (self.bits - 1) - 1.0)).astype(
-            self._dtype
-        ), flags
+            if raised & Flag.DIVERGED:
+                scaled = np.nan_to_num(scaled, nan=2.0 ** (self.bits - 1) - 1.0)
+        return np.rint(scaled, out=scaled).astype(self._dtype), flags

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rig.daq import LOST, State
 from rig.drivers import make_daq
@@ -22,7 +24,20 @@ from rig.errors import (
 )
 from rig.wire.device import Device, Faults, VirtualPlant
 from rig.wire.device.description import described
-from rig.wire.messages import ARM_KEY, Command, DeviceState, Parameter, Request, float_word
+from rig.wire.messages import (
+    ARM_KEY,
+    Answer,
+    Command,
+    DeviceState,
+    EmergencyStop,
+    Heartbeat,
+    Message,
+    Output,
+    Parameter,
+    Request,
+    Samples,
+    float_word,
+)
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink
 
@@ -132,6 +147,11 @@ def test_a_late_block_holds_outputs_and_says_so() -> None:
     assert np.isfinite(inputs).all()
     assert daq.counters["output_held"] > 0
     assert np.count_nonzero(flags & 4) == daq.counters["output_held"]
+
+
+def test_a_device_that_calls_its_channels_otherwise_is_refused() -> None:
+    names = ("force", "drive", "acc_drive", "nose")
+    assert "nose" in message_of(DaqMismatch, MemoryDAQ(bench_with(), faults=Faults(channel_names=names)))
 
 
 @pytest.mark.parametrize(
@@ -375,3 +395,42 @@ def test_counts_of_32_bits_carry_a_converter_of_24() -> None:
     reference, _ = answers(make_daq(bench, 3), 5)
     inputs, _ = answers(MemoryDAQ(bench, 3), 5)
     np.testing.assert_array_equal(inputs, reference)
+
+
+BLOCK_OF_5 = np.zeros((5, 4), np.int16)
+NOISE = st.one_of(
+    st.builds(
+        Samples,
+        st.integers(0, 60) | st.integers(0, 2**64 - 1),
+        st.sampled_from([BLOCK_OF_5, BLOCK_OF_5[:3], BLOCK_OF_5[:, :2]]),
+        st.sampled_from([0, 0, 0, 1, 2, 4, 8, 16]),
+        st.integers(0, 2**32 - 1),
+    ),
+    st.builds(Answer, *(st.integers(0, 255),) * 4, st.integers(0, 2**32 - 1)),
+    st.builds(Heartbeat, st.integers(0, 7), st.integers(0, 31), st.integers(0, 3), st.integers(0, 100)),
+    st.builds(Output, st.integers(0, 60), st.just(np.zeros(5, np.int16))),
+    st.builds(EmergencyStop),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(NOISE, max_size=40))
+def test_whatever_a_mad_device_sends_ends_in_rows_or_in_one_of_our_errors(noise: list[Message]) -> None:
+    daq = MemoryDAQ(bench_with(), 3, WireOptions(queue_blocks=2))
+    with daq:
+        daq.start(5)
+        drive(daq, 3)
+        daq.wire.to_host.extend(noise)
+        said = said_of(daq)
+    assert said == "" or (said.startswith("memory: ") and "\n" not in said)
+
+
+def said_of(daq: MemoryDAQ) -> str:
+    """What ends a few more blocks, if anything; rows that were lost are NaN and no others."""
+    try:
+        for _ in range(20):
+            rows = daq.exchange(np.zeros(5))
+            np.testing.assert_array_equal(np.isnan(rows).all(axis=1), (daq.flags & LOST).astype(bool))
+    except DaqError as error:
+        return str(error)
+    return ""

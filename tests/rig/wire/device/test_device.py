@@ -353,10 +353,14 @@ def test_in_lockstep_the_watchdog_brings_the_output_down_without_a_host() -> Non
 
 def test_a_stall_of_its_own_stops_its_clock_and_holds_no_output_against_the_host() -> None:
     bench = Bench()
-    bench.armed(watchdog_s=2.0)
+    bench.armed()
     bench.drive(4, 1.0)
     bench.now_s += 1.0  # nobody let it run
     bench.device.advance(bench.now_s)
     assert bench.device.counts["stalls"] == 1
     assert bench.device.measured == 50
     assert bench.device.counts["stalled_us"] == pytest.approx(0.99e6, rel=1e-6)
+    assert bench.device.state is DeviceState.ARMED
+    bench.put(60, 1.0)
+    bench.pass_time(0.02)
+    np.testing.assert_array_equal(bench.plant.output_v[20:60], 1.0)

@@ -15,7 +15,7 @@ import pytest
 from rig.bench import Bench, DriverChoice, load_bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
-from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqEmergencyStop
+from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqEmergencyStop, DaqTimeout
 from rig.wire.device import VirtualPlant, Wiring
 from rig.wire.device.emulator import Emulator, emulated
 from tests.rig.drivers.test_wire import answers, virtual
@@ -86,6 +86,15 @@ def exchange_for(daq: DAQ, seconds: float) -> None:
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         daq.exchange(np.zeros(5))
+
+
+def test_a_device_that_sends_other_channels_than_it_says_is_not_believed() -> None:
+    options = {"timeout_s": 0.3}
+    with emulated(bench_with(), options=options, faults={"channels_sent": 3}) as bench, make_daq(bench) as daq:
+        daq.start(5)
+        with pytest.raises(DaqTimeout, match="malformed"):
+            daq.exchange(np.zeros(5))
+        assert daq.counters["malformed"] > 0
 
 
 def test_a_host_that_is_killed_leaves_the_output_at_0_v_within_watchdog_and_ramp(tmp_path: Path) -> None:
