@@ -57,6 +57,7 @@ def test_a_limit_that_is_passed_brings_the_bench_down(backbone_run: Run, armed_r
 def test_the_bench_agrees_with_itself(backbone_run: Run, repeated_run: Run, armed_rig: ArmedRig) -> None:
     """Frequency, damping and force of every point, once more."""
     for first, second in zip(backbone_run.recording.points, repeated_run.recording.points, strict=True):
+        assert second["accepted"], second["reason"]
         for name, tolerance in REPEATS.items():
             assert second[name] == pytest.approx(first[name], rel=tolerance), name
     changes = {
