@@ -54,6 +54,8 @@ class Limits(Configured):
     """Time of uninterrupted overload that trips, s."""
     stuck_s: float = Field(0.5, gt=0, le=3600)
     """Time without any change of a reading, at a held level, that trips, s."""
+    lost_s: float = Field(0.05, gt=0, le=10)
+    """Time without any sample from the device, as samples lost on their way, that trips, s."""
     ramp_down_s: float = Field(0.5, gt=0, le=60)
     """Time of the ramp to 0 V that ends every run, s."""
 
@@ -190,7 +192,7 @@ def load_bench(name_or_path: str | Path) -> Bench:
     """A shipped bench by its name, or a bench from a TOML file.
 
     ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file beside it; what else
-    stands there changes it key by key.
+    stands there changes it key by key. Another ``driver.name`` than the base's begins with no ``driver.options``.
     """
     return validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
 
@@ -205,10 +207,22 @@ def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, An
     if isinstance(base, str) and base.endswith(".toml"):
         if path.resolve() in over:
             raise ConfigurationError(f"{name_or_path}: base = {base!r}: the files start from each other")
-        return merged(_with_base(path.parent / base, (*over, path.resolve())), table)
+        return _changed(_with_base(path.parent / base, (*over, path.resolve())), table)
     if base not in shipped_benches():
         allowed = ", ".join(shipped_benches())
         raise ConfigurationError(
             f"{name_or_path}: base = {base!r}: allowed is {allowed}, or a .toml file beside this one"
         )
-    return merged(_with_base(base, over), table)
+    return _changed(_with_base(base, over), table)
+
+
+def _changed(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+    """The base with what stands in ``table``; options of a driver that gives way to another go with it."""
+    driver, other = base.get("driver"), table.get("driver")
+    if (
+        isinstance(driver, dict)
+        and isinstance(other, dict)
+        and other.get("name", driver.get("name")) != driver.get("name")
+    ):
+        base = {**base, "driver": {}}
+    return merged(base, table)

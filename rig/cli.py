@@ -10,6 +10,7 @@ import typer
 from rig.cli_analyse import app as analyse_app
 from rig.cli_arming import ArmNow, Notes, Operator, SpecimenSerial, arm_from
 from rig.cli_check import check_
+from rig.cli_conformance import conformance
 from rig.cli_emulate import emulate
 from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
@@ -42,6 +43,7 @@ app.command("import")(import_)
 app.command("export")(export_)
 app.command("tune")(tune_)
 app.command()(emulate)
+app.command()(conformance)
 app.command("check")(check_)
 
 

@@ -40,6 +40,7 @@ class EndReason(IntEnum):
     NON_FINITE_OUTPUT = 18
     LOST_LOCK = 19
     DRIVER_FAILED = 20
+    SAMPLES_LOST = 21
     EMERGENCY_STOP = 22
 
     @property
@@ -66,6 +67,7 @@ TEXT = {
     EndReason.NON_FINITE_OUTPUT: "the law's output is not a number",
     EndReason.LOST_LOCK: "phase lock lost",
     EndReason.DRIVER_FAILED: "the driver failed",
+    EndReason.SAMPLES_LOST: "samples were lost for longer than is allowed",
     EndReason.EMERGENCY_STOP: "emergency stop",
 }
 """One line for each reason."""
@@ -84,12 +86,14 @@ LIMITS = np.dtype(
         ("slew_v_per_sample", "f8"),
         ("overload_samples", "i8"),
         ("stuck_samples", "i8"),
+        ("lost_samples", "i8"),
         ("ramp_down_samples", "i8"),
         ("integrator_gain", "f8"),
         ("integrator_leak", "f8"),
+        ("resonance_rad_s", "f8"),
     ]
 )
-"""Limits of a bench in samples and SI units (one record)."""
+"""Limits of a bench in samples and SI units (one record), and the resonance that its motion is mostly made of."""
 
 INPUT = np.dtype(
     [

@@ -24,8 +24,10 @@ def limits_record(bench: Bench) -> np.ndarray:
     out["slew_v_per_sample"] = limits.slew_v_per_s / rate
     out["overload_samples"] = max(1, round(limits.overload_s * rate))
     out["stuck_samples"] = max(2, round(limits.stuck_s * rate))
+    out["lost_samples"] = max(1, round(limits.lost_s * rate))
     out["ramp_down_samples"] = max(1, round(limits.ramp_down_s * rate))
     out["integrator_gain"] = 1.0 / rate
+    out["resonance_rad_s"] = 2.0 * math.pi * bench.specimen.linear_frequency_hz
     out["integrator_leak"] = -math.expm1(-2.0 * math.pi * INTEGRATOR_CORNER * limits.frequency_hz[0] / rate)
     return out
 
@@ -92,6 +94,8 @@ def describe_end(guard: np.ndarray, bench: Bench) -> str:
         where = f" on channel {bench.channels[channel].name} ({float(guard['value'][0]):.4g} {unit})"
     elif reason is EndReason.FREQUENCY_LIMIT:
         where = f" ({float(guard['value'][0]):.4g} Hz)"
+    elif reason is EndReason.SAMPLES_LOST:
+        where = f" ({float(guard['value'][0]):.4g} s, limits.lost_s = {bench.limits.lost_s:g})"
     acquiring = int(guard["lock"][0]) == LockState.ACQUIRING and reason <= EndReason.FREQUENCY_LIMIT
     hint = f"; the loop was not locked: {POLARITY_HINT}" if acquiring else ""
     return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s){hint}"

@@ -177,7 +177,7 @@ class _Runs:
         crest = 4.0
         for index, channel in enumerate(self.bench.channels):
             limit = {"force": limits.force_n, "monitor": math.inf}.get(channel.role, limits.acceleration_m_s2)
-            shares.append(float(np.abs(rows["inputs"][:, index]).max()) / limit)
+            shares.append(float(np.nanmax(np.abs(rows["inputs"][:, index]))) / limit)
             if channel.role in ("drive", "response"):
                 amplitude = measured.amplitude[measured.index(channel.name)]
                 moved = amplitude / (2.0 * np.pi * measured.frequency_hz) ** 2

@@ -115,7 +115,8 @@ class VirtualPlant:
     def reset(self) -> None:
         """Back to rest, at sample 0, with the noise of the same seed."""
         self._daq.stop()
-        self._daq.start(1)
+        self._daq.start(1)  # its flags are those of one sample now: the buffers are made anew with the first block
+        self._volts = np.empty((0, len(self.names)))
         self._first = 0
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
