@@ -15,6 +15,7 @@ from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts, 
 from rig.drivers.wire.incoming import Incoming
 from rig.drivers.wire.options import WireOptions
 from rig.drivers.wire.round_trips import RoundTrips
+from rig.drivers.wire.scaling import Scaling
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
 from rig.wire.messages import (
@@ -201,14 +202,8 @@ class WireDAQ(DAQ):
         dialogue, facts = self._dialogue, self._facts
         assert facts is not None
         self._check_capacity(self.block)
-        block_s = self.block / self.sample_rate_hz
         options = self._options
-        watchdog_s = options.watchdog_s or max(0.1, 4.0 * block_s, facts.watchdog_s[0])
-        if watchdog_s < SHORTEST_WATCHDOG_BLOCKS * block_s:
-            raise DaqRefused(
-                f"driver.options.watchdog_s = {watchdog_s:g}: allowed is from {SHORTEST_WATCHDOG_BLOCKS * block_s:g} s on, "
-                f"{SHORTEST_WATCHDOG_BLOCKS} blocks of {self.block} samples"
-            )
+        watchdog_s = self._watchdog_s(facts)
         if dialogue.get(Parameter.STATE) == DeviceState.LATCHED:
             dialogue.do(Command.CLEAR)
             self._cleared = 1
@@ -218,23 +213,28 @@ class WireDAQ(DAQ):
         self._set(Parameter.WATCHDOG_US, round(1e6 * watchdog_s), "driver.options.watchdog_s", 1e-6, "s")
         self._set(Parameter.RAMP_US, round(1e6 * options.ramp_s), "driver.options.ramp_s", 1e-6, "s")
         dialogue.link.configure(self._stream(self.block))
-        timeout_s = options.timeout_s or max(0.25, 10.0 * block_s)
+        timeout_s = options.timeout_s or max(0.25, 10.0 * self.block / self.sample_rate_hz)
         dialogue.early.clear()
         longest_gap = math.ceil((watchdog_s + timeout_s) * self.sample_rate_hz) + self.block
         self._incoming = Incoming(dialogue, (self.block, len(self.channels)), longest_gap, timeout_s, facts.boot)
         self._incoming.on_answer = self._take_answer
         self._flag_counts = dict.fromkeys(self._flag_counts, 0)
-        self._counts_per_v = 1.0 / facts.output_v_per_count
-        largest = 2.0 ** (facts.bits - 1)
-        self._lowest_count, self._highest_count = -largest, largest - 1.0
-        self._dtype = np.dtype(f"<i{facts.bits // 8}")
-        self._scaled = np.empty(self.block)
-        self._v_per_count = facts.v_per_count.copy()
+        self._scaling = Scaling(facts, self.block)
         self._due = options.queue_blocks * self.block
         self._blocks_out = 0
         self._blocks_between_pings = max(1, round(self.sample_rate_hz / self.block / PINGS_PER_S))
         self._ping: tuple[int, float] | None = None
         self._sampling = False
+
+    def _watchdog_s(self, facts: DeviceFacts) -> float:
+        block_s = self.block / self.sample_rate_hz
+        watchdog_s = self._options.watchdog_s or max(0.1, 4.0 * block_s, facts.watchdog_s[0])
+        if watchdog_s < SHORTEST_WATCHDOG_BLOCKS * block_s:
+            raise DaqRefused(
+                f"driver.options.watchdog_s = {watchdog_s:g}: allowed is from {SHORTEST_WATCHDOG_BLOCKS * block_s:g} s on, "
+                f"{SHORTEST_WATCHDOG_BLOCKS} blocks of {self.block} samples"
+            )
+        return watchdog_s
 
     def _set(self, parameter: Parameter, value: int, key: str, scale: float, unit: str) -> None:
         answer = self._dialogue.ask(Command.SET, parameter, value=value)
@@ -255,12 +255,8 @@ class WireDAQ(DAQ):
             self._begin()
         incoming = self._incoming
         assert incoming is not None
-        scaled = self._scaled
-        np.multiply(voltages, self._counts_per_v, out=scaled)
-        np.rint(scaled, out=scaled)
-        np.clip(scaled, self._lowest_count, self._highest_count, out=scaled)
         link = self._dialogue.link
-        link.send(Output(self._due, scaled.astype(self._dtype), self._blocks_out & 0xFFFF))
+        link.send(Output(self._due, self._scaling.to_counts(voltages), self._blocks_out & 0xFFFF))
         self._due += self.block
         self._blocks_out += 1
         if self._blocks_out % self._blocks_between_pings == 0 and self._ping is None:
@@ -272,7 +268,7 @@ class WireDAQ(DAQ):
             inputs.fill(np.nan)
             self.flags.fill(LOST)
             return
-        np.multiply(samples.counts, self._v_per_count, out=inputs)
+        self._scaling.to_volts(samples.counts, inputs)
         self.flags.fill(samples.flags)
         if samples.flags:
             for flag in DeviceFlag:

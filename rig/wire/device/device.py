@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.wire.device.description import SETTINGS, Words
 from rig.wire.device.faults import Faults
+from rig.wire.device.gate import Gate
 from rig.wire.device.outputs import OutputQueue
 from rig.wire.device.plant import Plant
 from rig.wire.device.sending import FaultySender
@@ -64,9 +65,7 @@ class Device:
         self._origin_s = 0.0
         self._beat_s = -math.inf
         self._fed_s = math.inf
-        self._cut = math.inf  # sample at which the output begins to go to 0 V
-        self._ramp_samples = 0.0
-        self._through = math.inf  # sample from which on outputs are let through
+        self._gate = Gate()
         self._last: tuple[Request, Answer] | None = None
         self._reset_s = math.inf
         self._deaf_s = math.inf
@@ -212,7 +211,7 @@ class Device:
         self.measured = 0
         self._blocks = 0
         self._origin_s = now_s
-        self._cut, self._through = math.inf, math.inf
+        self._gate = Gate()
         self.sampling = True
         faults = self.faults
         self._reset_s = now_s + faults.reset_after_s if faults.reset_after_s is not None else math.inf
@@ -228,7 +227,7 @@ class Device:
             return Status.LATCHED, self._latch
         if self.state is not DeviceState.RUNNING:
             return Status.WRONG_STATE, int(self.state)
-        self._through, self._cut = float(self._present(now_s)), math.inf
+        self._gate.open(self._present(now_s))
         self._fed_s = now_s
         self._become(DeviceState.ARMED, now_s)
         return Status.DONE, 0
@@ -256,11 +255,10 @@ class Device:
 
     def _bring_down(self, at_s: float, state: DeviceState, ramp_s: float = 0.0) -> None:
         """Let the output go to 0 V from an instant on, and block what comes."""
-        if self.lockstep:
-            self._cut = float(self.measured)
-        else:
-            self._cut = max(0.0, (at_s - self._origin_s) * self._rate_hz - ROUNDING_SAMPLES)
-        self._ramp_samples = ramp_s * self._rate_hz
+        instant = float(self.measured)
+        if not self.lockstep:
+            instant = max(0.0, (at_s - self._origin_s) * self._rate_hz - ROUNDING_SAMPLES)
+        self._gate.close(instant, ramp_s * self._rate_hz)
         self._fed_s = math.inf
         self._become(state, at_s)
 
@@ -324,7 +322,7 @@ class Device:
         block = self._block
         if self.measured < self._queue * block or self._outputs.is_there(self.measured):
             return True
-        return self._cut < math.inf and self.measured < self._cut + self._ramp_samples + block  # goes down by itself
+        return self._gate.is_closing(self.measured - block)  # it goes down by itself, and one block beyond
 
     def _watch(self, now_s: float) -> None:
         bites_s = self._fed_s + self._watchdog_s
@@ -336,11 +334,7 @@ class Device:
     def _measure(self, now_s: float) -> None:
         first, block = self.measured, self._block
         counts, held = self._outputs.take(first)
-        volts = counts * self.plant.output_v_per_count
-        if first < self._through:
-            volts[: int(min(block, self._through - first))] = 0.0
-        if first + block > self._cut:
-            volts *= self._share_of_output(np.arange(first, first + block))
+        volts = self._gate.let_through(first, counts * self.plant.output_v_per_count)
         flags = self._latch
         asked_for = self._has_output and first >= self._queue * block
         if held and asked_for and self.state is DeviceState.ARMED:
@@ -357,13 +351,6 @@ class Device:
         sequence = (self._blocks - 1) & 0xFFFF
         samples = Samples(first, readings, flags | seen, self._sender.dropped_samples, clock_us, sequence)
         self._sender.send_samples(samples, self._blocks, now_s)
-
-    def _share_of_output(self, index: np.ndarray) -> np.ndarray:
-        """Part of the output that is let through at a sample: 1 before the cut, then down a ramp."""
-        beyond = index - self._cut
-        if self._ramp_samples == 0.0:
-            return np.where(beyond >= 0.0, 0.0, 1.0)
-        return np.clip(1.0 - beyond / self._ramp_samples, 0.0, 1.0)
 
     def _beat(self, now_s: float) -> None:
         self._beat_s = now_s
