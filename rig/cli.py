@@ -10,6 +10,7 @@ import typer
 from rig.cli_analyse import app as analyse_app
 from rig.cli_arming import ArmNow, Notes, Operator, SpecimenSerial, arm_from
 from rig.cli_check import check_
+from rig.cli_emulate import emulate
 from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
@@ -41,6 +42,7 @@ app.command("import")(import_)
 app.command("export")(export_)
 app.command("tune")(tune_)
 app.command("check")(check_)
+app.command()(emulate)
 
 
 @app.command()
@@ -163,19 +165,27 @@ def plot_(
 
 
 @app.command()
-def doctor(json: Json = False) -> None:
-    """What this machine can promise: clock, privileges, disk, drivers."""
+def doctor(
+    daq: Annotated[
+        str | None, typer.Option(help="Bench whose device to look at: a name or TOML file. It is given 0 V only.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """What this machine can promise: clock, privileges, disk, drivers; with --daq, what a bench's device answers."""
+    from rig.bench import load_bench
     from rig.console import print_json
-    from rig.realtime import examine
+    from rig.realtime import examine, examine_bench
 
-    facts = examine(Path.cwd())
+    facts = examine(Path.cwd()) if daq is None else examine_bench(load_bench(daq))
     if json:
         print_json(facts)
-        return
-    for name, value in facts.items():
-        text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
-        text = ", ".join(value) if isinstance(value, list) else text
-        print(f"{name.replace('_', ' '):22} {text}")
+    else:
+        for name, value in facts.items():
+            text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
+            text = "; ".join(value) if isinstance(value, list) else text
+            print(f"{name.replace('_', ' '):22} {text}")
+    if facts.get("failure"):
+        raise typer.Exit(1)
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from datetime import date
 from enum import Enum, IntEnum
 from types import TracebackType
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -145,6 +145,9 @@ class DAQ(ABC):
     Errors: `DaqRefused` for what the device or the present state cannot do, `DaqTimeout`, `DaqDisconnected`,
     `DaqOverrun` and the others of `rig.errors` for what happens on the way.
     """
+
+    wall_clock: ClassVar[bool] = True
+    """Whether there is a device behind it that has a clock, so that its loop wants a process of its own."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float, output_range_v: float) -> None:
         self.channels = channels

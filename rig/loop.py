@@ -15,7 +15,7 @@ from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
 
-__all__ = ["FusedDAQ", "Loop", "LoopStatistics", "RunningLoop"]
+__all__ = ["FusedDAQ", "Loop", "LoopStatistics", "RunningLoop", "end_by_driver"]
 
 CHUNK_S = 0.5
 PACED_CHUNK_S = 0.02
@@ -62,6 +62,8 @@ class RunningLoop(Protocol):
     """Its control state, as of the last row that `run` has yielded."""
     failure: DaqError | None
     """Why the driver ended the loop, if it did."""
+    cause: str
+    """Why the loop asked for the ramp of its own accord, if it did; else empty."""
     statistics: LoopStatistics
     """What the loop did so far."""
 
@@ -84,6 +86,16 @@ class RunningLoop(Protocol):
         """Statistics for the record, as plain data."""
 
 
+def end_by_driver(tick: Tick, error: DaqError) -> None:
+    """Note in the guard that the driver has failed, with which the output is off."""
+    guard = tick.guard
+    if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
+        guard["reason"] = end_reason_of(error)
+        guard["sample"] = tick.sample
+    guard["mode"] = GuardMode.OFF
+    guard["amplitude_v"] = 0.0
+
+
 class Loop:
     """Runs a tick over a started driver until the guard has brought the output to 0 V.
 
@@ -98,6 +110,8 @@ class Loop:
         self.tick = tick
         self.paced = paced
         self.failure: DaqError | None = None
+        self.cause = ""
+        self.notes: tuple[str, ...] = ()
         self.statistics = LoopStatistics(daq.sample_rate_hz)
         self._fused = daq if fused and isinstance(daq, FusedDAQ) else None
         self._voltages = np.zeros(daq.block)
@@ -132,7 +146,7 @@ class Loop:
     @property
     def remarks(self) -> tuple[str, ...]:
         """The driver's remarks on the bench."""
-        return self.daq.remarks
+        return (*self.daq.remarks, *self.notes)
 
     @property
     def report(self) -> dict[str, Any]:
@@ -174,12 +188,7 @@ class Loop:
 
     def _fail(self, error: DaqError) -> None:
         self.failure = error
-        guard = self.tick.guard
-        if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
-            guard["reason"] = end_reason_of(error)
-            guard["sample"] = self.tick.sample
-        guard["mode"] = GuardMode.OFF
-        guard["amplitude_v"] = 0.0
+        end_by_driver(self.tick, error)
 
     def _wait_for_the_clock(self, began: float) -> None:
         early = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()

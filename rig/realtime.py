@@ -1,83 +1,78 @@
-"""What this machine can promise: the answer of ``rig doctor``."""
+"""What this machine and a bench can promise: the answers of ``rig doctor``."""
 
 import os
 import platform
 import shutil
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
-__all__ = ["examine"]
+from rig.bench import Bench
+from rig.errors import RigError
 
-WAKE_UPS = 1000
-PERIOD_S = 0.001
+__all__ = ["examine", "examine_bench"]
+
+RATE_HZ = 1000.0
+SECONDS = 1.0
 
 
 def examine(folder: Path) -> dict[str, Any]:
     """Facts on processor, clock, privileges, kernels, disk and drivers; ``folder`` is where recordings would go.
 
-    The lateness is that of a sleeping Python thread, measured for a second; a wall-clock rig wants its own process.
+    The lateness is that of a process like the one a wall-clock loop gets, woken a thousand times in a second, with and
+    without its privileges.
     """
     import vibrolock
     from rig.bench import shipped_benches
     from rig.drivers import driver_names
     from vibrolock.compiled import kernel_cache_folder
 
-    lateness_us = _lateness_us()
+    with_it, without_it = _probed(privileged=True), _probed(privileged=False)
     return {
         "vibrolock": vibrolock.__version__,
         "python": sys.version.split()[0],
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "processors": os.cpu_count() or 1,
-        "realtime_scheduling": _may_schedule_realtime(),
-        "memory_lock": _may_lock_memory(),
-        "wake_up_lateness_us": {
-            "p50": lateness_us[WAKE_UPS // 2],
-            "p99": lateness_us[WAKE_UPS * 99 // 100],
-            "largest": lateness_us[-1],
-        },
+        "realtime_scheduling": with_it.pop("scheduling", "not on this system"),
+        "memory_lock": with_it.pop("memory", "not on this system"),
+        "timer_slack": with_it.pop("timer_slack", "not on this system"),
+        "wake_up_lateness_us": with_it.get("wake_up_us", {}),
+        "without_privilege_us": without_it.get("wake_up_us", {}),
         "kernel_cache": str(kernel_cache_folder()),
         "free_disk_gb": round(shutil.disk_usage(folder).free / 1e9, 1),
         "drivers": driver_names(),
         "benches": shipped_benches(),
-        "wall_clock_rigs": "not in this version; virtual rigs run on every system",
+        "wall_clock_rigs": _promise(with_it),
     }
 
 
-def _lateness_us() -> list[float]:
-    """Sorted lateness of wake-ups from a 1 ms sleep, in microseconds."""
-    out = []
-    due = time.perf_counter()
-    for _ in range(WAKE_UPS):
-        due += PERIOD_S
-        time.sleep(max(0.0, due - time.perf_counter()))
-        out.append(round(1e6 * (time.perf_counter() - due), 1))
-    return sorted(out)
+def examine_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str, Any]:
+    """Open a bench's device, swap blocks of 0 V with it for some seconds, and say how that went; nothing is driven.
+
+    Raises `rig.errors.DaqError`, `rig.errors.ConfigurationError` where the device cannot be opened.
+    """
+    from rig.worker.probe import round_trips
+    from rig.worker.spawn import ask, supported
+
+    if supported():
+        return dict(ask("round trips", bench, seed, seconds))
+    return round_trips(bench, seed, seconds)
 
 
-def _may_schedule_realtime() -> str:
-    """Whether this process may ask for SCHED_FIFO; tried and taken back."""
-    if not hasattr(os, "sched_setscheduler"):
-        return "not on this system"
-    before = os.sched_getscheduler(0), os.sched_getparam(0)
+def _probed(*, privileged: bool) -> dict[str, Any]:
+    from rig.worker.spawn import ask, supported
+
+    if not supported():
+        return {}
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-        os.sched_setscheduler(0, *before)
-    except PermissionError:
-        return "not permitted (set rtprio in /etc/security/limits.conf)"
-    except OSError as error:
-        return f"not available ({error.strerror})"
-    return "permitted"
+        return dict(ask("probe", RATE_HZ, SECONDS, privileged))
+    except RigError as error:
+        return {"scheduling": str(error)}
 
 
-def _may_lock_memory() -> str:
-    """How much memory this process may lock."""
-    try:
-        import resource
-    except ImportError:
-        return "not on this system"
-    if not hasattr(resource, "RLIMIT_MEMLOCK"):
-        return "not on this system"
-    soft, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
-    return "unlimited" if soft == resource.RLIM_INFINITY else f"{soft // 1024} KiB"
+def _promise(probed: dict[str, Any]) -> str:
+    """In one sentence, what a wall-clock loop may count on here."""
+    if "wake_up_us" not in probed:
+        return "in the campaign's own process, and nothing is promised on this system"
+    rate_hz = 0.5e6 / max(1.0, probed["wake_up_us"]["p99_9"])
+    return f"in a process of their own; by this second, 999 of 1000 blocks begin within half a period up to {rate_hz:.0f} Hz"

@@ -1,6 +1,6 @@
-"""A session with a bench: its driver open and its loop running, in this process.
+"""A session with a bench: its driver open and its loop running, in this process or in one of its own.
 
-A virtual rig runs here, as fast as the machine allows.
+A virtual rig runs here, as fast as the machine allows; what has to keep to a clock runs in `rig.worker`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,6 +20,8 @@ from rig.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
 
 __all__ = ["Session", "TickSettings", "open_session"]
+
+NO_PROCESS = "this system has no process for the loop alone: it shares its time with the recorder, nothing is promised"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +73,27 @@ class LocalSession:
     def start(self, settings: TickSettings) -> RunningLoop:
         """Start the device; the loop runs while its rows are taken."""
         self._daq.start(settings.bench.block)
-        return Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
+        loop = Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
+        if self._realtime or self._daq.wall_clock:
+            loop.notes = (NO_PROCESS,)
+        return loop
 
 
 @contextmanager
 def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iterator[Session]:
     """Open the bench's driver; on the way out its output is at 0 V and it is closed, whatever happened.
 
-    ``realtime`` holds a virtual rig back to the wall clock. Raises `ConfigurationError`, `rig.errors.DaqError`.
+    A driver with a clock behind it is opened in a process of its own, and so is a virtual rig that ``realtime`` holds back to
+    the wall clock. Raises `ConfigurationError`, `rig.errors.DaqError`.
     """
-    with make_daq(bench, seed) as daq:
+    from rig.worker.session import WorkerSession
+    from rig.worker.spawn import supported
+
+    daq = make_daq(bench, seed)
+    if supported() and (realtime or daq.wall_clock):
+        del daq  # nothing is open yet; the other process makes its own
+        with WorkerSession(bench, seed) as session:
+            yield session
+        return
+    with daq:
         yield LocalSession(daq, realtime=realtime)

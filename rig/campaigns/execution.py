@@ -272,7 +272,12 @@ class Execution:
             return str(self.loop.failure)
         if self.failure is not None:
             return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
-        return describe_end(self.tick.guard, self.bench)
+        reason = int(self.tick.guard["reason"][0])
+        return (
+            self.loop.cause
+            if self.loop.cause and reason == EndReason.STOP_REQUESTED
+            else describe_end(self.tick.guard, self.bench)
+        )
 
 
 def nothing_left(bench: Bench) -> dict[str, Any]:

@@ -72,5 +72,5 @@ def knock(monkeypatch: Any, mode: int, at_s: float, change: float, length_s: flo
             self._state.inputs[self.rig.plant.n_mode + mode] += change * len(inputs) / self.sample_rate_hz / length_s
         exchange(self, voltages, inputs)
 
-    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", knocked)

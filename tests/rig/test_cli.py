@@ -206,6 +206,15 @@ def test_doctor_says_what_the_machine_can_promise(command):
     )
 
 
+def test_doctor_looks_at_the_device_of_a_bench(command):
+    status, out, _ = command("doctor --daq friction-beam --json")
+    facts = json.loads(out)
+    assert status == 0
+    assert facts["driver"] == "virtual"
+    assert facts["reached_hz"] > facts["sample_rate_hz"]
+    assert 0.0 < facts["block_us"]["p50"] <= facts["block_us"]["largest"]
+
+
 @pytest.mark.parametrize(
     ("line", "status", "named"),
     [

@@ -203,7 +203,7 @@ def test_a_sensor_that_reads_only_noise_gives_no_point(tmp_path, monkeypatch, ch
         exchange(self, voltages, inputs)
         inputs[:, channel] = 1e-4 * noise.normal(size=len(inputs))
 
-    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", dead)
     settle = SettleRule(longest_periods=100).model_dump()
     bench = bench_with({"block": 10})
@@ -223,7 +223,7 @@ def test_skew_between_channels_is_taken_out_of_loop_and_points_alike(tmp_path, m
         late.append(drive[-2:].copy())
         inputs[:, 1] = drive[:-2]
 
-    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", skewed)
     channels = [channel.model_dump() for channel in bench_with().channels]
     channels[1]["skew_samples"] = 2.0
@@ -305,7 +305,7 @@ def test_a_sensor_that_dies_shortly_before_the_end_of_a_record_spoils_the_point(
         if count > end - before_the_end:
             inputs[:, 0] = 1e-4 * noise.normal(size=len(inputs))
 
-    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", dying)
     with carry_out(plan, bench_with({"block": 10}), tmp_path / "run.h5", seed=1) as recording:
         assert not recording.complete
@@ -374,7 +374,7 @@ def test_a_device_that_disappears_ends_the_run_and_keeps_its_rows(tmp_path, monk
             raise DaqDisconnected("virtual: unplugged; plug it in and resume")
         inputs[:] = 0.0
 
-    monkeypatch.setattr("rig.campaigns.execution.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", vanish)
     with carry_out(plan_with(), bench_with(), tmp_path / "run.h5") as recording:
         end = recording.parts[0].end

@@ -1,6 +1,7 @@
 """`VirtualDAQ`: a full sibling of a real driver, with any block and any latency."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -19,6 +20,7 @@ __all__ = ["VirtualDAQ"]
 
 FACT_TOLERANCE = 1e-3
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
+FLAG_NAMES = tuple(str(flag.name).lower() for flag in Flag)
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 
 
@@ -39,6 +41,8 @@ class VirtualDAQ(DAQ):
 
     It returns at once: pacing is the loop's. Not modelled: lost samples, jitter, a device that fails.
     """
+
+    wall_clock: ClassVar[bool] = False
 
     def __init__(self, bench: Bench, seed: int = 0) -> None:
         super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
@@ -130,7 +134,7 @@ class VirtualDAQ(DAQ):
     @property
     def counters(self) -> dict[str, int]:
         """Samples at which each flag of the rig was up."""
-        return {str(flag.name).lower(): int(count) for flag, count in zip(Flag, self._counts, strict=True)}
+        return dict(zip(FLAG_NAMES, self._counts.tolist(), strict=True))
 
     def _open(self) -> None:
         pass

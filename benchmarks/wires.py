@@ -1,0 +1,101 @@
+"""One backbone over several wires, side by side: ``python -m benchmarks.wires [--json] [--lockstep] [PLAN]``.
+
+The plan runs unchanged on the virtual rig, on an emulated serial device and on an emulated CAN FD device, each in its own process, the
+emulators at wall-clock pace (or in lockstep). Frequency and damping of every point are compared with those of the virtual rig, whose loop has
+neither the devices' queue nor their blocks.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+import rig
+from rig.bench import Bench
+from rig.campaigns.plans import bench_of, load_plan
+from rig.wire.device.emulator import emulated
+
+BLOCKS = {"serial": 10, "can": 7}
+WIRES = {"virtual": None, "serial": "serial", "can": "can"}
+
+
+@contextmanager
+def bench_behind(wire: str | None, bench: Bench, lockstep: bool) -> Iterator[Bench]:
+    """The bench itself, or an emulated device with it behind a wire."""
+    if wire is None:
+        yield bench
+        return
+    blocked = bench.model_copy(update={"block": BLOCKS[wire]})
+    with emulated(blocked, wire=wire, lockstep=lockstep) as reached:
+        yield reached
+
+
+def measure(plan_name: str, lockstep: bool) -> dict[str, dict[str, Any]]:
+    """Points and loop statistics by wire."""
+    plan = load_plan(plan_name)
+    out: dict[str, dict[str, Any]] = {}
+    for name, wire in WIRES.items():
+        with bench_behind(wire, bench_of(plan, plan_name), lockstep) as bench, rig.run(plan, bench=bench) as done:
+            points = [point for point in done.recording.latest.values() if point["accepted"]]
+            end = done.recording.parts[-1].end or {}
+            out[name] = {
+                "rate_hz": bench.sample_rate_hz,
+                "block": bench.block,
+                "force_n": [point["force_n"] for point in points],
+                "frequency_hz": [point["frequency_hz"] for point in points],
+                "damping_ratio": [point["damping_ratio"] for point in points],
+                "loop": end.get("loop", {}),
+                "counters": end.get("counters", {}),
+                "reason": end.get("text", ""),
+            }
+    return out
+
+
+def compare(found: dict[str, dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """Largest differences from the virtual rig, percent, over the points all have."""
+    out = {}
+    truth = found["virtual"]
+    for name, one in found.items():
+        n = min(len(one["frequency_hz"]), len(truth["frequency_hz"]))
+        differ = {
+            key: float(np.max(np.abs(np.array(one[key][:n]) / np.array(truth[key][:n]) - 1.0))) * 100.0
+            for key in ("frequency_hz", "damping_ratio")
+        }
+        out[name] = {"points": float(len(one["frequency_hz"])), **{f"{k}_percent": v for k, v in differ.items()}}
+    return out
+
+
+def main() -> None:
+    """Print the backbones side by side."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("plan", nargs="?", default="magnet-beam/backbone")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--lockstep", action="store_true")
+    wanted = parser.parse_args()
+    found = measure(wanted.plan, wanted.lockstep)
+    differences = compare(found)
+    if wanted.json:
+        json.dump({"found": found, "differences": differences}, sys.stdout, indent=2)
+        return
+    print("force N   " + "   ".join(f"{name:>8} Hz      %" for name in found))
+    for row in zip(
+        *(zip(one["frequency_hz"], one["damping_ratio"], strict=True) for one in found.values()), strict=False
+    ):
+        index = found["virtual"]["frequency_hz"].index(row[0][0])
+        cells = "   ".join(f"{frequency:11.5f} {100 * damping:6.4f}" for frequency, damping in row)
+        print(f"{found['virtual']['force_n'][index]:7.3f}   {cells}")
+    for name, one in found.items():
+        print(
+            f"\n{name}: {one['rate_hz']:g} Hz, block {one['block']}, {one['reason']}; differences {differences[name]}"
+        )
+        for key, value in {**one["loop"], **one["counters"]}.items():
+            if not isinstance(value, list | dict):
+                print(f"    {key} = {value}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,5 @@
+"""Entry point of the loop process; started by `rig.worker.spawn.Worker`, never by hand."""
+
+from rig.worker.process import main
+
+main()

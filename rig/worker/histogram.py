@@ -1,0 +1,73 @@
+"""Times counted in logarithmic bins, in memory that somebody else may watch."""
+
+import math
+
+__all__ = ["WORDS", "Histogram"]
+
+PER_OCTAVE = 16
+OCTAVES = 24  # 1 us to 16.8 s
+BINS = PER_OCTAVE * OCTAVES + 2  # one below, one beyond
+LARGEST = BINS
+WORDS = BINS + 1
+"""Words of eight bytes that a histogram takes."""
+
+_log2 = math.log2
+
+
+def upper_edge_us(index: int) -> float:
+    """Upper edge of a bin, us; infinite for the last."""
+    return math.inf if index >= BINS - 1 else 2.0 ** (index / PER_OCTAVE)
+
+
+class Histogram:
+    """Counts by time, 16 bins an octave (4.4 %) from 1 us on, and the largest as it was.
+
+    ``words`` holds `WORDS` signed integers of eight bytes, zeros at first. One process counts, any may read.
+    """
+
+    def __init__(self, words: "list[int] | memoryview[int] | None" = None) -> None:
+        self._words = words if words is not None else [0] * WORDS
+
+    def add(self, nanoseconds: int) -> None:
+        """Count one time."""
+        words = self._words
+        index = 0 if nanoseconds <= 1000 else min(1 + int(PER_OCTAVE * _log2(1e-3 * nanoseconds)), BINS - 1)
+        words[index] += 1
+        if nanoseconds > words[LARGEST]:
+            words[LARGEST] = nanoseconds
+
+    @property
+    def count(self) -> int:
+        """Number of times."""
+        return sum(self._words[:BINS])
+
+    @property
+    def largest_us(self) -> float:
+        """The largest, us."""
+        return 1e-3 * self._words[LARGEST]
+
+    def quantile_us(self, share: float) -> float:
+        """Time that a ``share`` (0 to 1) of all does not exceed, us: the upper edge of its bin; 0 without any."""
+        wanted = share * self.count
+        seen = 0
+        for index in range(BINS):
+            seen += self._words[index]
+            if self._words[index] and seen >= wanted:
+                return min(upper_edge_us(index), self.largest_us)
+        return 0.0
+
+    def above(self, microseconds: float) -> int:
+        """How many were in bins that begin at a time or beyond, us."""
+        return sum(self._words[index] for index in range(1, BINS) if upper_edge_us(index - 1) >= microseconds)
+
+    def report(self) -> dict[str, float]:
+        """p50, p99, p99.9 and the largest, us."""
+        shares = {"p50": 0.5, "p99": 0.99, "p99_9": 0.999}
+        out = {name: round(self.quantile_us(share), 2) for name, share in shares.items()}
+        return out | {"largest": round(self.largest_us, 2)}
+
+    def bins(self) -> dict[str, list[float]]:
+        """Upper edges (us) of the bins that hold anything, and how many each holds."""
+        held = [index for index in range(BINS) if self._words[index]]
+        edges = [round(min(upper_edge_us(index), max(self.largest_us, 1.0)), 3) for index in held]
+        return {"upper_edge_us": edges, "count": [self._words[index] for index in held]}

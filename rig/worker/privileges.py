@@ -1,0 +1,84 @@
+"""What a process may ask of the system so that its loop is woken in time: each is tried, and said."""
+
+import ctypes
+import gc
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+__all__ = ["CPU_VARIABLE", "PRIORITY", "prepare"]
+
+PRIORITY = 80
+"""Of SCHED_FIFO: above the interrupt threads of the kernel (50)."""
+
+CPU_VARIABLE = "VIBROLOCK_LOOP_CPU"
+"""Environment variable with the number of the processor that the loop is to keep to."""
+
+LOCK_CURRENT, LOCK_FUTURE = 1, 2
+SET_TIMER_SLACK = 29  # <sys/prctl.h>
+NO_SUCH = "not on this system"
+
+
+def prepare(*, privileged: bool = True) -> dict[str, str]:
+    """Ask for all of it in this process; returns what came of each.
+
+    ``privileged`` false leaves out what needs a permission. The garbage collector is off from here on: what is there is kept
+    for good, and a loop without cyclic garbage needs none.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    steps: dict[str, Callable[[], str]] = {"timer_slack": _timer_slack, "processor": _affinity}
+    if privileged:
+        steps |= {"memory": _lock_memory, "scheduling": _schedule}
+    out = {"garbage_collector": "off"}
+    for name, step in steps.items():
+        try:
+            out[name] = step()
+        except PermissionError:
+            out[name] = "not permitted"
+        except (OSError, ValueError) as error:
+            out[name] = f"not available ({error})"
+    return {"memory": "not asked for", "scheduling": "not asked for"} | out
+
+
+def _schedule() -> str:
+    """SCHED_FIFO for every thread that there is by now; new ones inherit it."""
+    if not hasattr(os, "sched_setscheduler"):
+        return NO_SUCH
+    folder = Path("/proc/self/task")
+    threads = [int(path.name) for path in folder.iterdir()] if folder.exists() else [0]
+    for thread in threads:
+        os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    return f"SCHED_FIFO {PRIORITY}"
+
+
+def _lock_memory() -> str:
+    library = ctypes.CDLL(None, use_errno=True)
+    if not hasattr(library, "mlockall"):
+        return NO_SUCH
+    if library.mlockall(LOCK_CURRENT | LOCK_FUTURE) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
+    return "locked"
+
+
+def _timer_slack() -> str:
+    """Without real-time scheduling the kernel rounds a wake-up by 50 us; 1 ns asks for none of it."""
+    library = ctypes.CDLL(None, use_errno=True)
+    if not hasattr(library, "prctl"):
+        return NO_SUCH
+    unused = ctypes.c_ulong(0)
+    if library.prctl(SET_TIMER_SLACK, ctypes.c_ulong(1), unused, unused, unused) != 0:
+        raise OSError(ctypes.get_errno(), "prctl")
+    return "1 ns"
+
+
+def _affinity() -> str:
+    wanted = os.environ.get(CPU_VARIABLE, "")
+    if not wanted:
+        return "any"
+    if not hasattr(os, "sched_setaffinity"):
+        return NO_SUCH
+    os.sched_setaffinity(0, {int(wanted)})
+    return f"number {int(wanted)}"

@@ -1,0 +1,121 @@
+"""The loop process: opens the driver, takes its orders from the campaign, runs the loop, and says what came of it."""
+
+import signal
+import sys
+from multiprocessing.connection import Connection
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.daq import DAQ
+from rig.drivers import make_daq
+from rig.errors import DaqError, RigError
+from rig.session import TickSettings
+from rig.tick.kernels import tick_block
+from rig.worker.loop import WallClockLoop
+from rig.worker.memory import Layout, SharedMemory, packed
+from rig.worker.privileges import prepare
+from rig.worker.probe import probe, round_trips
+
+__all__ = ["main"]
+
+SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
+
+
+def main() -> None:
+    """Descriptors of the two pipes and of the shared memory are the arguments; see `rig.worker.spawn`."""
+    commands = Connection(int(sys.argv[1]), writable=False)
+    facts = Connection(int(sys.argv[2]), readable=False)
+    memory = int(sys.argv[3])
+    try:
+        name, *arguments = commands.recv()
+        if name == "probe":
+            facts.send(("probed", probe(*arguments)))
+        elif name == "round trips":
+            facts.send(("round trips", round_trips(*arguments)))
+        elif name == "open":
+            _serve(commands, facts, memory, *arguments)
+    except (EOFError, BrokenPipeError):
+        return  # nobody is there any more, and the driver is closed
+    except RigError as error:
+        facts.send(("failed", described(error)))
+    except Exception as error:
+        facts.send(("failed", described(DaqError(f"the driver has failed: {type(error).__name__}: {error}"))))
+        raise
+
+
+def described(error: RigError) -> tuple[tuple[str, ...], str]:
+    """An error for the other process: names of its classes, the closest first, and its message."""
+    return tuple(kind.__name__ for kind in type(error).__mro__), str(error)
+
+
+def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Bench, seed: int, privileged: bool) -> None:
+    """Open the driver, and run one loop over it if the campaign says so."""
+    with make_daq(bench, seed) as daq:
+        facts.send(("opened", daq.capabilities, dict(daq.identity), daq.remarks, dict(daq.counters)))
+        _, settings, ring_s = commands.recv()
+        trial = settings.build(0.0)
+        layout = Layout.of(bench, trial.arrays, len(daq.counters), ring_s)
+        memory = SharedMemory(descriptor, layout, create=True)
+        _load_kernels(daq, bench, settings)
+        asked = _listen()
+        said = prepare(privileged=privileged)
+        daq.start(bench.block)
+        loop = _begin(daq, settings, memory, facts, asked)
+        facts.send(("started", daq.latency_samples, layout, daq.remarks))
+        try:
+            loop.run()
+        except Exception as error:  # a driver that fails in its own way: 0 V first, then said
+            loop.failure = DaqError(f"the driver has failed: {type(error).__name__}: {error}")
+        statistics = _statistics(loop, said)
+        try:
+            daq.stop()
+        except DaqError as error:
+            loop.failure = loop.failure or error
+    failure = None if loop.failure is None else described(loop.failure)
+    facts.send(("ended", failure, loop.cause, dict(daq.counters), statistics))
+
+
+def _begin(
+    daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: list[str]
+) -> WallClockLoop:
+    tick = settings.build(daq.latency_samples)
+    tick.arrays, state = packed(tick.arrays)
+    return WallClockLoop(daq, tick, state, memory, facts, lambda: asked[0] if asked else "")
+
+
+def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
+    """Compile, or load from the cache, what the loop calls, before any device runs."""
+    tick = settings.build(0.0)
+    arrays, _ = packed(tick.arrays)
+    readings, rows = tick.buffers(0)
+    nothing = np.empty((0, len(bench.channels)))
+    tick_block(arrays, nothing, np.zeros(0, np.uint16), readings, rows, np.empty(0))
+    _ = tick.over
+    if not daq.wall_clock:  # software, which starts anew as if nothing had been
+        daq.start(bench.block)
+        daq.exchange(np.zeros(bench.block))
+        daq.stop()
+
+
+def _listen() -> list[str]:
+    """From here on signals only ask for the ramp; the list holds the names of those that have come."""
+    came: list[str] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        came.append(signal.Signals(number).name)
+
+    for name in SIGNALS:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), note)
+    return came
+
+
+def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
+    """What the loop process alone knows, as plain data for the record."""
+    pacing = "device" if loop.daq.capabilities.paced else "host"
+    counted = {"imports": str(loop.imports), "collections": str(loop.collections)}
+    real_time = {**said, "pacing": pacing, **counted}
+    return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}
