@@ -68,6 +68,8 @@ def scaled(name: str, factor: float) -> Rewiring:
 class RewiredDAQ(DAQ):
     """A virtual rig, its readings rewired; ``virtual`` false makes it pass for something physical."""
 
+    wall_clock = False  # in the test's own process
+
     def __init__(self, bench: Bench, seed: int, rewire: Rewiring | None, *, virtual: bool = True) -> None:
         super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
         self.inner = VirtualDAQ(bench, seed)
