@@ -1,8 +1,8 @@
 """One backbone over several wires, side by side: ``python -m benchmarks.wires [--json] [--lockstep] [PLAN]``.
 
-The plan runs unchanged on the virtual rig, on an emulated serial device and on an emulated CAN FD device, each in its own process, the
-emulators at wall-clock pace (or in lockstep). Frequency and damping of every point are compared with those of the virtual rig, whose loop has
-neither the devices' queue nor their blocks.
+The plan runs unchanged on the virtual rig, on an emulated serial device and on an emulated CAN FD device, each in its own
+process, the emulators at wall-clock pace (or in lockstep). Frequency and damping of every point are compared with those of
+the virtual rig, whose loop has neither the devices' queue nor their blocks.
 """
 
 import argparse

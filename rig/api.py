@@ -1,5 +1,6 @@
 """The bench from Python: what ``rig run`` and ``rig resume`` do, in one call each."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,6 +13,8 @@ from identification import (
     Transient,
 )
 from rig.bench import Bench, load_bench
+from rig.campaigns.about import About
+from rig.campaigns.arming import Arm
 from rig.campaigns.execution import Progress
 from rig.campaigns.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
@@ -84,15 +87,23 @@ def run(
     realtime: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
+    arm: Arm = None,
+    operator: str | None = None,
+    specimen_serial: str = "",
+    notes: Sequence[str] = (),
 ) -> Run:
     """Carry out a plan: a plan object, the name of a shipped one (``"magnet-beam/backbone"``) or a TOML file.
 
     ``bench`` replaces the bench that the plan names. ``seed`` draws the noise of a virtual rig; the same seed gives the
     same recording bit for bit. ``realtime`` holds a virtual rig back to the wall clock.
 
+    A bench on which something physical moves is armed by a person: ``arm`` is True, or a callable that is given a
+    `rig.campaigns.arming.ArmingRequest` and answers. ``operator`` (the user if not given), ``specimen_serial`` and
+    ``notes`` are recorded.
+
     Raises `rig.errors.ConfigurationError` for a plan or bench that is not allowed, `rig.errors.RecordingError` for a
-    file that cannot be written, `rig.errors.DaqError` for a device that cannot be started. A run that ends early
-    raises nothing; ``complete`` is false and the recording says why.
+    file that cannot be written, `rig.errors.DaqError` for a device that cannot be started, `rig.errors.NotArmed`. A run that
+    ends early raises nothing; ``complete`` is false and the recording says why.
     """
     if not 0 <= seed < 2**63:
         raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
@@ -105,7 +116,17 @@ def run(
     folder = TemporaryDirectory(prefix="vibrolock-") if output is None else None
     path = Path(output) if output is not None else Path(folder.name if folder else "") / "run.h5"
     try:
-        recording = carry_out(plan, bench, path, seed=seed, realtime=realtime, overwrite=overwrite, progress=progress)
+        recording = carry_out(
+            plan,
+            bench,
+            path,
+            seed=seed,
+            realtime=realtime,
+            overwrite=overwrite,
+            progress=progress,
+            arm=arm,
+            about=About(operator, specimen_serial, tuple(notes)),
+        )
     except BaseException:
         if folder is not None:
             folder.cleanup()
@@ -120,12 +141,16 @@ def resume(
     seed: int | None = None,
     realtime: bool = False,
     progress: Progress | None = None,
+    arm: Arm = None,
+    operator: str | None = None,
+    specimen_serial: str = "",
+    notes: Sequence[str] = (),
 ) -> Run:
     """Go on with a recording: points that were accepted stay, the others are measured in a further part.
 
     A changed ``plan`` of the same kind and bench takes the place of the one in force. Points that it asks for and that were
     accepted by any plan before are not measured again; those that it does not ask for stay in the file and count no more.
-    ``seed`` draws the noise of the further part; without it, one that no part had.
+    ``seed`` draws the noise of the further part; without it, one that no part had. ``arm`` and all after it: as for `run`.
 
     Raises `rig.errors.ConfigurationError` for a plan that cannot follow, `rig.errors.RecordingError` for a file that cannot
     be read or written.
@@ -134,4 +159,15 @@ def resume(
         raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
     source = "" if plan is None or isinstance(plan, Plan) else plan
     change = plan if plan is None or isinstance(plan, Plan) else load_plan(plan)
-    return Run(take_up(Path(output), change=change, source=source, seed=seed, realtime=realtime, progress=progress))
+    return Run(
+        take_up(
+            Path(output),
+            change=change,
+            source=source,
+            seed=seed,
+            realtime=realtime,
+            progress=progress,
+            arm=arm,
+            about=About(operator, specimen_serial, tuple(notes)),
+        )
+    )

@@ -10,7 +10,16 @@ from rig.configuration import Configured, find_toml, merged, read_toml, shipped_
 from rig.daq import Channel
 from rig.errors import ConfigurationError
 
-__all__ = ["Bench", "DriverChoice", "Limits", "SpecimenFacts", "load_bench", "shipped_benches"]
+__all__ = [
+    "Arming",
+    "Bench",
+    "DriverChoice",
+    "EmergencyStop",
+    "Limits",
+    "SpecimenFacts",
+    "load_bench",
+    "shipped_benches",
+]
 
 HIGHEST_PART = 0.45  # of the sample rate; a phase-locked loop keeps to a quarter of its own accord
 
@@ -45,6 +54,8 @@ class Limits(Configured):
     """Time of uninterrupted overload that trips, s."""
     stuck_s: float = Field(0.5, gt=0, le=3600)
     """Time without any change of a reading, at a held level, that trips, s."""
+    lost_s: float = Field(0.05, gt=0, le=10)
+    """Time without any sample from the device, as samples lost on their way, that trips, s."""
     ramp_down_s: float = Field(0.5, gt=0, le=60)
     """Time of the ramp to 0 V that ends every run, s."""
 
@@ -74,6 +85,34 @@ class SpecimenFacts(Configured):
         return value
 
 
+class Arming(Configured):
+    """Who may arm a bench on which something physical moves."""
+
+    automated: bool = False
+    """Whether the bench arms itself: one that nobody stands beside, made for it."""
+    check_valid_h: float = Field(24.0, gt=0, le=8760)
+    """Age up to which a check counts, h."""
+    require_check: bool = True
+    """Whether an automated bench needs a check that passed, of the same channels and driver."""
+
+
+class EmergencyStop(Configured):
+    """A switch on an input channel that brings the output to 0 V at once."""
+
+    channel: str = Field(min_length=1)
+    """Name of a channel with role ``monitor``."""
+    above_v: float | None = Field(None, ge=-100, le=100)
+    """Pressed where the channel reads more than this, V."""
+    below_v: float | None = Field(None, ge=-100, le=100)
+    """Pressed where the channel reads less than this, V: a switch that opens, or a cable that breaks, stops too."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.above_v is None) == (self.below_v is None):
+            raise ValueError("above_v, below_v: allowed is exactly one of the two")
+        return self
+
+
 class Bench(Configured):
     """A rig as a laboratory has it."""
 
@@ -95,6 +134,10 @@ class Bench(Configured):
     """What the bench may be asked for."""
     specimen: SpecimenFacts
     """What is known of the specimen."""
+    arming: Arming = Field(default_factory=Arming)
+    """Who may arm it; a virtual rig arms itself."""
+    emergency_stop: EmergencyStop | None = None
+    """A switch that stops, where there is one."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -114,6 +157,13 @@ class Bench(Configured):
             raise ValueError(
                 f"limits.frequency_hz = {list(self.limits.frequency_hz)}: allowed is up to {HIGHEST_PART:g} of "
                 f"sample_rate_hz, {HIGHEST_PART * self.sample_rate_hz:g} Hz"
+            )
+        stop = self.emergency_stop
+        if stop is not None and stop.channel not in {
+            channel.name for channel in self.channels if channel.role == "monitor"
+        }:
+            raise ValueError(
+                f"emergency_stop.channel = {stop.channel!r}: allowed is the name of a channel with role 'monitor'"
             )
         for channel in self.channels:
             limit = self.limits.force_n if channel.role == "force" else self.limits.acceleration_m_s2
@@ -142,7 +192,7 @@ def load_bench(name_or_path: str | Path) -> Bench:
     """A shipped bench by its name, or a bench from a TOML file.
 
     ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file beside it; what else
-    stands there changes it key by key.
+    stands there changes it key by key. Another ``driver.name`` than the base's begins with no ``driver.options``.
     """
     return validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
 
@@ -157,10 +207,22 @@ def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, An
     if isinstance(base, str) and base.endswith(".toml"):
         if path.resolve() in over:
             raise ConfigurationError(f"{name_or_path}: base = {base!r}: the files start from each other")
-        return merged(_with_base(path.parent / base, (*over, path.resolve())), table)
+        return _changed(_with_base(path.parent / base, (*over, path.resolve())), table)
     if base not in shipped_benches():
         allowed = ", ".join(shipped_benches())
         raise ConfigurationError(
             f"{name_or_path}: base = {base!r}: allowed is {allowed}, or a .toml file beside this one"
         )
-    return merged(_with_base(base, over), table)
+    return _changed(_with_base(base, over), table)
+
+
+def _changed(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+    """The base with what stands in ``table``; options of a driver that gives way to another go with it."""
+    driver, other = base.get("driver"), table.get("driver")
+    if (
+        isinstance(driver, dict)
+        and isinstance(other, dict)
+        and other.get("name", driver.get("name")) != driver.get("name")
+    ):
+        base = {**base, "driver": {}}
+    return merged(base, table)

@@ -8,6 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from rig.cli_analyse import app as analyse_app
+from rig.cli_arming import ArmNow, Notes, Operator, SpecimenSerial, arm_from
+from rig.cli_check import check_
+from rig.cli_conformance import conformance
+from rig.cli_emulate import emulate
 from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
@@ -38,6 +42,9 @@ app.command()(predict)
 app.command("import")(import_)
 app.command("export")(export_)
 app.command("tune")(tune_)
+app.command()(emulate)
+app.command()(conformance)
+app.command("check")(check_)
 
 
 @app.command()
@@ -48,6 +55,10 @@ def run(
     daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
     realtime: Realtime = False,
+    arm: ArmNow = False,
+    operator: Operator = None,
+    specimen_serial: SpecimenSerial = "",
+    note: Notes = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -64,7 +75,17 @@ def run(
         json,
         loaded.kind,
         lambda progress: rig.run(
-            loaded, bench=chosen, output=output, seed=seed, realtime=realtime, overwrite=overwrite, progress=progress
+            loaded,
+            bench=chosen,
+            output=output,
+            seed=seed,
+            realtime=realtime,
+            overwrite=overwrite,
+            progress=progress,
+            arm=arm_from(arm),
+            operator=operator,
+            specimen_serial=specimen_serial,
+            notes=note or (),
         ),
     )
 
@@ -75,6 +96,10 @@ def resume(
     plan: Annotated[str | None, typer.Option(help="Changed plan to go on with: a name or TOML file.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)] = None,
     realtime: Realtime = False,
+    arm: ArmNow = False,
+    operator: Operator = None,
+    specimen_serial: SpecimenSerial = "",
+    note: Notes = None,
     json: Json = False,
 ) -> None:
     """Finish a run that was interrupted, by its plan or a changed one; points that were accepted stay."""
@@ -83,7 +108,21 @@ def resume(
 
     with Recording(output) as recording:
         kind = recording.kind
-    _carry(json, kind, lambda progress: rig.resume(output, plan=plan, seed=seed, realtime=realtime, progress=progress))
+    _carry(
+        json,
+        kind,
+        lambda progress: rig.resume(
+            output,
+            plan=plan,
+            seed=seed,
+            realtime=realtime,
+            progress=progress,
+            arm=arm_from(arm),
+            operator=operator,
+            specimen_serial=specimen_serial,
+            notes=note or (),
+        ),
+    )
 
 
 def _carry(json: bool, kind: str, start: Any) -> None:

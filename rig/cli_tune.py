@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from rig.cli_arming import ArmNow, Notes, Operator, SpecimenSerial, about_from, arm_from
 from rig.cli_options import Json, Overwrite, Realtime, keep_existing
 
 __all__ = ["tune_"]
@@ -29,6 +30,10 @@ def tune_(
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
     realtime: Realtime = False,
+    arm: ArmNow = False,
+    operator: Operator = None,
+    specimen_serial: SpecimenSerial = "",
+    note: Notes = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -66,6 +71,8 @@ def tune_(
             realtime=realtime,
             overwrite=overwrite,
             progress=progress,
+            arm=arm_from(arm),
+            about=about_from(operator, specimen_serial, note),
         )
     finally:
         progress.close()

@@ -9,7 +9,8 @@ import numpy as np
 
 from rig.daq import DAQ
 from rig.errors import DaqError
-from rig.safety.layout import EndReason, GuardMode
+from rig.safety.layout import GuardMode
+from rig.safety.limits import end_reason_of
 from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
@@ -89,7 +90,7 @@ def end_by_driver(tick: Tick, error: DaqError) -> None:
     """Note in the guard that the driver has failed, with which the output is off."""
     guard = tick.guard
     if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
-        guard["reason"] = EndReason.DRIVER_FAILED
+        guard["reason"] = end_reason_of(error)
         guard["sample"] = tick.sample
     guard["mode"] = GuardMode.OFF
     guard["amplitude_v"] = 0.0

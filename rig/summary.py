@@ -7,6 +7,8 @@ from rig.campaigns.continuation import changed_keys
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
 from rig.campaigns.quality import what_was_skipped
+from rig.check.assessment import assess, is_check
+from rig.check.report import summary
 from rig.models.files import KINDS, load
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -35,7 +37,7 @@ def summarise(path: Path) -> dict[str, Any]:
     if kind in KINDS:
         return {"kind": kind, **KINDS[kind].summarise(load(path))}
     with Recording(path) as recording:
-        return summarise_recording(recording)
+        return summary(assess(recording)) if is_check(recording) else summarise_recording(recording)
 
 
 def summarise_recording(recording: Recording) -> dict[str, Any]:
@@ -49,6 +51,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
             "ended": None if part.end is None else part.end["text"],
             "tripped": part.end is not None and part.end["tripped"],
             "changed": changed.get(number, []),
+            "about": part.information.get("about"),
         }
         for number, part in enumerate(recording.parts)
     ]

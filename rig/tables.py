@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rig.campaigns.about import user_name
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.check.report import say
 from rig.console import number, print_table
 from rig.models.files import KINDS
 
@@ -32,6 +34,9 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 
 def print_summary(summary: dict[str, Any]) -> None:
     """What `rig.summary.summarise` found in a file."""
+    if summary["kind"] == "check":
+        say(summary)
+        return
     print(f"{summary['kind']} of {summary['specimen'] or 'an unnamed specimen'}")
     if summary["kind"] in KINDS:
         KINDS[summary["kind"]].say(summary)
@@ -54,6 +59,24 @@ def print_summary(summary: dict[str, Any]) -> None:
     for index, part in enumerate(summary["parts"]):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
         print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
+        _print_about(part["about"] or {})
+
+
+def _print_about(about: dict[str, Any]) -> None:
+    """Who ran a part on what, where anything was said of it or something physical has moved."""
+    armed = about.get("armed", {})
+    told = any(about.get(key) for key in ("specimen_serial", "notes", "remarks"))
+    if not told and armed.get("how", "virtual") == "virtual" and about.get("operator") == user_name():
+        return
+    for name in ("operator", "specimen_serial"):
+        if about.get(name):
+            print(f"  {name.replace('_', ' ')}: {about[name]}")
+    if armed.get("how", "virtual") != "virtual":
+        print(f"  armed: {armed['how']}, {armed['by']}, {armed['at']}")
+    if about.get("device"):
+        print(f"  device: {', '.join(f'{key} {value}' for key, value in about['device'].items())}")
+    for line in [*armed.get("cautions", ()), *about.get("remarks", ()), *about.get("notes", ())]:
+        print(f"  {line}")
 
 
 def _print_points(kind: str, points: Sequence[dict[str, Any]]) -> None:

@@ -31,6 +31,7 @@ Float = NDArray[np.float64]
 _MAX_BATCHES = 20
 _MIN_BATCHES = 4
 _MANY = 50
+_MOST_LOST = 0.05
 _SAMPLES_TO_SPARE = 3  # that many more are needed to be sure of the last period
 
 
@@ -42,6 +43,7 @@ def periodic_vibration(
     sample_rate_hz: float,
     harmonics: int = 7,
     resolution: ArrayLike | None = None,
+    lost: ArrayLike | None = None,
     phase_lag_target_deg: float = 90.0,
     settled: bool = True,
 ) -> PeriodicVibration:
@@ -61,6 +63,8 @@ def periodic_vibration(
         Highest harmonic H.
     resolution
         float[n_channels], step of each channel's converter in the unit of the channel, 0 for none; left out if unknown.
+    lost
+        bool[n], true where a sample was lost: what stands in ``samples`` there (NaN, say) takes no part. None: all are there.
     phase_lag_target_deg, settled
         Handed on to the result.
 
@@ -76,10 +80,13 @@ def periodic_vibration(
     Raises
     ------
     IdentificationError
-        On NaN or inf, unequal lengths, fewer than one period, a phase that falls, too few samples per period for H.
+        On NaN or inf, unequal lengths, fewer than one period, a phase that falls, too few samples per period for H, more
+        than 5 % of the samples lost.
     """
     theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
-    data = finite_array("samples", samples, np.float64, 2)
+    gone = _lost(lost, theta.size)
+    values = np.where(gone, 0.0, samples) if gone.any() else samples
+    data = finite_array("samples", values, np.float64, 2)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
     if data.shape != (len(channels), theta.size):
         raise IdentificationError(
@@ -88,12 +95,16 @@ def periodic_vibration(
     if harmonics < 1:
         raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
     frequency_hz, periods, count, warnings = _whole_periods(theta, rate_hz, harmonics)
-    theta, data = _without_ripple(theta[:count], harmonics), data[:, :count]
+    theta, data, gone = _without_ripple(theta[:count], harmonics), data[:, :count], gone[:count]
     design = _design(theta, harmonics)
+    design[gone] = 0.0  # rows of zeros, in the data as well: no part in the sums of least squares
     solution = _least_squares(design, data.T)
     residual = data.T - design @ solution
-    coefficients, residual_rms = _coefficients(solution, harmonics), np.sqrt(np.mean(residual**2, axis=0))
-    scatter = _standard_errors(theta, design[:, : 2 * harmonics + 1], residual, periods)
+    coefficients, residual_rms = (
+        _coefficients(solution, harmonics),
+        np.sqrt(np.sum(residual**2, axis=0) / (~gone).sum()),
+    )
+    scatter = _standard_errors(theta, design[:, : 2 * harmonics + 1], residual, periods, gone)
     rounding = rounding_errors(coefficients, _steps(resolution, len(channels)), residual_rms)
     return PeriodicVibration(
         channels=tuple(channels),
@@ -107,6 +118,20 @@ def periodic_vibration(
         settled=settled,
         warnings=warnings,
     )
+
+
+def _lost(lost: ArrayLike | None, size: int) -> NDArray[np.bool_]:
+    """bool[n]: samples that take no part."""
+    if lost is None:
+        return np.zeros(size, np.bool_)
+    gone = finite_array("lost", lost, np.bool_, 1)
+    if gone.size != size:
+        raise IdentificationError(f"lost: has {gone.size} values, needs {size}, one per sample")
+    if gone.sum() > _MOST_LOST * size:
+        raise IdentificationError(
+            f"samples: {gone.sum()} of {size} were lost, allowed is up to {100.0 * _MOST_LOST:g} %"
+        )
+    return gone
 
 
 def _steps(resolution: ArrayLike | None, channels: int) -> Float:
@@ -218,9 +243,9 @@ def batches_of(periods: int) -> int:
     return min(_MAX_BATCHES, periods) if periods >= _MIN_BATCHES else _MANY
 
 
-def _standard_errors(theta: Float, design: Float, residual: Float, periods: int) -> Float:
+def _standard_errors(theta: Float, design: Float, residual: Float, periods: int, gone: NDArray[np.bool_]) -> Float:
     """float[n_channels, H + 1]: standard error of Re and of Im of each coefficient."""
-    n, columns = design.shape
+    n, columns = int((~gone).sum()), design.shape[1]
     harmonics = (columns - 1) // 2
     if periods < _MIN_BATCHES:
         variance = np.sum(residual**2, axis=0) / max(n - columns, 1)
@@ -231,7 +256,7 @@ def _standard_errors(theta: Float, design: Float, residual: Float, periods: int)
     edges = np.searchsorted(theta, borders)
     means = np.empty((batches, columns, residual.shape[1]))
     for batch, (start, stop) in enumerate(pairwise(edges)):
-        means[batch] = design[start:stop].T @ residual[start:stop] / (stop - start)
+        means[batch] = design[start:stop].T @ residual[start:stop] / max((~gone[start:stop]).sum(), 1)
     # Cosine and sine means are half the amplitude; residual means vanish over the record, so batches - 1 are free.
     squared = np.sum(means**2, axis=0) / ((batches - 1) * batches)
     result = np.empty((residual.shape[1], harmonics + 1))

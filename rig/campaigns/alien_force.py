@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from rig.bench import Bench
+from rig.campaigns.gaps import bridged
 
 __all__ = ["FEWEST_PERIODS", "alien_force"]
 
@@ -43,7 +44,7 @@ def _spectrum(bench: Bench, rows: np.ndarray) -> tuple[np.ndarray, Any] | None:
     periods = float(theta[-1] - theta[0]) / (2.0 * math.pi)
     if periods < FEWEST_PERIODS - 0.5:
         return None
-    force = rows["inputs"][:, bench.index_of("force")].astype(float)
+    force = bridged(rows)[:, bench.index_of("force")]
     turns = 2.0 * math.pi * np.arange(force.size) / force.size
     window = sum(factor * np.cos(order * turns) for order, factor in enumerate(WINDOW))
     power = np.abs(np.fft.rfft(window * (force - force.mean()))) ** 2

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification import Channel, PeriodicVibration, periodic_vibration
 from rig.bench import Bench
+from rig.campaigns.gaps import lost_rows
 from rig.campaigns.plan import OpenLoopPlan, Plan, Target
 from rig.safety.layout import POLARITY_HINT
 from rig.sequencer.layout import Outcome
@@ -101,7 +102,7 @@ def recorded_vibration(
 ) -> PeriodicVibration:
     """The periodic vibration in recorded rows, the channels' skew taken out.
 
-    Raises `identification.IdentificationError` where there is none to be seen.
+    Lost rows take no part. Raises `identification.IdentificationError` where there is none to be seen.
     """
     vibration = periodic_vibration(
         rows["theta_rad"].astype(float),
@@ -109,6 +110,7 @@ def recorded_vibration(
         channels_of(bench),
         sample_rate_hz=bench.sample_rate_hz,
         harmonics=harmonics,
+        lost=lost_rows(rows),
         resolution=[channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels],
         phase_lag_target_deg=phase_lag_target_deg,
     )

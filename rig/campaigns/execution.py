@@ -8,6 +8,7 @@ import numpy as np
 from controller import LockState
 from rig.bench import Bench
 from rig.campaigns.evaluate import failed_point
+from rig.campaigns.gaps import lost_rows, lost_warnings
 from rig.campaigns.kept_rows import KeptRows
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
@@ -174,10 +175,14 @@ class Execution:
                     settling = outcomes[self.next_segment - 1]
                     rows = self.kept.take(first, end)
                     point = self.measure(self.bench, self.plan, self.targets[number], rows, settling)
-                    point["warnings"] = [*point.get("warnings", []), *self._device_warnings(rows)]
-                    self._report({**point, "first_sample": first, "end_sample": end})
+                    self._report({**point, **self._remarks(point, rows), "first_sample": first, "end_sample": end})
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
+
+    def _remarks(self, point: Mapping[str, Any], rows: np.ndarray) -> dict[str, Any]:
+        """How many samples of a point were lost, and its warnings with those of the device."""
+        warnings = [*point.get("warnings", []), *lost_warnings(rows), *self._device_warnings(rows)]
+        return {"lost_samples": int(np.count_nonzero(lost_rows(rows))), "warnings": warnings}
 
     def _device_warnings(self, rows: np.ndarray) -> list[str]:
         """A line for each flag that the device had up while the point was recorded."""
@@ -219,8 +224,9 @@ class Execution:
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
         for point in self.measure(self.bench, self.plan, targets, rows, passages, ended):
-            warnings = [*point.get("warnings", []), *self._device_warnings(rows)]
-            self._report({**point, "warnings": warnings, "first_sample": first, "end_sample": first + rows.size})
+            self._report(
+                {**point, **self._remarks(point, rows), "first_sample": first, "end_sample": first + rows.size}
+            )
         self.next_segment = found.end_segment
         return True
 

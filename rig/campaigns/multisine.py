@@ -46,6 +46,8 @@ class MultisinePlan(OpenLoopPlan):
     """Periods that are played before."""
     phase_seed: int = Field(0, ge=0)
     """Seed of the phases; realisation k of a seed is always the same signal, at every level."""
+    silent_s: float = Field(0.0, ge=0, le=3600)
+    """Time at 0 V that is recorded before the first realisation, for the noise, s."""
     ramp_s: float = Field(0.5, gt=0, le=60)
     """Length of the ramps to the level and down from it, s."""
     accepted_change: float = Field(0.05, gt=0, le=1)
@@ -99,6 +101,9 @@ class MultisinePlan(OpenLoopPlan):
         ramp = self.ramp_s / design.period_s
         recorded = self.periods + 1.0 / design.period_samples  # one sample to be sure of the last period
         out: list[Segment] = []
+        if self.silent_s and not done:  # a ramp from 0 V to 0 V: at a held level a quiet channel would count as stuck
+            silent = Excitation(design.resolution_hz, waveform=0)
+            out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.silent_s / design.period_s, excitation=silent))
         for target in self.targets():
             if target.number in done:
                 continue

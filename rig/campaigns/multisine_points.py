@@ -10,6 +10,7 @@ import numpy as np
 from identification import IdentificationError, PeriodicSpectra, periodic_spectra
 from rig.bench import Bench
 from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
+from rig.campaigns.gaps import lost_rows
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.plan import Column, Target
 
@@ -37,7 +38,8 @@ def measure_multisine_point(
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     roles = {channel.role: channel.name for channel in bench.channels}
-    change = max(_change(spectra, roles[role]) for role in ("force", "drive")) if plan.periods > 1 else math.nan
+    periods = spectra.spectra.shape[1]
+    change = max(_change(spectra, roles[role]) for role in ("force", "drive")) if periods > 1 else math.nan
     reason = ""
     if change > plan.accepted_change:
         reason = (
@@ -46,7 +48,7 @@ def measure_multisine_point(
         )
     return {
         **point,
-        "settled": not reason if plan.periods > 1 else None,
+        "settled": not reason if periods > 1 else None,
         "accepted": not reason,
         "reason": reason,
         "force_rms_n": spectra.rms(roles["force"]),
@@ -55,18 +57,24 @@ def measure_multisine_point(
         "voltage_peak_v": float(np.abs(rows["output_v"]).max()),
         "change": None if math.isnan(change) else change,
         "periods": plan.periods,
-        "warnings": [] if plan.periods > 1 else ["one period only: neither noise nor a transient can be told"],
+        "warnings": _warnings(plan.periods, periods),
     }
+
+
+def _warnings(planned: int, periods: int) -> list[str]:
+    """What is to be said of the periods that were used, of those planned."""
+    left_out = [f"{planned - periods} of {planned} periods are left out"] if periods < planned else []
+    return [*left_out, *(["one period only: neither noise nor a transient can be told"] if periods == 1 else [])]
 
 
 def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
     """Spectra of recorded rows, by the number of the realisation; every period is turned to begin where the signal does.
 
-    The channels' skew is taken out.
+    The channels' skew is taken out. Periods in which samples were lost are left out.
     """
     design = plan.design(bench.sample_rate_hz)
     size = design.period_samples
-    turned = []
+    turned: list[np.ndarray] = []
     for index, rows in records.items():
         if rows.size < plan.periods * size:
             raise IdentificationError(f"record: has {rows.size} samples, needs {plan.periods * size}")
@@ -74,7 +82,12 @@ def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarr
         begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
         signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
         periods = signals.reshape(signals.shape[0], plan.periods, size)
-        turned.append(np.roll(periods, begun, axis=2).reshape(signals.shape))
+        whole = ~lost_rows(rows).reshape(plan.periods, size).any(axis=1)
+        if not whole.any():
+            raise IdentificationError("record: samples were lost on their way in every period")
+        turned.append(np.roll(periods[:, whole], begun, axis=2).reshape(signals.shape[0], -1))
+    shortest = min(record.shape[1] for record in turned)  # all realisations with as many periods as the poorest has
+    turned = [record[:, :shortest] for record in turned]
     spectra = periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
     without_skew = spectra.spectra.copy()
     without_skew[:, :, :-1] *= skew_turn(bench, spectra.frequency_hz)

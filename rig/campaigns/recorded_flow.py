@@ -5,8 +5,9 @@ import numpy as np
 from identification import SlowFlow, slow_flow
 from rig.bench import Bench
 from rig.campaigns.evaluate import channels_of
+from rig.campaigns.gaps import bridged
 from rig.campaigns.known_plant import PlantFacts
-from rig.tick.layout import FREQUENCY_CLAMPED, SATURATED, SENSOR_AT_RANGE
+from rig.tick.layout import FREQUENCY_CLAMPED, SAMPLE_LOST, SATURATED, SENSOR_AT_RANGE
 
 __all__ = ["AT_VOLTAGE_LIMIT", "flagged", "recorded_flow"]
 
@@ -22,7 +23,7 @@ def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFa
     """
     return slow_flow(
         rows["theta_rad"].astype(float),
-        rows["inputs"].astype(float).T,
+        bridged(rows).T,
         channels_of(bench),
         sample_rate_hz=bench.sample_rate_hz,
         drive_mode_shape=bench.specimen.drive_mode_shape or 0.0,
@@ -33,7 +34,7 @@ def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFa
 
 
 def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndarray]:
-    """By reason, bool[n]: instants within whose window the output, the frequency or a sensor stood at its limit."""
+    """By reason, bool[n]: instants within whose window output, frequency or a sensor stood at a limit, or samples were lost."""
     half = HALF_WINDOW_PERIODS / flow.frequency_hz
     first, end = (
         np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size) for side in (-1, 1)
@@ -43,6 +44,7 @@ def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndar
         (AT_VOLTAGE_LIMIT, SATURATED),
         ("the frequency stood at an end of its window", FREQUENCY_CLAMPED),
         ("a sensor was near its range", SENSOR_AT_RANGE),
+        ("samples were lost on their way", SAMPLE_LOST),
     ):
         count = np.concatenate([[0], np.cumsum((rows["flags"] & bit) != 0)])
         out[reason] = count[end.astype(int)] > count[first.astype(int)]

@@ -1,19 +1,27 @@
 """The runner: carries out a plan on a bench and records it. Every way out brings the output to 0 V."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import vibrolock
 from rig.bench import Bench
+from rig.campaigns.about import About, calibration_remarks
+from rig.campaigns.arming import Arm, armed
+from rig.campaigns.bench_memory import RememberedTrip, now, remember
 from rig.campaigns.continuation import what_is_left
 from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
 from rig.campaigns.output import make_way, set_aside
 from rig.campaigns.plan import Plan
-from rig.errors import ConfigurationError
+from rig.loop import RunningLoop
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.recording.store import continue_recording, finalise
+from rig.safety.layout import EndReason
+from rig.safety.limits import describe_end
 from rig.sequencer.segments import Segment
 from rig.session import Session, TickSettings, open_session
 from rig.tick.layout import ROW_COLUMNS
@@ -30,17 +38,20 @@ def carry_out(
     realtime: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
+    arm: Arm = None,
+    about: About | None = None,
 ) -> Recording:
     """Carry out a plan from its beginning and record it in the HDF5 file ``output``.
 
     Raises `ConfigurationError` before anything is started where plan and bench do not fit, `RecordingError` where the
     file exists or cannot be written, `rig.errors.DaqError` where the driver cannot be started. A run that ends early
-    raises nothing: the recording's last part says how it ended.
+    raises nothing: the recording's last part says how it ended. Where something physical would move it must be armed
+    (`rig.campaigns.arming`), else `rig.errors.NotArmed`; ``about`` is recorded with the part.
     """
     plan.check(bench)
     make_way(output, overwrite)
     with open_session(bench, seed, realtime=realtime) as session:
-        _require_armed(bench, session)
+        facts = _facts(plan, bench, session, arm, about, progress)
         loop = session.start(_settings(plan, bench, plan.segments(bench.sample_rate_hz)))
         header = Header(
             kind=plan.kind,
@@ -53,7 +64,9 @@ def carry_out(
             seed=seed,
         )
         with set_aside(output), JournalWriter.create(journal_path(output), header) as journal:
-            Execution(plan, bench, loop, journal, progress or Silent()).go({"first_sample": 0, "seed": seed})
+            execution = Execution(plan, bench, loop, journal, progress or Silent())
+            with _trip_remembered(bench, session, loop, output):
+                execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
     finalise(journal_path(output), output)
     return Recording(output)
 
@@ -66,6 +79,8 @@ def take_up(
     seed: int | None = None,
     realtime: bool = False,
     progress: Progress | None = None,
+    arm: Arm = None,
+    about: About | None = None,
 ) -> Recording:
     """Finish a run that was interrupted: finished points stay, the others are measured in a further part of the file.
 
@@ -85,11 +100,13 @@ def take_up(
     segments = plan.segments(bench.sample_rate_hz, left.done)
     if segments:
         with open_session(bench, drawn, realtime=realtime) as session:
-            _require_armed(bench, session)
+            facts = _facts(plan, bench, session, arm, about, progress)
             loop = session.start(_settings(plan, bench, segments))
             columns = [Column(**column) for column in ROW_COLUMNS]
             with continue_recording(output, row_dtype=loop.tick.row_dtype, columns=columns) as journal:
-                Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers).go(information)
+                execution = Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers)
+                with _trip_remembered(bench, session, loop, output):
+                    execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
     elif not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
@@ -99,10 +116,38 @@ def take_up(
     return Recording(output)
 
 
-def _require_armed(bench: Bench, session: Session) -> None:
-    """Refuse where something physical would move."""
-    if not session.capabilities.virtual:
-        raise ConfigurationError(f"bench {bench.name}: only virtual rigs can be armed by this version")
+def _facts(
+    plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress | None
+) -> dict[str, Any]:
+    """Arm the bench; who did, who runs the test on what, and what stands behind the driver."""
+    about = about or About()
+    facts = {
+        **about.facts(),
+        "armed": armed(bench, session, about.purpose or plan.kind, arm),
+        "device": session.identity,
+        "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
+    }
+    for remark in facts["remarks"]:
+        (progress or Silent()).remark(remark)
+    return facts
+
+
+def _lead(loop: RunningLoop) -> float:
+    """Samples from an output to the input that shows it."""
+    record = loop.tick.arrays.loop
+    return float(record["lead_whole"][0] + record["lead_fraction"][0])
+
+
+@contextmanager
+def _trip_remembered(bench: Bench, session: Session, loop: RunningLoop, output: Path) -> Iterator[None]:
+    """After a trip of something physical the next run needs a person."""
+    try:
+        yield
+    finally:
+        reason = EndReason(int(loop.tick.guard["reason"][0]))
+        if reason.is_trip and not session.capabilities.virtual:
+            text = str(loop.failure) if loop.failure is not None else describe_end(loop.tick.guard, bench)
+            remember(bench, trip=RememberedTrip(now(), text, str(output.absolute())))
 
 
 def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:

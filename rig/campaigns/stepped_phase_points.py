@@ -8,6 +8,7 @@ import numpy as np
 from identification import Backbone, IdentificationError, nonlinear_mode
 from rig.bench import Bench
 from rig.campaigns.evaluate import head, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.gaps import bridged
 from rig.campaigns.objections import level_error, level_objection
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.quality import PURITY_COLUMNS, of_a_record
@@ -42,7 +43,7 @@ def measure_stepped_phase_point(
         mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=True)
-    force_rms_n = float(rows["inputs"][:-1, bench.index_of("force")].astype(float).std())
+    force_rms_n = float(bridged(rows)[:-1, bench.index_of("force")].std())
     missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
     found = settled_quality(vibration, bench, rows)
     off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)

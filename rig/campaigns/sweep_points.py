@@ -9,6 +9,7 @@ from controller import AmplitudeLaw
 from identification import IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
 from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
+from rig.campaigns.gaps import bridged, lost_rows
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.sweep import SweepPlan
 from rig.tick.layout import SATURATED
@@ -39,6 +40,7 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
     except (IdentificationError, ArithmeticError) as error:
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     held = _held(bench, plan, target, rows, transient)
+    held["warnings"] += _gaps(transient, rows)
     reason = _level_objection(plan, held.get("held_usual_error"))
     return {
         **point,
@@ -51,6 +53,21 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
         "duration_s": rows.size / bench.sample_rate_hz,
         **held,
     }
+
+
+def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
+    """Where a sweep has holes: what happened there, the smallest force perhaps, is not known."""
+    lost = lost_rows(rows)
+    if not lost.any():
+        return []
+    usual = float(np.median(np.diff(transient.time_s))) if transient.time_s.size > 1 else 0.0
+    holes = np.flatnonzero(np.diff(transient.time_s) > 1.5 * usual)
+    where = ", ".join(f"{transient.frequency_hz[hole]:.3f}" for hole in holes[:5])
+    return (
+        [f"nothing is known about {where}{' Hz and more' if holes.size > 5 else ' Hz'}: samples were lost"]
+        if where
+        else []
+    )
 
 
 def _level_objection(plan: SweepPlan, error: float | None) -> str:
@@ -97,7 +114,7 @@ def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transien
         acceleration = np.abs(transient.fundamentals[roles.index("drive")])
         return np.asarray(acceleration / (2.0 * np.pi * transient.frequency_hz) ** 2)
     turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * np.pi)
-    force = rows["inputs"][:, roles.index("force")].astype(float)
+    force = bridged(rows)[:, roles.index("force")]
     sums = np.cumsum([force, force**2], axis=1)
     instants = np.interp(transient.time_s * bench.sample_rate_hz, np.arange(turns.size), turns)
     ends = np.clip(np.add.outer((-1.0, 1.0), instants), turns[0], turns[-1])
@@ -107,8 +124,13 @@ def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transien
 
 
 def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
-    """Fundamentals over time of recorded rows: every input, its skew taken out, and the output as channel ``voltage``."""
-    signals = np.vstack([rows["inputs"].T, rows["output_v"]])
+    """Fundamentals over time of recorded rows: every input, its skew taken out, and the output as channel ``voltage``.
+
+    Where samples were lost there are no instants. Raises `identification.IdentificationError` where none is left.
+    """
+    lost = lost_rows(rows)
+    inputs = bridged(rows) if lost.any() else rows["inputs"]
+    signals = np.vstack([inputs.T, rows["output_v"]])
     transient = demodulate(
         rows["theta_rad"],
         signals,
@@ -117,4 +139,23 @@ def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
     )
     without_skew = transient.fundamentals.copy()
     without_skew[:-1] *= skew_turn(bench, transient.frequency_hz)
-    return replace(transient, fundamentals=without_skew)
+    return _without_gaps(replace(transient, fundamentals=without_skew), lost, bench.sample_rate_hz)
+
+
+def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float) -> Transient:
+    """Without the instants within whose window samples were lost."""
+    if not lost.any():
+        return transient
+    count = np.concatenate([[0], np.cumsum(lost)])
+    half = 0.5 * transient.window_periods / transient.frequency_hz
+    first, end = (
+        np.clip(np.rint((transient.time_s + side * half) * sample_rate_hz), 0, lost.size).astype(int)
+        for side in (-1, 1)
+    )
+    keep = count[end] == count[first]
+    return replace(
+        transient,
+        time_s=transient.time_s[keep],
+        frequency_hz=transient.frequency_hz[keep],
+        fundamentals=transient.fundamentals[:, keep],
+    )

@@ -19,7 +19,7 @@ class TimeData:
     channels
         One per row of ``samples``.
     samples
-        float[n_channels, n], in the unit of each channel, SI.
+        float[n_channels, n], in the unit of each channel, SI; NaN where samples were lost on their way.
     sample_rate_hz
         Samples per second.
     start_s
@@ -32,7 +32,7 @@ class TimeData:
     Raises
     ------
     IdentificationError
-        On shapes that do not agree, NaN or inf, or a rate that is not above zero.
+        On shapes that do not agree, inf, or a rate that is not above zero.
     """
 
     channels: tuple[Channel, ...]
@@ -49,8 +49,8 @@ class TimeData:
         if samples.ndim != 2 or samples.shape[0] != len(self.channels) or not samples.size:
             raise IdentificationError(f"samples: shape {samples.shape} for {len(self.channels)} channels")
         for channel, row in zip(self.channels, samples, strict=True):
-            if not np.all(np.isfinite(row)):
-                where = int(np.argmin(np.isfinite(row)))
+            if np.any(np.isinf(row)):
+                where = int(np.argmax(np.isinf(row)))
                 raise IdentificationError(f"samples: channel '{channel.name}' is {row[where]} at [{where}]")
         if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0.0):
             raise IdentificationError(f"sample_rate_hz: is {self.sample_rate_hz:g} Hz, must be finite and above zero")

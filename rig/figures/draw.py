@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import ForceSurface, IdentificationError, NonlinearMode, force_drop_out, nonlinear_mode
+from rig.check.assessment import assess, is_check
 from rig.errors import RecordingError
+from rig.figures.check import draw_check
 from rig.figures.continuous_backbone import draw_differences, draw_ways
 from rig.figures.force_surface import draw_force_surface
 from rig.figures.nonlinear_mode import draw_properties
@@ -48,11 +50,16 @@ def plot(source: Path, figure: Path) -> None:
             KINDS[kind].draw(page, load(source))
         else:
             with Recording(source) as recording:
-                _DRAW[recording.kind](page, recording)
+                draw = _draw_check if is_check(recording) else _DRAW[recording.kind]
+                draw(page, recording)
         try:
             page.savefig(figure)
         except OSError as error:
             raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
+
+
+def _draw_check(page: "Figure", recording: Recording) -> None:
+    draw_check(page, assess(recording))
 
 
 def _draw_backbone(page: "Figure", recording: Recording) -> None:

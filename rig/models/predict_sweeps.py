@@ -18,6 +18,7 @@ from identification import (
     zero_crossings,
 )
 from rig.bench import Bench
+from rig.campaigns.gaps import bridged
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.sweep import SweepPlan
 from rig.errors import ConfigurationError, RecordingError
@@ -122,7 +123,7 @@ def _between_crossings(recording: Recording, number: int, which: str) -> HalfPer
     """The force of a recorded sweep between its zero crossings."""
     bench = bench_of_recording(recording)
     column = next(index for index, channel in enumerate(bench.channels) if channel.role == "force")
-    force = point_rows(recording, number)["inputs"][:, column].astype(float)
+    force = bridged(point_rows(recording, number))[:, column]
     return zero_crossings(force, sample_rate_hz=bench.sample_rate_hz, whole_periods=which == "periods")
 
 

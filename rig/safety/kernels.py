@@ -18,6 +18,8 @@ SENSOR_OVERLOAD = int(EndReason.SENSOR_OVERLOAD)
 SENSOR_STUCK = int(EndReason.SENSOR_STUCK)
 NON_FINITE_INPUT = int(EndReason.NON_FINITE_INPUT)
 NON_FINITE_OUTPUT = int(EndReason.NON_FINITE_OUTPUT)
+SAMPLES_LOST = int(EndReason.SAMPLES_LOST)
+EMERGENCY_STOP = int(EndReason.EMERGENCY_STOP)
 
 
 @kernel
@@ -44,10 +46,20 @@ def is_over(guard: Record, lead: int) -> bool:
 
 
 @kernel
+def watch_switch(guard: Record, channel: Record, index: int, volts: float, sample: int) -> None:
+    """Drop to 0 V where the emergency stop is pressed; its reading standing still is in order, its being no number is not."""
+    if not channel.stop_below_v <= volts <= channel.stop_above_v:
+        shut_down(guard, EMERGENCY_STOP, index, volts * channel.unit_per_volt, sample, True)
+
+
+@kernel
 def watch_input(
     guard: Record, limits: Record, channel: Record, watch: Record, index: int, volts: float, sample: int, driven: bool
 ) -> bool:
     """Check one raw reading (V) before it is used; False where it must not be (not a number)."""
+    if channel.emergency_stop == 1:
+        watch_switch(guard, channel, index, volts, sample)
+        return math.isfinite(volts)
     if not math.isfinite(volts):
         shut_down(guard, NON_FINITE_INPUT, index, volts, sample, False)
         return False
@@ -78,6 +90,27 @@ def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: flo
         shut_down(guard, OVERTRAVEL, index, travel_m, sample, True)
     elif travel_m > limits.displacement_m:
         shut_down(guard, DISPLACEMENT_LIMIT, index, travel_m, sample, False)
+
+
+@kernel
+def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float, omega: float) -> None:
+    """Go on with a motion that is not seen for a sample, as the vibration at ``omega`` (rad/s) that it was.
+
+    Integrated with a hole in it, an acceleration would leave a velocity behind and pass for travel. With the leak l (1/s),
+    ``x' = v - l x``; of ``x'' = -w^2 x`` follows ``v' = l v - (w^2 + l^2) x``, a turn by w dt for any l.
+    """
+    leak = limits.integrator_leak / limits.integrator_gain
+    velocity, displacement = watch.velocity, watch.displacement
+    share = sin_step / omega
+    watch.velocity = cos_step * velocity + share * (leak * velocity - (omega * omega + leak * leak) * displacement)
+    watch.displacement = cos_step * displacement + share * (velocity - leak * displacement)
+
+
+@kernel
+def watch_gap(guard: Record, limits: Record, lost: int, sample: int, dt_s: float) -> None:
+    """Check for how many samples in a row nothing has been seen of the rig."""
+    if lost >= limits.lost_samples:
+        shut_down(guard, SAMPLES_LOST, -1, lost * dt_s, sample, False)
 
 
 @kernel

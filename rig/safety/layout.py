@@ -40,6 +40,8 @@ class EndReason(IntEnum):
     NON_FINITE_OUTPUT = 18
     LOST_LOCK = 19
     DRIVER_FAILED = 20
+    SAMPLES_LOST = 21
+    EMERGENCY_STOP = 22
 
     @property
     def is_trip(self) -> bool:
@@ -65,6 +67,8 @@ TEXT = {
     EndReason.NON_FINITE_OUTPUT: "the law's output is not a number",
     EndReason.LOST_LOCK: "phase lock lost",
     EndReason.DRIVER_FAILED: "the driver failed",
+    EndReason.SAMPLES_LOST: "samples were lost for longer than is allowed",
+    EndReason.EMERGENCY_STOP: "emergency stop",
 }
 """One line for each reason."""
 
@@ -82,12 +86,14 @@ LIMITS = np.dtype(
         ("slew_v_per_sample", "f8"),
         ("overload_samples", "i8"),
         ("stuck_samples", "i8"),
+        ("lost_samples", "i8"),
         ("ramp_down_samples", "i8"),
         ("integrator_gain", "f8"),
         ("integrator_leak", "f8"),
+        ("resonance_rad_s", "f8"),
     ]
 )
-"""Limits of a bench in samples and SI units (one record)."""
+"""Limits of a bench in samples and SI units (one record), and the resonance that its motion is mostly made of."""
 
 INPUT = np.dtype(
     [
@@ -98,9 +104,13 @@ INPUT = np.dtype(
         ("role", "i8"),
         ("skew_samples", "f8"),
         ("watch_displacement", "i8"),
+        ("emergency_stop", "i8"),
+        ("stop_below_v", "f8"),
+        ("stop_above_v", "f8"),
     ]
 )
-"""What the tick needs to know of an input channel (one record a channel)."""
+"""What the tick needs to know of an input channel (one record a channel). One with ``emergency_stop`` is a switch: it drops the
+output outside ``stop_below_v`` to ``stop_above_v`` and may stand still otherwise."""
 
 INPUT_WATCH = np.dtype(
     [

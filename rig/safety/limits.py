@@ -6,11 +6,12 @@ import numpy as np
 
 from controller.layout import LockState
 from rig.bench import Bench
+from rig.errors import DaqEmergencyStop, DaqError
 from rig.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_HINT, TEXT, EndReason, GuardMode
 
 INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
 
-__all__ = ["describe_end", "guard_record", "input_records", "limits_record", "watch_records"]
+__all__ = ["describe_end", "end_reason_of", "guard_record", "input_records", "limits_record", "watch_records"]
 
 
 def limits_record(bench: Bench) -> np.ndarray:
@@ -23,8 +24,10 @@ def limits_record(bench: Bench) -> np.ndarray:
     out["slew_v_per_sample"] = limits.slew_v_per_s / rate
     out["overload_samples"] = max(1, round(limits.overload_s * rate))
     out["stuck_samples"] = max(2, round(limits.stuck_s * rate))
+    out["lost_samples"] = max(1, round(limits.lost_s * rate))
     out["ramp_down_samples"] = max(1, round(limits.ramp_down_s * rate))
     out["integrator_gain"] = 1.0 / rate
+    out["resonance_rad_s"] = 2.0 * math.pi * bench.specimen.linear_frequency_hz
     out["integrator_leak"] = -math.expm1(-2.0 * math.pi * INTEGRATOR_CORNER * limits.frequency_hz[0] / rate)
     return out
 
@@ -47,6 +50,12 @@ def input_records(bench: Bench) -> np.ndarray:
         record["role"] = channel.role_code
         record["skew_samples"] = channel.skew_samples
         record["watch_displacement"] = accelerates
+        stop = bench.emergency_stop
+        if stop is not None and stop.channel == channel.name:
+            record["emergency_stop"] = 1
+            record["stop_below_v"] = -math.inf if stop.below_v is None else stop.below_v
+            record["stop_above_v"] = math.inf if stop.above_v is None else stop.above_v
+            record["alarm_v"] = 0.0  # every reading is looked at, none passes as plainly in order
     return out
 
 
@@ -65,6 +74,11 @@ def guard_record(armed: bool) -> np.ndarray:
     return out
 
 
+def end_reason_of(error: DaqError) -> EndReason:
+    """What a run ends with when its driver raises this error."""
+    return EndReason.EMERGENCY_STOP if isinstance(error, DaqEmergencyStop) else EndReason.DRIVER_FAILED
+
+
 def describe_end(guard: np.ndarray, bench: Bench) -> str:
     """One sentence on why the output was brought down: reason, channel, value, sample; what to look for without a lock."""
     reason = EndReason(int(guard["reason"][0]))
@@ -80,6 +94,8 @@ def describe_end(guard: np.ndarray, bench: Bench) -> str:
         where = f" on channel {bench.channels[channel].name} ({float(guard['value'][0]):.4g} {unit})"
     elif reason is EndReason.FREQUENCY_LIMIT:
         where = f" ({float(guard['value'][0]):.4g} Hz)"
+    elif reason is EndReason.SAMPLES_LOST:
+        where = f" ({float(guard['value'][0]):.4g} s, limits.lost_s = {bench.limits.lost_s:g})"
     acquiring = int(guard["lock"][0]) == LockState.ACQUIRING and reason <= EndReason.FREQUENCY_LIMIT
     hint = f"; the loop was not locked: {POLARITY_HINT}" if acquiring else ""
     return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s){hint}"

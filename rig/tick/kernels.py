@@ -11,13 +11,16 @@ import numpy as np
 from controller.demodulation.kernels import adapt, demodulate, sign_product, turn_phasors
 from controller.kernels import TWO_PI, advance_phase, size, track, wrap
 from controller.layout import ADAPTIVE, SIGN
+from rig.daq import LOST
 from rig.safety.kernels import (
     NON_FINITE_OUTPUT,
     SENSOR_OVERLOAD,
+    carry_motion,
     permitted_amplitude,
     permitted_turn,
     shut_down,
     watch_frequency,
+    watch_gap,
     watch_input,
     watch_motion,
 )
@@ -102,6 +105,28 @@ def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
 
 
 @kernel
+def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
+    """A sample that was lost on its way: nothing is read, the motion goes on as it was, a long gap trips.
+
+    For force and drive stand the fundamentals as they are known: so a detector's ripple goes on as well, and does not turn
+    into an error of the phase by stopping anywhere.
+    """
+    loop, limits, dt = t.loop[0], t.limits[0], t.law[0].dt_s
+    readings[:] = math.nan
+    loop.lost += 1
+    omega = limits.resonance_rad_s if loop.drive == WAVEFORM else loop.omega
+    cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
+    for index in range(t.inputs.size):
+        if t.inputs[index].watch_displacement == 1:
+            carry_motion(limits, t.watches[index], cos_step, sin_step, omega)
+    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
+    loop.force = force.real * cos_theta - force.imag * sin_theta
+    loop.drive_motion = drive.real * cos_theta - drive.imag * sin_theta
+    watch_gap(t.guard[0], limits, loop.lost, loop.sample, dt)
+    return 0
+
+
+@kernel
 def demodulate_inputs(t: TickArrays, cos_theta: float, sin_theta: float) -> None:
     """Force and drive-point motion of this sample into their complex amplitudes and sizes."""
     law, loop, gain = t.law[0], t.loop[0], t.law[0].demodulator_gain
@@ -151,8 +176,11 @@ def oscillate(t: TickArrays, amplitude: float) -> float:
 
 
 @kernel
-def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) -> float:
-    """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``."""
+def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row: Record) -> float:
+    """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``.
+
+    Of a sample that is ``lost`` the volts are not looked at: estimates hold, but for their ripple; all else goes on.
+    """
     law, loop, guard, progress = t.law[0], t.loop[0], t.guard[0], t.progress[0]
     now = loop.sample
     slot = now % t.history.size
@@ -168,8 +196,14 @@ def tick(t: TickArrays, volts: np.ndarray, readings: np.ndarray, row: Record) ->
         else complex(seen.amplitude_v, 0.0)
     )
 
-    flags = take_in(t, volts, readings)
-    demodulate_inputs(t, math.cos(theta_in), math.sin(theta_in))
+    cos_theta, sin_theta = math.cos(theta_in), math.sin(theta_in)
+    if lost:
+        flags = pass_over(t, readings, cos_theta, sin_theta)
+    else:
+        loop.lost = 0
+        flags = take_in(t, volts, readings)
+    if not lost or law.detector != ADAPTIVE:
+        demodulate_inputs(t, cos_theta, sin_theta)
     thresholds = t.thresholds[0]
     present = loop.force_size >= thresholds.smallest_force_n and loop.response_size >= thresholds.smallest_response
     closed = present and loop.drive == LOOP_DRIVE
@@ -235,5 +269,6 @@ def tick_block(
     ``outputs`` (float64[n]) are for the next block.
     """
     for index in range(outputs.size):
-        outputs[index] = tick(t, volts[index], readings[index], rows[index])
+        lost = (flags[index] & LOST) != 0
+        outputs[index] = tick(t, volts[index], lost, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags[index]) << np.uint32(DEVICE_SHIFT)

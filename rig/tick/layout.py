@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rig.daq import LOST
+
 __all__ = ["HISTORY", "LOOP", "ROW", "ROW_COLUMNS", "TickArrays", "recorded_row"]
 
 LOOP = np.dtype(
@@ -65,13 +67,14 @@ LOOP = np.dtype(
         ("drive", "i8"),
         ("waveform", "i8"),
         ("play", "i8"),
+        ("lost", "i8"),
     ]
 )
 """State of oscillator and laws (one record). ``turn``: angle of the complex command U that is put out, ``demanded_turn`` by
 its law, ``turn_behind``: 1 while it cannot rise there as fast as it should, -1 fall; ``displacement``: amplitude of the
 drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at;
 ``late_`` amplitudes that passed one more low-pass, ``rest_`` sizes and phase error as they will be once the response keeps
-still (`rig.tick.laws.frequency.kernels.see_rest`)."""
+still (`rig.tick.laws.frequency.kernels.see_rest`); ``lost``: samples in a row that have not come."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """What the tick has sent out and the inputs have not yet seen; a ring."""
@@ -96,6 +99,7 @@ FREQUENCY_CLAMPED = 2
 SENSOR_AT_RANGE = 4
 HELD = 8
 DEVICE_SHIFT = 16
+SAMPLE_LOST = LOST << DEVICE_SHIFT
 
 ROW_COLUMNS: tuple[dict[str, str], ...] = (
     {"name": "inputs", "unit": "SI unit of each channel", "description": "inputs in SI units, one column a channel"},
@@ -112,7 +116,7 @@ ROW_COLUMNS: tuple[dict[str, str], ...] = (
         "name": "flags",
         "unit": "1",
         "description": "bits: 1 output at its voltage limit, 2 frequency at its window, 4 sensor near its range, "
-        "8 level held; from 65536 (bit 16) on the device's own, named in its counters",
+        "8 level held; from 65536 (bit 16) on the device's own, named in its counters; bit 31 sample lost, inputs NaN",
     },
     {"name": "segment", "unit": "1", "description": "number of the plan's segment; -1 while coming down"},
     {"name": "lock", "unit": "1", "description": "0 searching, 1 acquiring, 2 locked, 3 lost"},

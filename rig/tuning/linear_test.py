@@ -5,13 +5,15 @@ All of it goes through the ordinary runner into one recording, level by level a 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from identification import FrequencyResponseMatrix, PeriodicSpectra
 from rig.bench import Bench
+from rig.campaigns.about import About
+from rig.campaigns.arming import Arm, asked_once
 from rig.campaigns.execution import Progress
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.runner import carry_out, take_up
@@ -63,6 +65,8 @@ def measure(
     realtime: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
+    arm: Arm = None,
+    about: About | None = None,
     damping_of: Callable[[FrequencyResponseMatrix], float],
 ) -> LinearTest:
     """Raise the level until the coherence suffices, then measure with lines as close as the damping asks for.
@@ -72,7 +76,7 @@ def measure(
     Raises `TuningError` where a run was stopped or no level within half of the bench's limits suffices,
     `ConfigurationError` for a level beyond the limits.
     """
-    run = _Runs(bench, bench_name, recording, seed, realtime, overwrite, progress)
+    run = _Runs(bench, bench_name, recording, seed, realtime, overwrite, progress, asked_once(arm), about)
     level = FIRST * bench.limits.voltage_v if level_rms_v is None else level_rms_v
     tried: list[float] = []
     while True:
@@ -113,9 +117,12 @@ class _Runs:
         realtime: bool,
         overwrite: bool,
         progress: Progress | None,
+        arm: Arm,
+        about: About | None,
     ) -> None:
         self.bench, self.name, self.path = bench, name, recording
         self.seed, self.realtime, self.overwrite, self.progress = seed, realtime, overwrite, progress
+        self.arm, self.about = arm, replace(about or About(), purpose="tuning")
         self.begun = False
         self.share_of_limits = 0.0
 
@@ -135,7 +142,14 @@ class _Runs:
             periods=2,
         )
         if self.begun:
-            done = take_up(self.path, change=plan, realtime=self.realtime, progress=self.progress)
+            done = take_up(
+                self.path,
+                change=plan,
+                realtime=self.realtime,
+                progress=self.progress,
+                arm=self.arm,
+                about=self.about,
+            )
         else:
             done = carry_out(
                 plan,
@@ -145,6 +159,8 @@ class _Runs:
                 realtime=self.realtime,
                 overwrite=self.overwrite,
                 progress=self.progress,
+                arm=self.arm,
+                about=self.about,
             )
             self.begun = True
         with done as recording:
@@ -161,7 +177,7 @@ class _Runs:
         crest = 4.0
         for index, channel in enumerate(self.bench.channels):
             limit = {"force": limits.force_n, "monitor": math.inf}.get(channel.role, limits.acceleration_m_s2)
-            shares.append(float(np.abs(rows["inputs"][:, index]).max()) / limit)
+            shares.append(float(np.nanmax(np.abs(rows["inputs"][:, index]))) / limit)
             if channel.role in ("drive", "response"):
                 amplitude = measured.amplitude[measured.index(channel.name)]
                 moved = amplitude / (2.0 * np.pi * measured.frequency_hz) ** 2

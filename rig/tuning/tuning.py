@@ -6,6 +6,8 @@ from typing import get_args
 
 from controller.tuning import PlantModel
 from rig.bench import Bench, load_bench
+from rig.campaigns.about import About
+from rig.campaigns.arming import Arm
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.execution import Progress
 from rig.campaigns.plans import plan_from
@@ -69,12 +71,14 @@ def tune(
     realtime: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
+    arm: Arm = None,
+    about: About | None = None,
 ) -> Tuning:
     """Measure the plant with a low-level multisine, recorded in ``recording``, and design a backbone test for it.
 
     ``level_rms_v`` spares the search for a level; ``law`` is ``frequency-error`` (with complex response control, levels in
     metres) or ``phase`` (levels in volts); ``from_m``, ``to_m`` and ``points`` set the levels; ``named`` is what the plan calls
-    the bench.
+    the bench. ``arm`` and ``about`` as for `rig.campaigns.runner.carry_out`.
 
     Raises `rig.tuning.errors.TuningError` where the rig is unsuited, with the numbers,
     `rig.errors.ConfigurationError` for what the bench does not allow, `rig.errors.RecordingError` for a recording that
@@ -92,6 +96,8 @@ def tune(
         realtime=realtime,
         overwrite=overwrite,
         progress=progress,
+        arm=arm,
+        about=about,
         damping_of=lambda responses: plant_of(bench, responses).damping_ratio,
     )
     plant = plant_of(bench, test.responses)

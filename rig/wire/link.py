@@ -60,6 +60,11 @@ class Link(ABC):
         """What a stream would ask of this wire."""
 
     @property
+    def largest_block(self) -> int:
+        """Samples that a block may have on this wire."""
+        return 1 << 16
+
+    @property
     def layout_crc(self) -> int:
         """CRC-32 of the definition both ends must share; 0 where the protocol's page says it all."""
         return 0

@@ -121,7 +121,7 @@ class Parameter(IntEnum):
     BOOT = 7
     """Another number after every reset."""
     SIMULATED = 8
-    """1 where nothing physical moves."""
+    """1 where nothing physical moves; 2 where, besides, the same outputs after START always give the same samples."""
     STATE = 9
     """`DeviceState`."""
     N_CHANNELS = 16

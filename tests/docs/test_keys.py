@@ -11,7 +11,7 @@ from pydantic_core import PydanticUndefined
 from controller import OpenLoop
 from controller.lock.rule import LockRule
 from controller.pll import PhaseLockedLoop
-from rig.bench import Bench, DriverChoice, Limits, SpecimenFacts
+from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
 from rig.campaigns.kinds import KINDS
@@ -47,6 +47,8 @@ MODELS = {
     "Keys of `[driver]`": DriverChoice,
     "Keys of `[specimen]`": SpecimenFacts,
     "Keys of `[limits]`": Limits,
+    "Keys of `[arming]`": Arming,
+    "Keys of `[emergency_stop]`": EmergencyStop,
     "Keys of `[[channels]]`": Channel,
     "Keys of `[driver.options]` of the virtual driver": Queue,
 }

@@ -28,6 +28,7 @@ frequency_window_hz = [22.0, 27.0]
 """
 NEEDS = {"docs/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
 NOT_RUN = {
+    ("docs/emulator.md", "runs until Ctrl-C"),
     ("docs/user-guide.md", "a minute of wall clock"),
     ("docs/writing-a-driver.md", "installs a package"),
 }

@@ -66,7 +66,7 @@ def fused(
         slot = t.loop[0].sample % delay
         flags = sample(rig, state, queue[slot], volts)
         count_flags(flags, counts)
-        queue[slot] = tick(t, volts, readings[index], rows[index])
+        queue[slot] = tick(t, volts, False, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
         if is_over(t.guard[0], t.loop[0].lead_whole):
             return index + 1

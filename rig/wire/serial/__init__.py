@@ -1,1 +1,1 @@
-"""The protocol on a serial line: COBS frames with CRC-32."""
+"""The wire protocol over serial lines: frames of COBS and CRC-32, and links over ports and pseudo-terminals."""

@@ -17,8 +17,8 @@ from functools import partial
 
 import numpy as np
 
-from rig.daq import DAQ, State
-from rig.errors import DaqRefused
+from rig.daq import DAQ, LOST, State
+from rig.errors import DaqError, DaqRefused
 
 __all__ = ["DriverContract", "NotApplicable"]
 
@@ -40,6 +40,10 @@ class DriverContract(ABC):
     @abstractmethod
     def make(self) -> DAQ:
         """A driver that is not open."""
+
+    def unplug(self, daq: DAQ) -> bool:
+        """Take the device away while it is running; False where the contract does not know how."""
+        return False
 
     def skip(self, reason: str) -> None:
         """What to do with a test that does not apply; pytest's skip where pytest runs the suite."""
@@ -224,6 +228,68 @@ class DriverContract(ABC):
             daq.start(10)
             inputs = np.vstack([daq.exchange(np.zeros(10)) for _ in range(500)])
             assert np.std(inputs[-1000:], axis=0).max() < self.tolerance_v
+
+    def test_lost_samples_are_rows_of_nan_with_their_flag_and_nothing_else_is(self) -> None:
+        """Flags uint16[n]; a row is either lost, all NaN and flagged, or there."""
+        for block in self.blocks:
+            with self.running(block) as daq:
+                for _ in range(20):
+                    inputs = daq.exchange(np.zeros(block))
+                    assert daq.flags.shape == (block,)
+                    assert daq.flags.dtype == np.uint16
+                    lost = (daq.flags & LOST) != 0
+                    assert np.isnan(inputs[lost]).all()
+                    assert np.isfinite(inputs[~lost]).all()
+
+    def test_the_device_says_who_it_is_in_words(self) -> None:
+        """Identity in text, statistics in numbers, remarks in lines, all known once open."""
+        with self.make() as daq:
+            for name, value in daq.identity.items():
+                assert isinstance(name, str)
+                assert isinstance(value, str)
+            assert all(isinstance(value, int | float) for value in daq.statistics.values())
+            assert all(isinstance(remark, str) and "\n" not in remark for remark in daq.remarks)
+
+    def test_capabilities_are_the_same_before_and_while_running(self) -> None:
+        """Whether something physical moves is known before anything is started."""
+        with self.make() as daq:
+            before = daq.capabilities
+            daq.start(1)
+            daq.exchange(np.zeros(1))
+            assert daq.capabilities == before
+
+    def test_a_device_that_is_gone_is_a_daq_error_and_can_be_closed(self) -> None:
+        """`unplug` takes the device away: exchange raises a `DaqError` that says something, close does not."""
+        daq = self.make()
+        try:
+            daq.open()
+            daq.start(1)
+            if not self.unplug(daq):
+                self.skip("the contract has not been told how this device is unplugged (override unplug)")
+            message = ""
+            try:
+                for _ in range(1000):
+                    daq.exchange(np.zeros(1))
+            except DaqError as error:
+                message = str(error)
+            assert message, "exchange went on without a device, or failed without a word"
+        finally:
+            daq.close()
+        assert daq.state is State.CLOSED
+
+    def test_closed_after_a_refusal_a_driver_can_be_used_again(self) -> None:
+        """A mistake of the host's leaves nothing behind."""
+        daq = self.make()
+        try:
+            with daq:
+                daq.start(1)
+                daq.exchange(np.zeros(7))
+        except DaqRefused:
+            pass
+        assert daq.state is State.CLOSED
+        with daq:
+            daq.start(1)
+            assert daq.exchange(np.zeros(1)).shape == (1, len(daq.channels))
 
     def test_counters_are_whole_numbers_that_only_grow(self) -> None:
         """Whatever a driver counts."""

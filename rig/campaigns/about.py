@@ -1,0 +1,64 @@
+"""Who runs a test, on which specimen, with what remarks: facts that stand with every part of a recording."""
+
+import getpass
+import os
+from dataclasses import dataclass
+from datetime import date
+from typing import Any
+
+from rig.bench import Bench
+from rig.errors import ConfigurationError
+
+__all__ = ["About", "calibration_remarks", "user_name"]
+
+
+@dataclass(frozen=True)
+class About:
+    """What a person adds to a run.
+
+    Raises `ConfigurationError` for text that cannot be printed in one line.
+    """
+
+    operator: str | None = None
+    """Who runs it; without one ``VIBROLOCK_OPERATOR`` or the user of the operating system."""
+    specimen_serial: str = ""
+    """Serial number of the specimen."""
+    notes: tuple[str, ...] = ()
+    """Anything else, one line each."""
+    purpose: str = ""
+    """What the run belongs to: ``check`` or ``tuning``; empty for a campaign on its own."""
+
+    def __post_init__(self) -> None:
+        texts = [("operator", self.operator or ""), ("specimen_serial", self.specimen_serial)]
+        for name, text in [*texts, *(("note", note) for note in self.notes)]:
+            if text and not text.isprintable():
+                raise ConfigurationError(f"{name} = {text!r}: allowed is printable text in one line")
+
+    def facts(self) -> dict[str, Any]:
+        """As they are recorded."""
+        return {
+            "operator": self.operator or user_name(),
+            "specimen_serial": self.specimen_serial,
+            "notes": list(self.notes),
+            "purpose": self.purpose,
+        }
+
+
+def user_name() -> str:
+    """``VIBROLOCK_OPERATOR``, or the user of the operating system; empty where neither is known."""
+    given = os.environ.get("VIBROLOCK_OPERATOR", "")
+    if given and given.isprintable():
+        return given
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return ""
+
+
+def calibration_remarks(bench: Bench, today: date) -> list[str]:
+    """One line for each sensor whose calibration is past its due date."""
+    return [
+        f"channel {channel.name}: calibration was due on {channel.calibration_due}"
+        for channel in bench.channels
+        if channel.calibration_due and date.fromisoformat(channel.calibration_due) < today
+    ]

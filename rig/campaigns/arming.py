@@ -1,0 +1,129 @@
+"""Arming: who has let something physical move. A virtual rig arms itself, any other bench is armed by a person."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from rig.bench import Bench
+from rig.campaigns.about import user_name
+from rig.campaigns.bench_memory import BenchMemory, fingerprint, memory_of, now, remember
+from rig.errors import NotArmed
+from rig.session import Session
+
+__all__ = ["Arm", "ArmingRequest", "armed", "asked_once", "cautions_of"]
+
+CHECK = "check"
+
+
+@dataclass(frozen=True)
+class ArmingRequest:
+    """What a person is told before arming."""
+
+    bench: Bench
+    """The bench."""
+    what: str
+    """Kind of campaign that is to run."""
+    identity: dict[str, str]
+    """What stands behind the driver."""
+    memory: BenchMemory
+    """Last check and trip."""
+    cautions: tuple[str, ...]
+    """What speaks against it, one line each."""
+
+    def lines(self) -> list[str]:
+        """All of it for the terminal."""
+        bench, limits, check = self.bench, self.bench.limits, self.memory.check
+        device = ", ".join(f"{key} {value}" for key, value in self.identity.items()) or "unknown"
+        last = (
+            "never" if check is None else f"{_age_h(check.at):.1f} h ago, {_verdict(check.failed)} ({check.recording})"
+        )
+        return [
+            f"bench    {bench.name}: {bench.specimen.name}",
+            f"device   {bench.driver.name}: {device}",
+            f"limits   {limits.voltage_v:g} V, {limits.force_n:g} N, {limits.acceleration_m_s2:g} m/s^2, "
+            f"{1e3 * limits.displacement_m:g} mm, {limits.frequency_hz[0]:g} to {limits.frequency_hz[1]:g} Hz",
+            f"checked  {last}",
+            *(f"CAUTION  {caution}" for caution in self.cautions),
+        ]
+
+
+Arm = bool | Callable[[ArmingRequest], bool] | None
+"""A person's word: given beforehand, asked for by a callable, or neither."""
+
+
+def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]:
+    """How the bench was armed and by whom, for the record; a person's word also takes back a trip.
+
+    A rig whose driver says ``virtual`` arms itself. ``[arming] automated`` does where nothing speaks against it. Raises
+    `NotArmed`, which says how to arm, before anything has moved.
+    """
+    if session.capabilities.virtual:
+        return {"how": "virtual", "by": "", "at": now(), "cautions": []}
+    memory = memory_of(bench)
+    cautions = cautions_of(bench, memory, what)
+    how = _how(ArmingRequest(bench, what, session.identity, memory, cautions), arm)
+    if memory.trip is not None and how != "automated":
+        remember(bench, trip=None)
+    return {"how": how, "by": user_name(), "at": now(), "cautions": list(cautions)}
+
+
+def _how(request: ArmingRequest, arm: Arm) -> str:
+    bench, memory = request.bench, request.memory
+    checked = not request.cautions or not bench.arming.require_check
+    if bench.arming.automated and arm is not False and arm is not True and memory.trip is None and checked:
+        return "automated"
+    if callable(arm):
+        if arm(request):
+            return "person"
+        raise NotArmed(f"bench {bench.name}: was not armed; nothing has moved")
+    if arm:
+        return "switch"
+    against = f" ({'; '.join(request.cautions)})" if request.cautions else ""
+    automated = "" if bench.arming.automated else ", or [arming] automated = true in a bench made for it"
+    raise NotArmed(
+        f"bench {bench.name}: something physical would move and nobody has armed it{against}; run on a terminal and type the "
+        f"bench's name, or give --arm (arm=True from Python){automated}"
+    )
+
+
+def cautions_of(bench: Bench, memory: BenchMemory, what: str) -> tuple[str, ...]:
+    """What speaks against arming: a trip that nobody has looked at; no check, or one that does not count."""
+    out = []
+    if memory.trip is not None:
+        out.append(f"the last run tripped: {memory.trip.text}")
+    check = memory.check
+    if what == CHECK:
+        return tuple(out)
+    if check is None:
+        out.append(f"the bench was never checked: rig check --bench {bench.name}")
+        return tuple(out)
+    if check.failed:
+        out.append(f"the last check failed: {', '.join(check.failed)}")
+    if _age_h(check.at) > bench.arming.check_valid_h:
+        out.append(f"the last check is {_age_h(check.at):.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
+    if check.fingerprint != fingerprint(bench):
+        out.append("the last check was of other channels, another rate or another driver")
+    return tuple(out)
+
+
+def asked_once(arm: Arm) -> Arm:
+    """The same word for several parts of one recording: a person is asked before the first only."""
+    if not callable(arm):
+        return arm
+    answers: list[bool] = []
+
+    def ask(request: ArmingRequest) -> bool:
+        if not answers:
+            answers.append(arm(request))
+        return answers[0]
+
+    return ask
+
+
+def _verdict(failed: tuple[str, ...]) -> str:
+    return f"failed: {', '.join(failed)}" if failed else "passed"
+
+
+def _age_h(at: str) -> float:
+    return (datetime.now(UTC) - datetime.fromisoformat(at)).total_seconds() / 3600.0

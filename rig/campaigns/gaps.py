@@ -1,0 +1,43 @@
+"""Samples that were lost on their way: which rows of a recording, and what stands in for them where none may be missing."""
+
+import math
+
+import numpy as np
+
+from rig.tick.layout import SAMPLE_LOST
+
+__all__ = ["bridged", "lost_rows", "lost_warnings"]
+
+
+def lost_rows(rows: np.ndarray) -> np.ndarray:
+    """bool[n]: rows whose inputs were lost and are NaN."""
+    return np.asarray((rows["flags"] & SAMPLE_LOST) != 0)
+
+
+def lost_warnings(rows: np.ndarray) -> list[str]:
+    """One line on how many samples are missing; none where all are there."""
+    lost = int(np.count_nonzero(lost_rows(rows)))
+    return [f"{lost} of {rows.size} samples were lost on their way"] if lost else []
+
+
+def bridged(rows: np.ndarray) -> np.ndarray:
+    """float64[n, n_channels]: the inputs, gaps filled with the mean of the readings one period before and after.
+
+    These are read at the same phase, straight between samples, so that a vibration that grows or drifts steadily is met to
+    second order. For windows and spectra that stand no hole; results within reach of a gap are left out by whoever asks.
+    Without any loss the inputs are as recorded.
+    """
+    inputs = np.asarray(rows["inputs"].astype(float))
+    lost = lost_rows(rows)
+    if not lost.any() or lost.all():
+        return inputs
+    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * math.pi)
+    there, at = turns[~lost], turns[lost]
+    before, after = at - 1.0 >= there[0], at + 1.0 <= there[-1]
+    for column in inputs.T:
+        known = column[~lost]
+        earlier, later = np.interp(at - 1.0, there, known), np.interp(at + 1.0, there, known)
+        column[lost] = np.select(
+            [before & after, before, after], [0.5 * (earlier + later), earlier, later], np.interp(at, there, known)
+        )
+    return inputs

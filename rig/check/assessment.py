@@ -1,0 +1,141 @@
+"""From the recording of a check to its findings; another check may stand beside it as reference."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from identification import IdentificationError
+from rig.bench import Bench
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import spectra_of
+from rig.campaigns.plans import plan_from
+from rig.check.findings import Finding, failed
+from rig.check.judging import driven_findings
+from rig.check.latency import latency_findings
+from rig.check.reference import reference_findings
+from rig.check.responses import Mode, Responses, responses_of
+from rig.check.silence import silent_findings
+from rig.errors import RecordingError
+from rig.measurements import bench_of_recording
+from rig.recording.reader import Recording
+from rig.safety.layout import EndReason
+
+__all__ = ["PURPOSE", "Assessment", "assess", "is_check", "responses_in"]
+
+PURPOSE = "check"
+SKIPPED = 0.1  # of the silence: what the converter and its filters begin with
+CUT_SHORT = "the multisine was not played to its end"
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What a check has found."""
+
+    bench: Bench
+    """The bench as it was."""
+    recording: Path
+    """Where it is recorded."""
+    level_rms_v: float | None
+    """Level of the multisine that was evaluated, V RMS."""
+    findings: tuple[Finding, ...]
+    """All that was looked at."""
+    responses: Responses | None
+    """What was measured; None where the run was cut short."""
+    mode: Mode | None
+    """The mode under test."""
+    reference: Responses | None
+    """What was measured in the reference."""
+
+    @property
+    def verdict(self) -> Literal["passed", "failed"]:
+        """``failed`` where anything has."""
+        return "failed" if self.failed else "passed"
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """What failed."""
+        return failed(self.findings)
+
+
+def is_check(recording: Recording) -> bool:
+    """Whether a recording is that of a check."""
+    return bool(recording.parts) and _about(recording.parts[0].information).get("purpose") == PURPOSE
+
+
+def assess(recording: Recording, reference: Recording | None = None) -> Assessment:
+    """Findings of a recorded check; `RecordingError` where one of the two is none."""
+    bench = bench_of_recording(recording)
+    plan = _plan(recording)
+    findings = [*_how_it_ended(recording, bench), *silent_findings(bench, _silence(recording, bench, plan))]
+    found = responses_in(recording)
+    old = None if reference is None else responses_in(reference)
+    mode = None
+    if found is None:
+        findings.append(Finding("responses", "", "not tested", text=CUT_SHORT))
+    else:
+        driven, mode = driven_findings(bench, found)
+        findings += [*driven, *latency_findings(bench, found, _lead_fraction(recording))]
+        dead = {f.channel for f in driven if f.name == "life" and f.verdict == "fail"}
+        if old is not None:
+            findings += reference_findings(bench, found, old, dead)
+    if reference is None:
+        text = "no reference was given: drive polarity, volts to newtons and slow changes are not seen"
+        findings.append(Finding("reference", "", "not tested", text=text))
+    level = plan.levels_rms_v[-1] if found is not None else None
+    return Assessment(bench, recording.path, level, tuple(findings), found, mode, old)
+
+
+def responses_in(recording: Recording) -> Responses | None:
+    """What the multisine of a check tells; None where it was not played to its end."""
+    if not is_check(recording):
+        raise RecordingError(f"{recording.path}: is not the recording of a check")
+    bench, plan = bench_of_recording(recording), _plan(recording)
+    points = [point for point in recording.latest.values() if "end_sample" in point]
+    if not points:
+        return None
+    part = recording.parts[-1]
+    rows = part.read(points[-1]["first_sample"], points[-1]["end_sample"])
+    try:
+        return responses_of(bench, spectra_of(bench, plan, {points[-1].get("realisation") or 0: rows}))
+    except IdentificationError:
+        return None
+
+
+def _plan(recording: Recording) -> MultisinePlan:
+    plan = plan_from(dict(recording.configuration["plan"]), f"{recording.path}: plan")
+    if not isinstance(plan, MultisinePlan):
+        raise RecordingError(f"{recording.path}: is not the recording of a check")
+    return plan
+
+
+def _silence(recording: Recording, bench: Bench, plan: MultisinePlan) -> np.ndarray:
+    """Readings before the first realisation [n, n_channels]."""
+    first = recording.plans[0].plan
+    samples = round(float(first.get("silent_s", 0.0)) * bench.sample_rate_hz)
+    part = recording.parts[0]
+    stop = min(samples, part.n_rows)
+    return np.asarray(part.read(min(round(SKIPPED * samples), stop), stop)["inputs"])
+
+
+def _how_it_ended(recording: Recording, bench: Bench) -> list[Finding]:
+    """A finding where the run did not end by itself; it names the channel that tripped."""
+    end = recording.parts[-1].end
+    if end is None:
+        return [Finding("run", "", "fail", text="the recording was cut short")]
+    if end["reason"] == EndReason.COMPLETED.name.lower():
+        return []
+    name = next((c.name for c in bench.channels if f"channel {c.name} " in f"{end['text']} "), "")
+    label = "life" if end["reason"] == EndReason.SENSOR_STUCK.name.lower() else "run"
+    return [Finding(label, name, "fail", text=end["text"])]
+
+
+def _lead_fraction(recording: Recording) -> float:
+    lead = float(_about(recording.parts[-1].information).get("lead_samples", 0.0))
+    return lead - float(np.floor(lead))
+
+
+def _about(information: Any) -> dict[str, Any]:
+    about = information.get("about", {})
+    return dict(about) if isinstance(about, dict) else {}

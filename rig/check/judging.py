@@ -1,0 +1,201 @@
+"""Findings from the driven part of a check: what lives, what is reversed or swapped, how large and how late it is."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.check.findings import Finding, graded
+from rig.check.responses import BAND, Mode, Responses, fit_mode
+from rig.check.wiring import ALIKE, best_assignment, by_magnitude
+
+__all__ = ["driven_findings"]
+
+LIVES, CLEAR = 0.5, 0.98  # coherence
+POWER = 0.5  # part of the power's absolute sum that must flow one way for the way to be told
+SIZE_OK, SIZE_TOLERATED = (0.9, 1.1), (0.67, 1.5)
+FREQUENCY_OK, FREQUENCY_TOLERATED = (0.98, 1.02), (0.9, 1.1)
+TURN_DEG = 3.0
+DISTORTED = 0.05
+FITS = 0.15
+
+
+def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], Mode | None]:
+    """Findings from the responses alone and the bench's own facts, and the mode under test."""
+    lives = _coherence(bench, responses)
+    dead = {finding.channel for finding in lives if finding.verdict == "fail"}
+    out = [*lives, *_distortion(bench, responses, dead)]
+    force, drive = bench.index_of("force"), bench.index_of("drive")
+    names = responses.names
+    if names[force] in dead or names[drive] in dead:
+        text = "force or drive channel is dead"
+        return [*out, Finding("power", names[drive], "not tested", text=text)], None
+    alive = [i for i in _accelerations(bench) if names[i] not in dead]
+    mode = fit_mode(responses.frequency_hz, responses.per(force)[alive], bench.specimen.linear_frequency_hz)
+    out.append(_power(bench, responses))
+    if mode is None or mode.misfit > FITS or not _near(bench, mode):
+        text = (
+            "the accelerations per force show no single mode near specimen.linear_frequency_hz: force and drive swapped, "
+            "another specimen, or wrong facts"
+        )
+        value = None if mode is None else mode.frequency_hz
+        low, high = (part * bench.specimen.linear_frequency_hz for part in FREQUENCY_TOLERATED)
+        return [*out, Finding("frequency", "", "fail", value, "Hz", f"{low:.4g} to {high:.4g}", text)], None
+    out.append(_frequency(bench, mode))
+    out += _shapes(bench, responses, alive, mode)
+    return [*out, *_delays(bench, alive, mode)], mode
+
+
+def _accelerations(bench: Bench) -> list[int]:
+    drive = bench.index_of("drive")
+    return [drive, *(i for i, channel in enumerate(bench.channels) if channel.role == "response")]
+
+
+def _coherence(bench: Bench, responses: Responses) -> list[Finding]:
+    out = []
+    for channel, value in zip(bench.channels, responses.coherence, strict=True):
+        if channel.role == "monitor" and not channel.loopback:
+            continue
+        verdict = graded(float(value), (CLEAR, 1.0), (LIVES, 1.0))
+        text = {"ok": "", "warn": "much noise beside the excitation: a loose cable, or a level too low"}.get(
+            verdict, "does not follow the excitation: sensor, cable or supply is dead"
+        )
+        out.append(Finding("life", channel.name, verdict, float(value), "coherence", f"from {CLEAR:g}", text))
+    return out
+
+
+def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Finding]:
+    """Of the force alone: an amplifier that clips shows there, and so does a specimen that is nonlinear already."""
+    index = bench.index_of("force")
+    name, value = responses.names[index], float(responses.distortion[index])
+    if name in dead:
+        return []
+    bad = value > DISTORTED
+    text = (
+        "lines are heard that were not played: amplifier clipping, a rattle, or a very nonlinear specimen"
+        if bad
+        else ""
+    )
+    return [Finding("distortion", name, "warn" if bad else "ok", value, "", f"up to {DISTORTED:g}", text)]
+
+
+def _power(bench: Bench, responses: Responses) -> Finding:
+    """Power goes into a passive structure at its drive point: the mean of force times velocity is positive."""
+    force, drive = bench.index_of("force"), bench.index_of("drive")
+    part = responses.frequency_hz / bench.specimen.linear_frequency_hz
+    around = (part > BAND[0]) & (part < BAND[1])
+    velocity = responses.per_volt[drive] / (2j * math.pi * responses.frequency_hz)
+    power = np.real(responses.per_volt[force].conj() * velocity)[around]
+    share = float(power.sum() / max(np.abs(power).sum(), 1e-300))
+    name, allowed = responses.names[drive], f"from {POWER:g}"
+    if share >= POWER:
+        return Finding("power", name, "ok", share, "into specimen", allowed)
+    if share > -POWER:
+        text = "goes in at some frequencies and out at others: the drive channel is not at the drive point"
+        return Finding("power", name, "warn", share, "into specimen", allowed, text)
+    text = "power comes out of the specimen: force or drive is reversed, or the two are swapped"
+    return Finding("power", name, "fail", share, "into specimen", allowed, text)
+
+
+def _near(bench: Bench, mode: Mode) -> bool:
+    ratio = mode.frequency_hz / bench.specimen.linear_frequency_hz
+    return FREQUENCY_TOLERATED[0] <= ratio <= FREQUENCY_TOLERATED[1]
+
+
+def _frequency(bench: Bench, mode: Mode) -> Finding:
+    linear = bench.specimen.linear_frequency_hz
+    verdict = graded(mode.frequency_hz / linear, FREQUENCY_OK, FREQUENCY_TOLERATED)
+    text = "" if verdict == "ok" else "correct specimen.linear_frequency_hz, or see what has changed"
+    allowed = f"{FREQUENCY_OK[0] * linear:.4g} to {FREQUENCY_OK[1] * linear:.4g}"
+    return Finding("frequency", "", verdict, mode.frequency_hz, "Hz", allowed, text)
+
+
+def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode) -> list[Finding]:
+    """Sizes, signs and places of the accelerations against the mode's shape as the bench knows it."""
+    drive_shape = bench.specimen.drive_mode_shape
+    names, channels = responses.names, bench.channels
+    if drive_shape is None:
+        text = "the bench knows no drive_mode_shape: a reference check would tell"
+        return [Finding("place", "", "not tested", text=text)]
+    shapes = {
+        i: drive_shape if channels[i].role == "drive" else shape
+        for i in alive
+        if channels[i].role == "drive" or (shape := channels[i].mode_shape) is not None
+    }
+    known = [i for i in alive if shapes.get(i)]
+    residues = np.array([mode.residue[alive.index(i)] for i in known])
+    expected = drive_shape * np.array([shapes[i] or 0.0 for i in known])
+    volts = np.array([abs(channels[i].sensitivity_v_per_unit) for i in known])
+    swapped = best_assignment(by_magnitude(np.abs(residues) * volts, np.abs(expected) * volts))
+    out = [
+        Finding(
+            "place", names[i], "not tested", text="the bench knows no mode_shape of it: a reference check would tell"
+        )
+        for i in alive
+        if i not in known
+    ]
+    if swapped is not None:
+        return [*out, *_misplaced([names[i] for i in known], swapped)]
+    out += _look_alike([names[i] for i in known], np.abs(expected))
+    out += _polarities(bench, known, np.sign(residues.real * expected))
+    return [*out, *(_size(names[i], float(r)) for i, r in zip(known, np.abs(residues / expected), strict=True))]
+
+
+def _polarities(bench: Bench, known: Sequence[int], signs: np.ndarray) -> list[Finding]:
+    """Signs of the accelerations against the force; where most of them are against it, it is the force that is reversed."""
+    force = bench.channels[bench.index_of("force")].name
+    names = [bench.channels[i].name for i in known]
+    turned = len(known) > 2 and int(np.sum(signs < 0.0)) > len(known) / 2
+    against = signs > 0.0 if turned else signs < 0.0
+    text = "reversed against the accelerations: turn the sign of its sensitivity" if turned else ""
+    out = [Finding("polarity", force, "fail" if turned else "ok", -1.0 if turned else 1.0, "sign", "1", text)]
+    unsure = "" if len(known) > 2 else ", or the force is"
+    for name, wrong in zip(names, against, strict=True):
+        text = f"reversed{unsure}: turn the sign of its sensitivity" if wrong else ""
+        out.append(Finding("polarity", name, "fail" if wrong else "ok", -1.0 if wrong else 1.0, "sign", "1", text))
+    return out
+
+
+def _misplaced(names: Sequence[str], swapped: tuple[int, ...]) -> list[Finding]:
+    return [
+        Finding("place", name, "fail", text=f"reads what {names[really]} should: the two are swapped")
+        if swapped[really] == place
+        else Finding("place", name, "fail", text=f"reads what {names[really]} should: channels are swapped")
+        for place, (name, really) in enumerate(zip(names, swapped, strict=True))
+        if place != really
+    ]
+
+
+def _look_alike(names: Sequence[str], expected: np.ndarray) -> list[Finding]:
+    text = "moves like {other} in this mode: whether the two are swapped, only a reference check tells"
+    return [
+        Finding("place", names[j], "not tested", text=text.format(other=names[i]))
+        for i in range(len(names))
+        for j in range(i + 1, len(names))
+        if abs(math.log(expected[i] / expected[j])) < ALIKE
+    ]
+
+
+def _size(name: str, ratio: float) -> Finding:
+    verdict = graded(ratio, SIZE_OK, SIZE_TOLERATED)
+    text = (
+        ""
+        if verdict == "ok"
+        else "per force, against the mode's shape: a sensitivity, its place, or the shape is wrong"
+    )
+    return Finding("size", name, verdict, ratio, "of expected", f"{SIZE_OK[0]:g} to {SIZE_OK[1]:g}", text)
+
+
+def _delays(bench: Bench, alive: Sequence[int], mode: Mode) -> list[Finding]:
+    """Phase of the residues, which normal modes have at 0 or 180 degrees: delay of a channel behind the force's."""
+    out = []
+    for place, i in enumerate(alive):
+        residue = complex(mode.residue[place])
+        turn = math.degrees(math.atan(residue.imag / residue.real)) if residue.real else 90.0
+        samples = -turn / 360.0 / mode.frequency_hz * bench.sample_rate_hz
+        late = abs(turn) > TURN_DEG
+        text = f"{samples:+.2f} samples behind the force more than skew_samples says" if late else ""
+        name = bench.channels[i].name
+        out.append(Finding("skew", name, "warn" if late else "ok", turn, "deg", f"+-{TURN_DEG:g}", text))
+    return out

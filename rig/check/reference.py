@@ -1,0 +1,57 @@
+"""Findings against an earlier check of the same bench: what has changed since, and what only a comparison tells."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.bench import Bench
+from rig.check.findings import Finding, graded
+from rig.check.judging import SIZE_OK, SIZE_TOLERATED
+from rig.check.responses import Responses
+from rig.check.wiring import best_assignment, by_shape
+
+__all__ = ["on_lines_of", "reference_findings"]
+
+Complex = NDArray[np.complex128]
+
+
+def on_lines_of(frequency_hz: NDArray[np.float64], reference: Responses) -> Complex:
+    """complex[n_channels, n_lines]: the reference's responses per volt, interpolated."""
+    parts = [
+        np.interp(frequency_hz, reference.frequency_hz, part(row))
+        for row in reference.per_volt
+        for part in (np.real, np.imag)
+    ]
+    return np.asarray(np.array(parts[0::2]) + 1j * np.array(parts[1::2]))
+
+
+def reference_findings(bench: Bench, found: Responses, reference: Responses, dead: set[str]) -> list[Finding]:
+    """Swapped and reversed channels and changed gains, of channels that both checks have and that live."""
+    both = [i for i, name in enumerate(found.names) if name in reference.names and name not in dead]
+    both = [i for i in both if bench.channels[i].role != "monitor"]
+    if not both:
+        return [Finding("reference", "", "not tested", text="the reference has no channel in common with this bench")]
+    inside = (found.frequency_hz >= reference.frequency_hz[0]) & (found.frequency_hz <= reference.frequency_hz[-1])
+    known = on_lines_of(found.frequency_hz[inside], reference)
+    known = known[[reference.names.index(found.names[i]) for i in both]]
+    volts = np.array([bench.channels[i].sensitivity_v_per_unit for i in both])[:, None]
+    now = found.per_volt[both][:, inside]
+    swapped = best_assignment(by_shape(now * volts, known * volts))
+    names = [found.names[i] for i in both]
+    if swapped is not None:
+        return [
+            Finding("place", name, "fail", text=f"reads what {names[really]} did in the reference: swapped")
+            for place, (name, really) in enumerate(zip(names, swapped, strict=True))
+            if place != really
+        ]
+    return [finding for name, new, old in zip(names, now, known, strict=True) for finding in _compared(name, new, old)]
+
+
+def _compared(name: str, now: Complex, known: Complex) -> list[Finding]:
+    alike = float(np.real(np.vdot(known, now)) / (np.linalg.norm(known) * np.linalg.norm(now)))
+    ratio = float(np.exp(np.median(np.log(np.abs(now) / np.abs(known)))))
+    turned = alike < 0.0
+    text = "reversed since the reference (if all channels are: the drive is)" if turned else ""
+    sign = Finding("polarity", name, "fail" if turned else "ok", alike, "likeness", "above 0", text)
+    verdict = graded(ratio, SIZE_OK, SIZE_TOLERATED)
+    text = "" if verdict == "ok" else "per volt, against the reference: amplifier, sensitivity, or the rig has changed"
+    return [sign, Finding("gain", name, verdict, ratio, "of reference", f"{SIZE_OK[0]:g} to {SIZE_OK[1]:g}", text)]

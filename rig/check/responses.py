@@ -1,0 +1,128 @@
+"""What the multisine tells: coherence of every channel, responses per volt and per newton, the mode under test.
+
+Near the mode under test the responses of all accelerations a_i to the force at the drive point share one pole,
+
+    a_i / F = s^2 phi_d phi_i / (s^2 + 2 zeta omega_0 s + omega_0^2) + c_i + e_i s^2,    s = j omega,
+
+with mass-normalised shapes phi (normal modes; Ewins, *Modal Testing*, 2nd ed., section 2.4) and other modes as residuals. The
+pole is found by iterated linear least squares (Sanathanan and Koerner, 1963), residues and residuals are then linear; they
+are left complex, for delay between channels turns them.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification import PeriodicSpectra
+from rig.bench import Bench
+
+__all__ = ["BAND", "Mode", "Responses", "fit_mode", "responses_of"]
+
+Float = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+BAND = (0.7, 1.4)  # of the linear frequency, for the fit
+ROUNDS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """What was measured, at the excited lines."""
+
+    names: tuple[str, ...]
+    """Channels of the bench, in its order."""
+    frequency_hz: Float
+    """float[n_lines]."""
+    per_volt: Complex
+    """complex[n_channels, n_lines], unit of the channel per volt of output, skew taken out."""
+    coherence: Float
+    """float[n_channels]: part of a channel's power in the band that repeats itself with the excitation."""
+    distortion: Float
+    """float[n_channels]: RMS of lines that are not excited, less noise, beside that of excited ones."""
+
+    def per(self, reference: int) -> Complex:
+        """complex[n_channels, n_lines]: responses to another channel."""
+        return np.asarray(self.per_volt / self.per_volt[reference])
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """The mode under test as the force and the accelerations show it."""
+
+    frequency_hz: float
+    """Natural frequency."""
+    damping_ratio: float
+    """Damping ratio of the structure alone."""
+    residue: Complex
+    """complex[n_accelerations], phi_d phi_i, 1/kg; real and positive where a point moves with the drive point."""
+    misfit: float
+    """Largest relative RMS difference between fit and measurement."""
+
+
+def responses_of(bench: Bench, measured: PeriodicSpectra) -> Responses:
+    """Responses per volt from the spectra of one level."""
+    excited = measured.excited
+    means, spread = measured.mean, measured.noise_variance
+    rows = [measured.index(channel.name) for channel in bench.channels]
+    voltage = means[:, measured.index("voltage")][:, excited]
+    value = np.einsum("rck,rk->ck", means[:, rows][:, :, excited], voltage.conj()) / np.sum(
+        np.abs(voltage) ** 2, axis=0
+    )
+    periods = measured.spectra.shape[1]
+    power = np.abs(means[:, rows]) ** 2 - spread[:, rows] / periods
+    signal = np.maximum(power[:, :, excited].sum(axis=(0, 2)), 0.0)
+    noise = spread[:, rows][:, :, excited].sum(axis=(0, 2))
+    coherence = signal / np.maximum(signal + noise, 1e-300)
+    unexcited = np.maximum(power[:, :, ~excited].mean(axis=(0, 2)), 0.0) if (~excited).any() else np.zeros(len(rows))
+    distortion = np.sqrt(unexcited / np.maximum(power[:, :, excited].mean(axis=(0, 2)), 1e-300))
+    names = tuple(channel.name for channel in bench.channels)
+    return Responses(names, measured.frequency_hz[excited], value, coherence, distortion)
+
+
+def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode | None:
+    """The mode nearest to a frequency, from accelerations per force [n, n_lines]; None where there is none in the band."""
+    around = (frequency_hz > BAND[0] * near_hz) & (frequency_hz < BAND[1] * near_hz)
+    if np.count_nonzero(around) < 12:
+        return None
+    s: Complex = np.asarray(1j * frequency_hz[around] / near_hz, np.complex128)
+    values = accelerance[:, around]
+    sizes = np.sqrt(np.mean(np.abs(values) ** 2, axis=1))
+    if not (np.isfinite(values).all() and np.all(sizes > 0.0)):
+        return None
+    pole = _pole(s, values / sizes[:, None])
+    if pole is None:
+        return None
+    omega = math.sqrt(pole[0])
+    matrix = np.column_stack([s**2 / (s**2 + pole[1] * s + pole[0]), np.ones_like(s), s**2])
+    found, *_ = np.linalg.lstsq(matrix, values.T, rcond=None)
+    left = np.sqrt(np.mean(np.abs(values.T - matrix @ found) ** 2, axis=0)) / sizes
+    return Mode(omega * near_hz, pole[1] / (2.0 * omega), np.asarray(found[0]), float(left.max()))
+
+
+def _pole(s: NDArray[Any], values: NDArray[Any]) -> tuple[float, float] | None:
+    """Stiffness and damping term of the common denominator, frequencies relative to the one looked near."""
+    rows, powers = [], s[:, None] ** np.arange(5)[None, :]
+    weight = np.ones(s.size)
+    stiffness, damping = 1.0, 0.01
+    for _ in range(ROUNDS):
+        rows = [_reduced(powers * weight[:, None], value * weight, s) for value in values]
+        matrix = np.concatenate([row[0] for row in rows])
+        right = np.concatenate([row[1] for row in rows])
+        (stiffness, damping), *_ = np.linalg.lstsq(
+            np.concatenate([matrix.real, matrix.imag]), np.concatenate([right.real, right.imag]), rcond=None
+        )
+        if not math.isfinite(stiffness) or not math.isfinite(damping):
+            return None
+        weight = 1.0 / np.maximum(np.abs(s**2 + damping * s + stiffness), 1e-9)
+    inside = BAND[0] ** 2 < stiffness < BAND[1] ** 2 and 0.0 < damping < 0.6
+    return (float(stiffness), float(damping)) if inside else None
+
+
+def _reduced(numerator: NDArray[Any], value: NDArray[Any], s: NDArray[Any]) -> tuple[Complex, Complex]:
+    """The equations ``value (s^2 + a s + b) = numerator coefficients`` less what the numerator's own unknowns explain."""
+    basis, _ = np.linalg.qr(numerator)
+    columns = np.column_stack([value, value * s, -value * s**2])
+    left = columns - basis @ (basis.conj().T @ columns)
+    return left[:, :2], left[:, 2]

@@ -1,0 +1,113 @@
+"""What the channels read at 0 V: noise floor, offset, mains hum, channels that do not move or stand at their range."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.bench import Bench
+from rig.check.findings import Finding, graded
+from rig.daq import Channel
+
+__all__ = ["floor", "hum", "silent_findings"]
+
+MAINS_HZ = (50.0, 60.0)
+HUM_HARMONICS = 3
+NOISY = 3.0  # times the expected floor
+CALM = 0.3
+FAR_OFF = 0.1  # of the range: an offset that eats into it
+SIGNIFICANT = 5.0  # standard deviations of a line of noise
+
+Float = NDArray[np.float64]
+
+
+def silent_findings(bench: Bench, readings: Float) -> list[Finding]:
+    """Findings from ``readings`` [n, n_channels] in SI units at 0 V."""
+    out: list[Finding] = []
+    for index, channel in enumerate(bench.channels):
+        values = readings[:, index].astype(float)
+        if not np.isfinite(values).all():
+            out.append(
+                Finding("samples", channel.name, "warn", text="samples were lost or are no numbers; see the wire")
+            )
+            values = values[np.isfinite(values)]
+        stopping = bench.emergency_stop is not None and bench.emergency_stop.channel == channel.name
+        if values.size < 10 or stopping:
+            continue
+        out += _of_channel(bench, channel, values)
+    return out
+
+
+def _of_channel(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
+    scale = abs(channel.sensitivity_v_per_unit)
+    offset_v = float(values.mean()) * scale
+    highest_v = bench.limits.overload_fraction * channel.range_v
+    at_range = float(np.abs(values).max()) * scale >= highest_v
+    verdict = "fail" if at_range else graded(abs(offset_v), (0.0, FAR_OFF * channel.range_v), (0.0, highest_v))
+    offset = Finding(
+        "offset",
+        channel.name,
+        verdict,
+        offset_v,
+        "V",
+        f"+-{FAR_OFF * channel.range_v:g}",
+        {"ok": "", "warn": "see the sensor's supply and its warm-up"}.get(
+            verdict, "at the end of its range: short or open?"
+        ),
+    )
+    return [offset, _noise(channel, values), *_hum(bench, channel, values)]
+
+
+def floor(channel: Channel) -> float:
+    """RMS that the bench expects of a channel at rest: declared noise and the converter's steps, in its unit."""
+    bit = channel.resolution_v / abs(channel.sensitivity_v_per_unit)
+    return math.hypot(channel.noise_rms, bit / math.sqrt(12.0))
+
+
+def _noise(channel: Channel, values: Float) -> Finding:
+    bit = channel.resolution_v / abs(channel.sensitivity_v_per_unit)
+    found, expected = float(values.std()), floor(channel)
+    if np.ptp(values) < 0.5 * bit:
+        if channel.noise_rms < 0.5 * bit:
+            text = "below one bit, as the bench expects; whether it lives is told under drive"
+            return Finding("noise", channel.name, "ok", found, channel.unit, f"up to {NOISY * expected:.3g}", text)
+        text = "does not change at all: cable, supply or sensor may be dead"
+        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {CALM * expected:.3g}", text)
+    if channel.noise_rms == 0.0 and found > NOISY * expected:
+        text = "the bench declares no noise_rms to compare with"
+        return Finding("noise", channel.name, "not tested", found, channel.unit, "", text)
+    if found < CALM * channel.noise_rms and channel.noise_rms > bit:
+        text = "much quieter than the sensor can be: is it connected?"
+        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {CALM * expected:.3g}", text)
+    noisy = found > NOISY * expected
+    text = "more than sensor and converter make: ambient vibration, cable or earth loop" if noisy else ""
+    return Finding(
+        "noise", channel.name, "warn" if noisy else "ok", found, channel.unit, f"up to {NOISY * expected:.3g}", text
+    )
+
+
+def _hum(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
+    found, at_hz = 0.0, 0.0
+    for mains in MAINS_HZ:
+        amplitude = hum(values, mains, bench.sample_rate_hz)
+        if amplitude > found:
+            found, at_hz = amplitude, mains
+    if found <= floor(channel):
+        return []
+    text = f"mains hum of {at_hz:g} Hz and its harmonics: earth loop, or a cable beside the amplifier's"
+    return [Finding("mains hum", channel.name, "warn", found, channel.unit, f"up to {floor(channel):.3g}", text)]
+
+
+def hum(values: Float, mains_hz: float, sample_rate_hz: float) -> float:
+    """RMS of the mains' first three harmonics where they stand out of the noise, else 0; least squares over all samples."""
+    time = np.arange(values.size) / sample_rate_hz
+    frequencies = [h * mains_hz for h in range(1, HUM_HARMONICS + 1) if h * mains_hz < 0.45 * sample_rate_hz]
+    columns = [part(2.0 * math.pi * f * time) for f in frequencies for part in (np.cos, np.sin)]
+    if not columns:
+        return 0.0
+    matrix = np.column_stack([np.ones_like(time), time, *columns])
+    found, *_ = np.linalg.lstsq(matrix, values, rcond=None)
+    left = float(np.std(values - matrix @ found))
+    amplitudes = np.hypot(found[2::2], found[3::2])
+    loud = amplitudes > SIGNIFICANT * left * math.sqrt(2.0 / values.size)
+    return float(np.sqrt(0.5 * np.sum(amplitudes[loud] ** 2)))

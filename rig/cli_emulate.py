@@ -1,0 +1,112 @@
+"""``rig emulate``: a virtual rig behind the wire protocol of a real device."""
+
+import json as jsonlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli_options import Json
+
+if TYPE_CHECKING:
+    from rig.wire.device.process import Ready
+
+__all__ = ["emulate"]
+
+
+def emulate(
+    wire: Annotated[str, typer.Argument(help="serial or can.")],
+    bench: Annotated[str, typer.Option(help="Virtual bench to put behind it: a name or TOML file.")] = "magnet-beam",
+    lockstep: Annotated[bool, typer.Option("--lockstep", help="Wait for the host instead of keeping time.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the rig's noise.", min=0)] = 0,
+    link: Annotated[Path | None, typer.Option(help="Symbolic link to the port, a name that stays.")] = None,
+    bench_file: Annotated[Path | None, typer.Option(help="Bench to write that reaches it: a TOML file.")] = None,
+    as_hardware: Annotated[bool, typer.Option("--as-hardware", help="Do not say that nothing moves.")] = False,
+    flip: Annotated[list[str] | None, typer.Option(help="Channel whose sensor sits the wrong way round.")] = None,
+    dead: Annotated[list[str] | None, typer.Option(help="Channel that is connected to nothing.")] = None,
+    swap: Annotated[list[str] | None, typer.Option(metavar="A,B", help="Two channels in each other's sockets.")] = None,
+    interface: Annotated[str | None, typer.Option(help="CAN: python-can's; slcan over a port if left out.")] = None,
+    channel: Annotated[str | None, typer.Option(help="CAN: channel of that interface.")] = None,
+    fd: Annotated[bool, typer.Option("--fd/--classic", help="CAN: frames of up to 64 or 8 bytes.")] = True,
+    node: Annotated[int, typer.Option(help="CAN: number of the device on its bus.", min=0, max=15)] = 1,
+    bitrate: Annotated[int, typer.Option(help="CAN: bit/s.")] = 1_000_000,
+    data_bitrate: Annotated[int, typer.Option(help="CAN FD: bit/s within the data.")] = 8_000_000,
+    log_output: Annotated[Path | None, typer.Option(help="File for the device's output, a line a block.")] = None,
+    json: Json = False,
+) -> None:
+    """Put a virtual rig behind a wire, at the pace of the clock, until Ctrl-C."""
+    from rig.bench import load_bench
+    from rig.configuration import validated
+    from rig.wire.device.process import run_emulator
+    from rig.wire.device.settings import EmulatorSettings
+
+    table = {
+        "wire": wire,
+        "bench": load_bench(bench).model_dump(),
+        "seed": seed,
+        "lockstep": lockstep,
+        "as_hardware": as_hardware,
+        "flip": flip or [],
+        "dead": dead or [],
+        "swap": [_pair(text) for text in swap or []],
+        "link": link,
+        "log_output": log_output,
+        "interface": interface,
+        "channel": channel,
+        "fd": fd,
+        "node": node,
+        "bitrate": bitrate,
+        "data_bitrate": data_bitrate,
+    }
+    settings = validated(EmulatorSettings, table, "rig emulate")
+    _check_bench_file(bench_file)
+
+    def when_ready(ready: "Ready") -> None:
+        if bench_file is not None:
+            bench_file.write_text(_bench_text(bench, ready), encoding="utf-8")
+        if json:
+            print(jsonlib.dumps({"wire": wire, **ready.options, "process": ready.process}), flush=True)
+        else:
+            where = ", ".join(f"{key} {value}" for key, value in ready.options.items())
+            print(f"{bench} behind {wire}: {where} ({ready.scheduling}); Ctrl-C ends it", flush=True)
+
+    counted = run_emulator(settings, when_ready)
+    if json:
+        print(jsonlib.dumps(counted), flush=True)
+    else:
+        counts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counted.items())
+        print(f"ended: {counts or 'nothing went wrong'}")
+
+
+def _pair(text: str) -> list[str]:
+    from rig.errors import ConfigurationError
+
+    names = text.split(",")
+    if len(names) != 2:
+        raise ConfigurationError(f"--swap {text}: allowed is two channels with a comma between them")
+    return names
+
+
+def _check_bench_file(path: Path | None) -> None:
+    from rig.errors import ConfigurationError
+
+    if path is not None and (path.suffix != ".toml" or not path.parent.is_dir()):
+        raise ConfigurationError(f"--bench-file {path}: allowed is a .toml file in a folder that exists")
+
+
+def _bench_text(bench: str, ready: "Ready") -> str:
+    """A bench that starts from the emulated one and names the driver that reaches it."""
+    from rig.wire.device.emulator import driver_options
+
+    base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
+    options = driver_options(ready.options, lockstep=ready.lockstep)
+    lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
+    head = [
+        f"base = {jsonlib.dumps(base)}",
+        "",
+        "[driver]",
+        f"name = {jsonlib.dumps(ready.wire)}",
+        "",
+        "[driver.options]",
+    ]
+    return "\n".join([*head, *lines, ""])

@@ -1,0 +1,77 @@
+"""`CanDAQ`: a device on a CAN bus."""
+
+from typing import Any
+
+from pydantic import Field
+
+from rig.bench import Bench
+from rig.configuration import validated
+from rig.drivers.wire import WireDAQ, WireOptions
+from rig.wire.can.bus import FrameBus, PythonCanBus
+from rig.wire.can.link import CanLink
+from rig.wire.can.slcan import SlcanBus
+from rig.wire.link import Link
+
+__all__ = ["CanDAQ", "CanOptions", "make_bus"]
+
+
+class CanOptions(WireOptions):
+    """Where the bus is, how fast it is, and which node the device has."""
+
+    interface: str = Field("socketcan", min_length=1)
+    """A backend of python-can by its name, or ``slcan``: an adapter on a serial line, which needs no backend."""
+    channel: str | int
+    """The interface's name, for instance ``can0``; with ``slcan`` the serial port."""
+    fd: bool = True
+    """CAN FD, or classical CAN."""
+    bitrate: int = Field(1_000_000, ge=10_000, le=1_000_000)
+    """Bit rate of the bus, bit/s."""
+    data_bitrate: int = Field(2_000_000, ge=1_000_000, le=8_000_000)
+    """CAN FD: bit rate within the data, bit/s."""
+    node: int = Field(1, ge=0, le=15)
+    """Node of the device."""
+    dbc: str | None = None
+    """A definition with other identifiers; by default the shipped one for the bench's number of channels."""
+    baud: int = Field(3_000_000, ge=9600)
+    """``slcan``: baud rate of the serial line."""
+    backend: dict[str, Any] = Field(default_factory=dict)
+    """Further keyword arguments of python-can's backend, such as its bit timing."""
+
+
+def make_bus(options: CanOptions) -> FrameBus:
+    """The bus that the options name, not yet open."""
+    if options.interface == "slcan":
+        return SlcanBus(str(options.channel), options.fd, options.bitrate, options.data_bitrate, options.baud)
+    return PythonCanBus(
+        options.interface,
+        options.channel,
+        options.fd,
+        options.bitrate,
+        options.data_bitrate,
+        options.node,
+        options.backend,
+    )
+
+
+class CanDAQ(WireDAQ):
+    """A device that speaks the wire protocol on a CAN bus.
+
+    Options: `CanOptions`. The seed is of no use to a real device.
+    """
+
+    def __init__(self, bench: Bench, seed: int = 0) -> None:
+        options = validated(CanOptions, dict(bench.driver.options), "driver.options")
+        super().__init__(bench, seed, options)
+        self._can = options
+
+    def _make_link(self) -> Link:
+        can = self._can
+        return CanLink(
+            make_bus(can),
+            len(self.channels),
+            can.fd,
+            can.node,
+            can.bitrate,
+            can.data_bitrate,
+            can.dbc,
+        )

@@ -1,0 +1,6 @@
+"""Drivers over a wire: the host's half of the protocol, whatever carries it."""
+
+from rig.drivers.wire.driver import WireDAQ
+from rig.drivers.wire.options import WireOptions
+
+__all__ = ["WireDAQ", "WireOptions"]

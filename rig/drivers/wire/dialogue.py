@@ -1,0 +1,155 @@
+"""The host's half of the commands: every request is repeated until it is answered."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+
+from rig.errors import DaqProtocol, DaqRefused, DaqTimeout
+from rig.wire.link import Link
+from rig.wire.messages import (
+    NAME_WORDS,
+    Answer,
+    Command,
+    DeviceState,
+    Heartbeat,
+    Parameter,
+    Request,
+    Samples,
+    Status,
+    as_float,
+    as_text,
+)
+
+__all__ = ["Dialogue"]
+
+TRIES = 5
+ANSWER_S = 0.1
+DOUBLED_ANSWERS = 8  # a single one may be a frame that the wire has repeated
+WAITING_BLOCKS = 4096
+
+
+class Dialogue:
+    """Requests and answers over a link, and the stream messages that came in between.
+
+    Errors: `DaqTimeout` for a device that has fallen silent, `DaqProtocol` where two devices answer, `DaqRefused` for what
+    the device will not do.
+    """
+
+    def __init__(self, link: Link, clock: Callable[[], float]) -> None:
+        self.link = link
+        self.clock = clock
+        self.early: deque[Samples | Heartbeat] = deque(maxlen=WAITING_BLOCKS)
+        """Stream messages that came while an answer was waited for."""
+        self.retries = 0
+        self.stray_answers = 0
+        self._doubled = 0
+        self._sent = 0
+        self._last: Answer | None = None
+        self._number = time.monotonic_ns() // 1000 % 255  # another one than the last host's, most likely
+
+    def ask(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0, tries: int = TRIES) -> Answer:
+        """The device's answer to a request, whatever its status."""
+        request = self.next_request(command, parameter, item, value)
+        for self._sent in range(1, tries + 1):
+            self.link.send(request)
+            answer = self._answer_to(request)
+            if answer is not None:
+                self._last = answer
+                return answer
+            self.retries += 1
+        raise DaqTimeout(
+            f"{self.link.name}: no answer to {_said(command, parameter)} in {tries * ANSWER_S:g} s"
+            f"{self.damage()}; is the device switched on, and its cable in place?"
+        )
+
+    def next_request(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0) -> Request:
+        """A request with a number of its own."""
+        self._number = self._number % 255 + 1
+        return Request(self._number, command, parameter, item, value)
+
+    def _answer_to(self, request: Request) -> Answer | None:
+        until = self.clock() + ANSWER_S
+        while (left := until - self.clock()) > 0.0:
+            message = self.link.receive(left)
+            if message is None:
+                return None
+            if isinstance(message, Answer):
+                if message[0] == request.number and message[2:4] == request[2:4]:
+                    return message
+                self.note_stray(message)
+            elif isinstance(message, Samples | Heartbeat):
+                self.early.append(message)
+        return None
+
+    def forget(self) -> None:
+        """Drop what has come so far: heartbeats of an idle device, blocks for a host that is no more."""
+        for _ in range(WAITING_BLOCKS):
+            if self.link.receive(0.0) is None:
+                break
+        self.early.clear()
+
+    def note_stray(self, answer: Answer) -> None:
+        """Count an answer that nobody waits for; `DaqProtocol` once it is plain that two devices answer."""
+        self.stray_answers += 1
+        if self._last is None or answer.number != self._last.number or answer[2:4] != self._last[2:4]:
+            return
+        if answer == self._last:
+            self._doubled += self._sent == 1
+            if self._doubled < DOUBLED_ANSWERS:
+                return
+        raise DaqProtocol(
+            f"{self.link.name}: two devices answer as one; give each an address of its own, or unplug one of them"
+        )
+
+    def damage(self) -> str:
+        """What the link has counted, for a message; empty where nothing was damaged."""
+        seen = [f"{count} {name.replace('_', ' ')}" for name, count in self.link.counters.items() if count]
+        return f" ({', '.join(seen)})" if seen else ""
+
+    def do(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0) -> int:
+        """Have a request carried out; returns the answer's value. `DaqRefused` where the device will not."""
+        answer = self.ask(command, parameter, item, value)
+        if answer.status != Status.DONE:
+            raise DaqRefused(f"{self.link.name}: {_said(command, parameter, value)}: {_why(answer)}")
+        return answer.value
+
+    def get(self, parameter: Parameter, item: int = 0, default: int | None = None) -> int:
+        """A parameter's word; ``default`` where the device does not know it."""
+        answer = self.ask(Command.GET, parameter, item)
+        if answer.status == Status.UNKNOWN and default is not None:
+            return default
+        if answer.status != Status.DONE:
+            raise DaqProtocol(
+                f"{self.link.name}: the device does not tell its {parameter.name} (item {item}): {_why(answer)}"
+            )
+        return answer.value
+
+    def get_float(self, parameter: Parameter, item: int = 0) -> float:
+        """A parameter that is a float32."""
+        return as_float(self.get(parameter, item))
+
+    def get_text(self, parameter: Parameter, channel: int = 0) -> str:
+        """A parameter that is a text, asked for up to its end."""
+        words: list[int] = []
+        for item in range(NAME_WORDS * channel, NAME_WORDS * (channel + 1)):
+            words.append(self.get(parameter, item, 0))
+            if not all(words[-1].to_bytes(4, "little")):
+                break
+        return as_text(words)
+
+
+def _said(command: Command, parameter: int, value: int | None = None) -> str:
+    known = {int(one): one.name for one in Parameter}
+    to = f" = {value}" if command is Command.SET and value is not None else ""
+    return " ".join(filter(None, (command.name, known.get(parameter, "") if parameter else ""))) + to
+
+
+def _why(answer: Answer) -> str:
+    if answer.status == Status.NOT_ALLOWED:
+        return f"not allowed, the nearest value is {answer.value}"
+    if answer.status == Status.WRONG_STATE:
+        names = {int(one): one.name.lower() for one in DeviceState}
+        return f"the device is {names.get(answer.value, answer.value)}"
+    if answer.status == Status.LATCHED:
+        return "the device's watchdog or emergency stop has latched; release it first"
+    return "the device does not know it"

@@ -1,0 +1,128 @@
+"""Blocks from the wire in the device's order: gaps are said, repeated and late-coming blocks are counted and skipped."""
+
+from collections.abc import Callable
+
+from rig.drivers.wire.dialogue import Dialogue
+from rig.errors import DaqEmergencyStop, DaqProtocol, DaqReset, DaqTimeout, DaqWatchdog
+from rig.wire.messages import Answer, DeviceFlag, DeviceState, Heartbeat, Message, Samples
+
+__all__ = ["Incoming"]
+
+OLD_BLOCKS_IN_A_ROW = 3  # so many old blocks, each after the other, are a device that counts anew
+IDLE_BEATS = 2  # one may have been under way when the device was started
+STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
+
+
+class Incoming:
+    """What comes in while a device streams.
+
+    ``take`` returns one block after the other. ``shape`` is a block's; a gap of more than ``longest_gap`` samples cannot be,
+    for the watchdog would have ended the stream.
+
+    Errors: `DaqTimeout`, `DaqProtocol`, `DaqReset`, `DaqWatchdog`, `DaqEmergencyStop`.
+    """
+
+    def __init__(
+        self, dialogue: Dialogue, shape: tuple[int, int], longest_gap: int, timeout_s: float, boot: int
+    ) -> None:
+        self._dialogue, self._link, self._clock = dialogue, dialogue.link, dialogue.clock
+        self._shape, self._block, self._longest_gap = shape, shape[0], longest_gap
+        self._boot, self._timeout_s = boot & 0xFF, timeout_s
+        self.on_answer: Callable[[Answer], None] = dialogue.note_stray
+        self.expected = 0
+        """Index of the first sample of the next block."""
+        self.blocks = 0
+        self.lost_samples = 0
+        self.repeated_blocks = 0
+        self.misplaced_blocks = 0
+        self.dropped = 0
+        self._newer: Samples | None = None
+        self._old_in_a_row = 0
+        self._last_old = 0
+        self._idle_beats = 0
+
+    def take(self) -> Samples | None:
+        """The next block; None where it was lost, which is known as soon as a newer one has come."""
+        samples = self._newer
+        if samples is None:
+            samples = self._wait()
+        if samples.first == self.expected:
+            self._newer = None
+            self.blocks += 1
+        else:
+            self._newer = samples
+            self.lost_samples += self._block
+            samples = None
+        self.expected += self._block
+        return samples
+
+    def _wait(self) -> Samples:
+        """The first block that is not older than the one expected."""
+        until = 0.0
+        left_s = self._timeout_s
+        while True:
+            early = self._dialogue.early
+            message: Message | None = early.popleft() if early else self._link.receive(left_s)
+            if message.__class__ is Samples and self._is_good(message):
+                return message
+            if message is not None and message.__class__ is not Samples:
+                self._other(message)
+            now = self._clock()
+            until = until or now + self._timeout_s
+            left_s = until - now
+            if message is None or left_s <= 0.0:
+                raise DaqTimeout(
+                    f"{self._link.name}: the block at sample {self.expected} has not come within {self._timeout_s:g} s"
+                    f"{self._dialogue.damage()}; the device is silent or its cable is damaged"
+                )
+
+    def _is_good(self, samples: Samples) -> bool:
+        first, block = samples.first, self._block
+        if samples.flags & STOPPED:
+            self._raise_stopped(samples.flags)
+        if samples.dropped > self.dropped:
+            self.dropped = samples.dropped
+        if first >= self.expected and first % block == 0 and samples.counts.shape == self._shape:
+            if first - self.expected > self._longest_gap:
+                raise DaqProtocol(
+                    f"{self._link.name}: the device jumps from sample {self.expected} to {first}, "
+                    "further than its watchdog lets it run alone"
+                )
+            self._old_in_a_row = 0
+            return True
+        if first >= self.expected:
+            self.misplaced_blocks += 1
+            return False
+        self.repeated_blocks += 1
+        follows = first == self._last_old + block
+        self._old_in_a_row = self._old_in_a_row + 1 if follows and self._old_in_a_row else 1
+        self._last_old = first
+        if self._old_in_a_row >= OLD_BLOCKS_IN_A_ROW:
+            raise DaqReset(
+                f"{self._link.name}: the device counts its samples anew, from {first}: it was started by another"
+            )
+        return False
+
+    def _other(self, message: Message) -> None:
+        if isinstance(message, Answer):
+            self.on_answer(message)
+        elif isinstance(message, Heartbeat):
+            if message.boot != self._boot:
+                raise DaqReset(
+                    f"{self._link.name}: the device has started anew in the middle of the run; its output is 0 V"
+                )
+            if message.flags & STOPPED:
+                self._raise_stopped(message.flags)
+            self._idle_beats = self._idle_beats + 1 if message.state == DeviceState.IDLE else 0
+            if self._idle_beats >= IDLE_BEATS:
+                raise DaqReset(f"{self._link.name}: the device was stopped by another; its output is 0 V")
+
+    def _raise_stopped(self, flags: int) -> None:
+        if flags & DeviceFlag.EMERGENCY_STOP:
+            raise DaqEmergencyStop(
+                f"{self._link.name}: the emergency stop has brought the output to 0 V; release it first"
+            )
+        raise DaqWatchdog(
+            f"{self._link.name}: the device's watchdog has brought the output to 0 V, for no output had come in time "
+            "(driver.options.watchdog_s)"
+        )

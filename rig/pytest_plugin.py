@@ -1,0 +1,124 @@
+"""pytest against a bench: options, fixtures for an armed and safe rig, markers for what a bench must have, a result file.
+
+Every pytest beside which this package is installed loads it: nothing heavy is imported before a fixture is asked for.
+"""
+
+from collections.abc import Generator, Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from rig.bench import Bench
+    from rig.daq import DAQ
+    from rig.hil.subject import ArmedRig, Subject
+    from simulators.virtual_rig import VirtualRig
+
+DEFAULT_BENCH = "magnet-beam"
+RESULTS = pytest.StashKey["Results"]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The options."""
+    group = parser.getgroup("rig", "tests on a vibration test bench")
+    group.addoption("--rig-bench", metavar="BENCH", help="bench to test: a shipped name or a TOML file")
+    group.addoption(
+        "--rig-emulate", choices=("serial", "can"), help="reach the (virtual) bench through an emulated device"
+    )
+    group.addoption("--rig-arm", action="store_true", help="arm a bench on which something physical moves")
+    group.addoption(
+        "--rig-result", metavar="FILE", help="JSON file to write: bench, device, versions, outcomes, numbers"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Announce the marker; begin the record that goes into the result file."""
+    config.addinivalue_line(
+        "markers",
+        "rig_needs(channels=None, physical=False, virtual=False): what a bench must have, else the test is skipped and says "
+        "so; channels: how many, or their names",
+    )
+    if config.getoption("rig_result"):
+        from rig.hil.results import Results
+
+        config.stash[RESULTS] = Results()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Note the outcome of every test."""
+    report = yield
+    results = item.config.stash.get(RESULTS, None)
+    if results is not None:
+        results.add(report)
+    return report
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Write the result file."""
+    results = session.config.stash.get(RESULTS, None)
+    if results is not None:
+        results.write(session.config.getoption("rig_result"), int(session.exitstatus))
+
+
+@pytest.fixture(scope="session")
+def rig_subject(pytestconfig: pytest.Config) -> Iterator["Subject"]:
+    """What is under test: its bench, device and capabilities. A bench that is missing or out of reach is an error."""
+    from rig.hil.subject import subject
+
+    with subject(
+        pytestconfig.getoption("rig_bench") or DEFAULT_BENCH,
+        wire=pytestconfig.getoption("rig_emulate"),
+        arm=pytestconfig.getoption("rig_arm"),
+    ) as found:
+        results = pytestconfig.stash.get(RESULTS, None)
+        if results is not None:
+            results.subject = found.facts()
+        yield found
+
+
+@pytest.fixture(scope="session")
+def rig_bench(rig_subject: "Subject") -> "Bench":
+    """The bench."""
+    return rig_subject.bench
+
+
+@pytest.fixture
+def rig_daq(rig_subject: "Subject") -> Iterator["DAQ"]:
+    """The bench's driver, open; afterwards its output is at 0 V and it is closed. A physical bench has to be armed."""
+    from rig.drivers import make_daq
+
+    rig_subject.require_arming()
+    with make_daq(rig_subject.bench) as daq:
+        yield daq
+
+
+@pytest.fixture(scope="session")
+def armed_rig(rig_subject: "Subject") -> Iterator["ArmedRig"]:
+    """A rig that carries out plans (``run``), is ramped down after each, however it ends, and let go of at the end."""
+    from rig.hil.subject import ArmedRig
+
+    rig_subject.require_arming()
+    rig = ArmedRig(rig_subject)
+    yield rig
+    rig.close()
+
+
+@pytest.fixture
+def rig_truth(rig_subject: "Subject") -> "VirtualRig":
+    """The virtual rig behind a virtual or emulated bench, whose own truth is known; a test on any other is skipped."""
+    if rig_subject.truth is None:
+        pytest.skip(f"bench {rig_subject.bench.name}: a rig whose truth is known is needed, this one is not virtual")
+    return rig_subject.truth
+
+
+@pytest.fixture(autouse=True)
+def _rig_needs(request: pytest.FixtureRequest) -> None:
+    """Skip where the bench lacks what the test needs; say whose numbers come now."""
+    marker = request.node.get_closest_marker("rig_needs")
+    if marker is not None:
+        lacking = request.getfixturevalue("rig_subject").lacking(**marker.kwargs)
+        if lacking:
+            pytest.skip(lacking)
+    if "armed_rig" in request.fixturenames:
+        request.getfixturevalue("armed_rig").properties = request.node.user_properties

@@ -1,0 +1,125 @@
+"""Blocks from frames: sequence numbers unwrapped, parts put together, in bounded memory."""
+
+import numpy as np
+
+__all__ = ["OPEN_BLOCKS", "Blocks"]
+
+OPEN_BLOCKS = 4
+"""Blocks of which frames may be under way at the same time; the oldest gives way."""
+
+
+_NEVER = 1 << 30
+
+
+class _Open:
+    """A block of which frames are missing."""
+
+    def __init__(self, shape: tuple[int, int], n_frames: int) -> None:
+        self.counts = np.zeros(shape, np.int16)
+        self.missing = n_frames
+        self.seen = bytearray(n_frames)
+        self.flags = 0
+
+
+class Blocks:
+    """Puts blocks together from frames that may be lost, doubled or swapped.
+
+    A frame says its sequence number, modulo ``wrap``, and its part. It is taken for the nearest group ahead of the last one if
+    that is less than half a wrap away, else for one behind. A whole block ends all older ones: time does not go back. A group
+    index from elsewhere (`mark`) puts right what a loss of half a wrap or more has confused, once a frame agrees with it.
+    """
+
+    def __init__(self, counters: dict[str, int], wrap: int, parts: int, rows: int, n: int, n_channels: int) -> None:
+        self._counters = counters
+        self._wrap, self._parts, self._rows = wrap, parts, rows
+        self._shape = (n, n_channels)
+        self._per_block = -(-n // rows)
+        self._open: dict[int, _Open] = {}
+        self._oldest = 0
+        """The first block that may still come."""
+        self._next = 0
+        """The group after the newest one."""
+        self._mark: int | None = None
+
+    @property
+    def bytes_held(self) -> int:
+        """Memory of the blocks under way."""
+        return sum(block.counts.nbytes + len(block.seen) for block in self._open.values())
+
+    def begin(self, block: int) -> None:
+        """The first block to come, where it is not block 0."""
+        self._oldest, self._next = block, block * self._per_block
+
+    def mark(self, sample: int) -> None:
+        """Somebody who knows says that this sample is next. Believed if it cannot be told from the sequence numbers."""
+        n = self._shape[0]
+        group = sample // n * self._per_block
+        far = sample % n == 0 and group - self._next >= self._wrap // 2
+        self._mark = group if far else None
+
+    def rows_of(self, sequence: int) -> int:
+        """Rows in the group of this number."""
+        row = self._group(sequence) % self._per_block * self._rows
+        return min(self._rows, self._shape[0] - row)
+
+    def put(
+        self, sequence: int, part: int, columns: slice, counts: np.ndarray, flags: int
+    ) -> tuple[int, np.ndarray, int] | None:
+        """Take the counts (int16, rows by columns) of a frame; return number, counts and flags of a block that is whole now."""
+        group = self._group(sequence)
+        if self._mark is not None and group == self._mark:
+            self._count("resynchronised")
+            self._drop(group // self._per_block)
+        self._mark = None
+        self._next = max(self._next, group + 1)
+        block, place = divmod(group, self._per_block)
+        if block < self._oldest:
+            self._count("repeated_frames")
+            return None
+        if self._per_block * self._parts == 1:
+            self._drop(block + 1)
+            return block, counts, flags
+        return self._add(block, place, part, columns, counts, flags)
+
+    def _add(
+        self, block: int, place: int, part: int, columns: slice, counts: np.ndarray, flags: int
+    ) -> tuple[int, np.ndarray, int] | None:
+        held = self._open.get(block)
+        if held is None:
+            held = self._open[block] = _Open(self._shape, self._per_block * self._parts)
+            if len(self._open) > OPEN_BLOCKS:
+                self._drop(sorted(self._open)[1])
+                if block < self._oldest:
+                    return None
+        frame = place * self._parts + part
+        into = held.counts[place * self._rows : place * self._rows + len(counts), columns]
+        if held.seen[frame]:
+            self._count("repeated_frames")
+            if not np.array_equal(into, counts):
+                held.missing = _NEVER  # one of the two is false, and nobody knows which
+            return None
+        held.seen[frame] = 1
+        held.missing -= 1
+        held.flags |= flags
+        into[...] = counts
+        if held.missing:
+            return None
+        del self._open[block]
+        self._drop(block + 1)
+        return block, held.counts, held.flags
+
+    def _group(self, sequence: int) -> int:
+        """The group that a sequence number stands for."""
+        base = self._next if self._mark is None or sequence != self._mark % self._wrap else self._mark
+        ahead = (sequence - base) % self._wrap
+        return base + ahead - self._wrap * (ahead >= self._wrap // 2)  # below 0: from before the start, and too old
+
+    def _drop(self, oldest: int) -> None:
+        """Give up what is older than this block."""
+        self._oldest = oldest
+        for block in [block for block in self._open if block < oldest]:
+            del self._open[block]
+            self._count("incomplete_blocks")
+
+    def _count(self, name: str) -> None:
+        self._counters[name] += 1

@@ -1,0 +1,99 @@
+"""`CanLink`: one end of the protocol on a bus, host or device."""
+
+import time
+from pathlib import Path
+
+from rig.wire.can.bus import FrameBus
+from rig.wire.can.codec import CanCodec
+from rig.wire.can.load import bus_load
+from rig.wire.can.protocol import protocol
+from rig.wire.link import Link, Load
+from rig.wire.messages import Message, Output, Samples, Stream
+
+__all__ = ["CanLink"]
+
+COMMAND_S = 0.1
+"""How long a command may wait for the bus."""
+SHORTEST_DEADLINE_S = 0.005
+_FRAMES_A_CALL = 256  # a bus full of strangers does not keep a call that must not wait
+
+
+class CanLink(Link):
+    """The protocol on a bus, for a number of channels and a node.
+
+    Samples and outputs that cannot be sent within the time of a block expire: they are dropped and counted ("expired_frames").
+    A device's answers to one host are its own business: two devices under one node are noticed by who asks them.
+    """
+
+    def __init__(
+        self,
+        bus: FrameBus,
+        n_channels: int,
+        fd: bool = False,
+        node: int = 1,
+        bit_rate_hz: float = 1e6,
+        data_bit_rate_hz: float = 2e6,
+        dbc: str | Path | None = None,
+        device: bool = False,
+    ) -> None:
+        super().__init__(f"{bus.name}, node {node}")
+        self._bus = bus
+        self._protocol = protocol(n_channels, fd, node, dbc)
+        self.counters = bus.counters
+        self._codec = CanCodec(self._protocol, device, self.counters)
+        self._rates_hz = (bit_rate_hz, data_bit_rate_hz)
+        self._deadline_s = COMMAND_S
+
+    def open(self) -> None:
+        """Open the bus."""
+        self._bus.open()
+
+    def configure(self, stream: Stream) -> None:
+        """Agree on the stream; `DaqRefused` for a block that the frames' sequence numbers cannot tell apart."""
+        self._codec.configure(stream)
+        self._deadline_s = max(stream.block / stream.rate_hz, SHORTEST_DEADLINE_S)
+
+    def send(self, message: Message) -> None:
+        """Send one message; one that cannot be sent in time is dropped, for what it says will be out of date."""
+        streamed = isinstance(message, Samples | Output)
+        deadline = time.monotonic() + (self._deadline_s if streamed else COMMAND_S)
+        for frame in self._codec.encode(message):
+            if not self._bus.send(frame, max(deadline - time.monotonic(), 0.0)):
+                return  # a block without one of its frames is none
+
+    def receive(self, timeout_s: float) -> Message | None:
+        """The next message."""
+        deadline = time.monotonic() + timeout_s
+        wait_s = timeout_s
+        for _ in range(_FRAMES_A_CALL):
+            frame = self._bus.receive(wait_s)
+            if frame is not None:
+                message = self._codec.decode(frame)
+                if message is not None:
+                    return message
+            wait_s = max(deadline - time.monotonic(), 0.0) if timeout_s else 0.0
+            if frame is None and wait_s == 0.0:
+                return None
+        return None
+
+    def load(self, stream: Stream) -> Load:
+        """Both directions, with worst-case stuffing, heartbeats and indices.
+
+        Raises `DaqRefused` for a stream that no frames can carry, however fast the bus.
+        """
+        self._codec.check(stream)
+        return bus_load(self._protocol.shape, stream, *self._rates_hz)
+
+    @property
+    def layout_crc(self) -> int:
+        """CRC-32 of the compiled definition."""
+        return self._protocol.layout.crc
+
+    @property
+    def largest_block(self) -> int:
+        """Samples a block may have on this bus."""
+        return self._protocol.shape.largest_block
+
+    def close(self) -> None:
+        """Let go of the bus."""
+        self._bus.close()

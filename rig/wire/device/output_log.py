@@ -1,0 +1,40 @@
+"""What a device puts out, written down: so that somebody else can see when it came to 0 V."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from rig.wire.device.plant import Plant
+
+__all__ = ["LoggedPlant"]
+
+
+class LoggedPlant:
+    """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V."""
+
+    def __init__(self, plant: Plant, path: Path) -> None:
+        self._plant = plant
+        self._file = path.open("w", buffering=1, encoding="ascii")
+        self._first = 0
+        for name in ("names", "range_v", "v_per_count", "skew_s", "output_range_v", "output_v_per_count"):
+            setattr(self, name, getattr(plant, name))
+        self.bits, self.rate_hz, self.filter_delay_s = plant.bits, plant.rate_hz, plant.filter_delay_s
+
+    names: tuple[str, ...]
+    range_v: np.ndarray
+    v_per_count: np.ndarray
+    skew_s: np.ndarray
+    output_range_v: float
+    output_v_per_count: float
+
+    def reset(self) -> None:
+        """Sample 0."""
+        self._plant.reset()
+        self._first = 0
+
+    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
+        """Write down, then measure."""
+        self._file.write(f"{time.monotonic():.6f} {self._first} {np.abs(voltages).max():.6g}\n")
+        self._first += voltages.size
+        return self._plant.step(voltages)

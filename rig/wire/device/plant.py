@@ -1,0 +1,145 @@
+"""What a device measures: something that takes voltages and gives back converter counts."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.drivers.virtual import VirtualDAQ
+from rig.errors import ConfigurationError
+from rig.wire.messages import DeviceFlag
+from simulators.layout import Flag
+
+__all__ = ["Plant", "VirtualPlant", "Wiring"]
+
+WHOLE_RANGE = 2.0**31  # counts of a converter without steps, in 32 bits
+
+
+class Plant(Protocol):
+    """What stands behind a device's converters."""
+
+    names: tuple[str, ...]
+    range_v: np.ndarray
+    v_per_count: np.ndarray
+    skew_s: np.ndarray
+    output_range_v: float
+    output_v_per_count: float
+    bits: int
+    rate_hz: float
+    filter_delay_s: float
+
+    def reset(self) -> None:
+        """Back to rest, at sample 0."""
+
+    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
+        """Hold one voltage a sample [n]; returns the counts [n, n_channels] and `DeviceFlag` bits."""
+
+
+class Wiring:
+    """How the sensors are connected: right, or as it happens on a Monday. The plant itself is as it is.
+
+    ``flip``: sensors the other way round. ``dead``: channels that are connected to nothing and read the converter's last bit.
+    ``swap``: pairs of sensors in each other's sockets.
+    """
+
+    def __init__(
+        self,
+        names: tuple[str, ...],
+        flip: tuple[str, ...] = (),
+        dead: tuple[str, ...] = (),
+        swap: tuple[tuple[str, str], ...] = (),
+    ) -> None:
+        for key, given in {"flip": flip, "dead": dead, "swap": tuple(name for pair in swap for name in pair)}.items():
+            for name in given:
+                if name not in names:
+                    raise ConfigurationError(
+                        f"{key} = {name!r}: there is no such channel, allowed is {', '.join(names)}"
+                    )
+        at = {name: index for index, name in enumerate(names)}
+        self._order = np.arange(len(names))
+        for first, second in swap:
+            pair = [at[first], at[second]]
+            self._order[pair] = self._order[pair[::-1]]
+        self._sign = np.array([-1 if name in flip else 1 for name in names])
+        self._dead = [at[name] for name in dead]
+        self.as_it_should_be = not (flip or dead or swap)
+
+    def connect(self, counts: np.ndarray, first: int) -> np.ndarray:
+        """Counts [n, n_channels] as the device gets them; ``first`` is the index of the first row."""
+        out = counts[:, self._order] * self._sign
+        for channel in self._dead:
+            out[:, channel] = (np.arange(first, first + counts.shape[0]) * 7919 >> 4) & 1
+        return np.asarray(np.clip(out, np.iinfo(counts.dtype).min, np.iinfo(counts.dtype).max), dtype=counts.dtype)
+
+
+class VirtualPlant:
+    """The virtual rig of a bench, its converters' counts as they are: scaled by the volts of a count they are its readings.
+
+    A rig that has diverged reads full scale, overloaded.
+    """
+
+    def __init__(self, bench: Bench, seed: int = 0, wiring: Wiring | None = None) -> None:
+        if bench.driver.name != "virtual":
+            raise ConfigurationError(
+                f"driver.name = {bench.driver.name!r}: allowed is 'virtual', for what is emulated is a virtual rig"
+            )
+        options: Mapping[str, object] = {
+            key: value for key, value in bench.driver.options.items() if key not in ("queue_blocks", "delay_samples")
+        }
+        driver = bench.driver.model_copy(update={"options": dict(options)})
+        self._daq = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed)
+        converter = self._daq.rig.converter
+        self.names = tuple(self._daq.rig.channel_names)
+        self.bits = 16 if 1 <= converter.adc_bits <= 16 and 1 <= converter.dac_bits <= 16 else 32
+        step_v = converter.adc_step_v or converter.adc_range_v / WHOLE_RANGE
+        self.v_per_count = np.full(len(self.names), step_v)
+        self.range_v = np.full(len(self.names), converter.adc_range_v)
+        self.skew_s = self._daq.rig.channel_delays_samples / bench.sample_rate_hz
+        self.output_range_v = converter.dac_range_v
+        self.output_v_per_count = converter.dac_step_v or converter.dac_range_v / WHOLE_RANGE
+        self.rate_hz = bench.sample_rate_hz
+        self.filter_delay_s = self._daq.rig.filter_delay_samples / bench.sample_rate_hz
+        self._wiring = wiring if wiring is not None and not wiring.as_it_should_be else None
+        self._dtype = np.dtype(f"<i{self.bits // 8}")
+        self._first = 0
+        self._volts = np.empty((0, len(self.names)))
+        self._flags = {
+            int(Flag.SENSOR_CLIPPED): int(DeviceFlag.OVERLOAD),
+            int(Flag.DIVERGED): int(DeviceFlag.OVERLOAD),
+            int(Flag.DAC_CLIPPED): int(DeviceFlag.OUTPUT_CLIPPED),
+            int(Flag.AMPLIFIER_CLIPPED): int(DeviceFlag.OUTPUT_CLIPPED),
+        }
+        self._daq.open()
+
+    def reset(self) -> None:
+        """Back to rest, at sample 0, with the noise of the same seed."""
+        self._daq.stop()
+        self._daq.start(1)  # its flags are those of one sample now: the buffers are made anew with the first block
+        self._volts = np.empty((0, len(self.names)))
+        self._first = 0
+
+    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
+        """Advance the virtual rig by one sample a voltage."""
+        n = voltages.size
+        if self._volts.shape[0] != n:
+            self._volts = np.empty((n, len(self.names)))
+            self._daq.flags = np.zeros(n, np.uint16)
+        self._daq._exchange(voltages, self._volts)
+        counts, flags = self._counted()
+        if self._wiring is not None:
+            counts = self._wiring.connect(counts, self._first)
+        self._first += n
+        return counts, flags
+
+    def _counted(self) -> tuple[np.ndarray, int]:
+        """The readings as counts: they lie on the converter's steps and within its range, so nothing is lost."""
+        raised = int(self._daq.flags[0]) if self._daq.flags.size == 1 else int(np.bitwise_or.reduce(self._daq.flags))
+        scaled = self._volts / self.v_per_count
+        flags = 0
+        if raised:
+            for bit, device_bit in self._flags.items():
+                flags |= device_bit if raised & bit else 0
+            if raised & Flag.DIVERGED:
+                scaled = np.nan_to_num(scaled, nan=2.0 ** (self.bits - 1) - 1.0)
+        return np.rint(scaled, out=scaled).astype(self._dtype), flags

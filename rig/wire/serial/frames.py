@@ -1,0 +1,85 @@
+"""Frames on a serial line: payload and CRC-32, encoded by COBS so that a zero occurs only between them.
+
+COBS: S. Cheshire, M. Baker, Consistent overhead byte stuffing, IEEE/ACM Transactions on Networking 7 (1999) 159-172.
+"""
+
+from zlib import crc32
+
+from cobs import cobs
+
+from rig.wire.messages import Message, Stream
+from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Oversize
+
+__all__ = ["COUNTERS", "FrameReader", "frame", "largest_frame", "payload_of"]
+
+CRC_SIZE = 4
+RESIDUE = crc32(bytes(CRC_SIZE))  # of any bytes with their CRC-32 behind them, low byte first
+LONGEST_RUN = 254  # bytes of a COBS block
+
+COUNTERS = ("crc_errors", "oversize_frames", "malformed", "foreign_versions", "garbage_bytes")
+"""What a `FrameReader` counts: frames that were damaged, too long, no message, of another version; bytes of all these."""
+
+
+def frame(payload: bytes) -> bytes:
+    """The bytes of one payload on the line, with the zero that ends them."""
+    return bytes(cobs.encode(payload + crc32(payload).to_bytes(CRC_SIZE, "little"))) + b"\0"
+
+
+def payload_of(encoded: bytes) -> bytes:
+    """The payload of one frame without its zero. Raises `Damaged`."""
+    try:
+        data: bytes = cobs.decode(encoded)
+    except cobs.DecodeError as error:
+        raise Damaged(str(error)) from error
+    if crc32(data) != RESIDUE or len(data) < CRC_SIZE:
+        raise Damaged(f"CRC-32 of {len(data)} bytes")
+    return data[:-CRC_SIZE]
+
+
+def largest_frame(payload_size: int) -> int:
+    """Bytes on the line of a payload in the worst case, with the zero that ends them."""
+    size = payload_size + CRC_SIZE
+    return size + size // LONGEST_RUN + 2
+
+
+class FrameReader:
+    """Messages out of a stream of bytes in any pieces.
+
+    What is not a message is counted in ``counters`` and skipped; the next zero begins anew. Never holds more than one frame.
+    """
+
+    def __init__(self, codec: Codec, counters: dict[str, int]) -> None:
+        self._codec = codec
+        self._counters = counters
+        self._rest = b""
+        self._skipping = False  # inside a frame that is too long already
+        self._longest = largest_frame(LARGEST_PAYLOAD)
+        counters.update((name, counters.get(name, 0)) for name in COUNTERS)
+
+    def configure(self, stream: Stream) -> None:
+        """Expect no frame longer than those of a stream."""
+        self._longest = largest_frame(max(*Codec.sizes(stream), 64))
+
+    def feed(self, data: bytes) -> list[Message]:
+        """Messages that are complete with these bytes, in order."""
+        parts = data.split(b"\0")
+        parts[0] = self._rest + parts[0]
+        self._rest = parts.pop()
+        if self._skipping and parts:
+            self._counters["garbage_bytes"] += len(parts.pop(0))
+            self._skipping = False
+        messages: list[Message] = []
+        for part in parts:
+            try:
+                if len(part) >= self._longest:
+                    raise Oversize
+                if part:
+                    messages.append(self._codec.decode(payload_of(part)))
+            except Malformed as remark:
+                self._counters[remark.counter] += 1
+                self._counters["garbage_bytes"] += len(part)
+        if self._skipping or len(self._rest) >= self._longest:
+            self._counters["oversize_frames"] += not self._skipping
+            self._counters["garbage_bytes"] += len(self._rest)
+            self._rest, self._skipping = b"", True
+        return messages

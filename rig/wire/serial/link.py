@@ -1,0 +1,174 @@
+"""`SerialLink`: messages over a serial port or any other descriptor that carries bytes."""
+
+import os
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from select import select
+from typing import Any, Self
+
+from rig.errors import DaqDisconnected, DaqRefused, DaqTimeout
+from rig.wire.link import Link, Load
+from rig.wire.messages import Message, Output, Samples, Stream
+from rig.wire.serial.codec import Codec
+from rig.wire.serial.frames import FrameReader, frame
+from rig.wire.serial.load import line_load
+from rig.wire.serial.pty import is_pseudo_terminal
+
+__all__ = ["SerialLink"]
+
+STREAMED = (Samples, Output)
+CHUNK = 4096  # bytes a read; a pseudo-terminal holds no more
+PATIENCE_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
+
+
+class SerialLink(Link):
+    """One end of a serial line.
+
+    A write that the line does not take within ``patience_s`` raises `DaqTimeout`; what has been begun of a frame is finished
+    first, so that the other end sees whole frames. Not to be used from two threads at a time.
+
+    The descriptor is waited for by ``select`` and then read once, all that there is: many frames may come at a time. On Linux
+    and macOS; Windows gives no descriptors, and `open` says so.
+    """
+
+    def __init__(self, name: str, opener: Callable[[], tuple[int, Any]], baud: int, patience_s: float) -> None:
+        super().__init__(name)
+        self._opener = opener
+        self._baud = baud
+        self._patience_s = patience_s
+        self._descriptor = -1
+        self._port: Any = None
+        self._codec = Codec()
+        self._reader = FrameReader(self._codec, self.counters)
+        self._received: deque[Message] = deque()
+        self._unfinished = b""
+        self.counters["unsent_frames"] = 0
+
+    @classmethod
+    def port(cls, path: str, baud: int, patience_s: float = PATIENCE_S) -> Self:
+        """The host's end: a serial port by its name, or the far end of a pseudo-terminal."""
+
+        def opened() -> tuple[int, Any]:
+            if sys.platform == "win32":
+                raise DaqRefused(
+                    f"port {path!r}: serial devices are driven on Linux and macOS only; on Windows use CAN"
+                )
+            from rig.wire.serial.port import open_port
+
+            port = open_port(path, baud)
+            return port.fileno(), port
+
+        return cls(path, opened, baud, patience_s)
+
+    @classmethod
+    def on(cls, descriptor: int, name: str, baud: int = 0, patience_s: float = 0.0) -> Self:
+        """A descriptor that is open already and stays the caller's, such as the near end of a pseudo-terminal."""
+
+        def opened() -> tuple[int, Any]:
+            os.set_blocking(descriptor, False)
+            return descriptor, None
+
+        return cls(name, opened, baud, patience_s)
+
+    def open(self) -> None:
+        """Open the port and forget what it still held; nothing is sent."""
+        self.close()
+        self._descriptor, self._port = self._opener()
+        self._reader = FrameReader(self._codec, self.counters)
+
+    def configure(self, stream: Stream) -> None:
+        """Agree on the shape of samples and outputs."""
+        self._codec.configure(stream)
+        self._reader.configure(stream)
+
+    def send(self, message: Message) -> None:
+        """Send one message; `DaqTimeout` says that the line takes no more, and that nothing of it was sent."""
+        data = frame(self._codec.encode(message))
+        if not isinstance(message, STREAMED):
+            data = b"\0" + data  # ends what noise on an idle line may have begun
+        if self._unfinished:
+            data = self._unfinished + data
+        written = self._write(data)
+        if written == len(data):
+            self._unfinished = b""
+        else:
+            self._send_slowly(data, written)
+
+    def receive(self, timeout_s: float) -> Message | None:
+        """Return the next message; wait for it at most so long."""
+        received = self._received
+        if received:
+            return received.popleft()
+        if timeout_s <= 0.0:
+            received.extend(self._reader.feed(self._read()))
+            return received.popleft() if received else None
+        deadline = time.monotonic() + timeout_s
+        while timeout_s > 0.0 and self._ready(timeout_s):
+            received.extend(self._reader.feed(self._read()))
+            if received:
+                return received.popleft()
+            timeout_s = deadline - time.monotonic()
+        return None
+
+    def load(self, stream: Stream) -> Load:
+        """Bits per second of the busier direction, ten a byte, against the baud rate; once open."""
+        unlimited = not self._baud or is_pseudo_terminal(self._descriptor)
+        return line_load(stream, None if unlimited else self._baud)
+
+    def close(self) -> None:
+        """Let go of the port."""
+        port, self._port, self._descriptor = self._port, None, -1
+        self._received.clear()
+        self._unfinished = b""
+        if port is not None:
+            with suppress(Exception):  # what a vanished port raises differs by system, and it is gone either way
+                port.close()
+
+    def _ready(self, timeout_s: float) -> bool:
+        try:
+            return bool(select((self._descriptor,), (), (), timeout_s)[0])
+        except (OSError, ValueError) as error:
+            raise self._gone(error) from error
+
+    def _read(self) -> bytes:
+        try:
+            data = os.read(self._descriptor, CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise self._gone(error) from error
+        if not data:
+            raise self._gone("end of file")
+        return data
+
+    def _write(self, data: bytes) -> int:
+        try:
+            return os.write(self._descriptor, data)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise self._gone(error) from error
+
+    def _send_slowly(self, data: bytes, written: int) -> None:
+        old = len(self._unfinished)
+        deadline = time.monotonic() + self._patience_s
+        while written < len(data) and (left_s := deadline - time.monotonic()) > 0.0:
+            try:
+                select((), (self._descriptor,), (), left_s)
+            except (OSError, ValueError) as error:
+                raise self._gone(error) from error
+            written += self._write(data[written:])
+        if written > old:
+            self._unfinished = data[written:]  # the rest goes before the next message
+            return
+        self._unfinished = data[written:old]
+        self.counters["unsent_frames"] += 1
+        raise DaqTimeout(f"{self.name}: the line takes no more bytes: the other end does not read")
+
+    def _gone(self, why: object) -> DaqDisconnected:
+        if self._descriptor < 0:
+            return DaqDisconnected(f"{self.name}: the port is not open")
+        return DaqDisconnected(f"{self.name}: the port is gone (unplugged or switched off): {why}")

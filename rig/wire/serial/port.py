@@ -1,0 +1,65 @@
+"""Serial ports: found, opened and configured by pyserial, then read and written by their descriptor."""
+
+import errno
+import os
+import termios
+from contextlib import suppress
+from typing import Any
+
+import serial
+from serial.tools import list_ports
+
+from rig.errors import DaqBusy, DaqDisconnected, DaqError, DaqRefused
+
+__all__ = ["open_port", "port_names"]
+
+BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: somebody holds its lock
+CONTROL_CHARACTERS = 6  # in the list that termios returns
+
+
+def port_names() -> list[str]:
+    """Serial ports that the system knows of; pseudo-terminals are not among them."""
+    return sorted(str(port.device) for port in list_ports.comports())
+
+
+def open_port(path: str, baud: int) -> Any:
+    """A port of pyserial, 8N1, held for us alone, old input dropped; reading its descriptor never waits.
+
+    Raises `DaqBusy`, `DaqDisconnected` or `DaqRefused` with what is there and what to do.
+    """
+    try:
+        port = serial.Serial(path, baud, timeout=0, exclusive=True)
+    except (OSError, ValueError, OverflowError, termios.error) as error:
+        raise _refusal(path, baud, error) from error
+    try:
+        with suppress(ValueError, OSError):  # an adapter may keep bytes back for 16 ms, and has no such setting or does
+            port.set_low_latency_mode(True)
+        _no_bytes_means_gone(port.fileno())
+        port.reset_input_buffer()
+    except (OSError, termios.error) as error:
+        port.close()
+        raise DaqDisconnected(f"port {path!r}: it went while it was being opened: {error}") from error
+    return port
+
+
+def _no_bytes_means_gone(descriptor: int) -> None:
+    """VMIN = 1: a read without input says so (EAGAIN), and one of 0 bytes can only mean that the port is gone."""
+    os.set_blocking(descriptor, False)
+    attributes = termios.tcgetattr(descriptor)
+    characters = attributes[CONTROL_CHARACTERS]
+    characters[termios.VMIN], characters[termios.VTIME] = 1, 0
+    termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+
+
+def _refusal(path: str, baud: int, error: Exception) -> DaqError:
+    number = getattr(error, "errno", None)
+    if number in BUSY:
+        return DaqBusy(f"port {path!r}: somebody else holds it; close the other program")
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO):
+        there = ", ".join(port_names()) or "none"
+        return DaqDisconnected(f"port {path!r}: it is not there; serial ports here: {there}")
+    if number in (errno.EACCES, errno.EPERM):
+        return DaqRefused(f"port {path!r}: no permission to open it; on Linux, join the group that owns it (dialout)")
+    if number is None:
+        return DaqRefused(f"port {path!r} at {baud} baud: {error}")
+    return DaqRefused(f"port {path!r}: it cannot be opened as a serial port: {error}")

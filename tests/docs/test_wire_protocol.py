@@ -1,0 +1,134 @@
+"""A device can be made from the page on the wire protocol alone: its tables, sums and known answers are the product's."""
+
+import re
+
+import numpy as np
+import pytest
+
+from rig.drivers.serial import SerialOptions
+from rig.wire.messages import (
+    ARM_KEY,
+    VERSION,
+    Answer,
+    Command,
+    DeviceFlag,
+    DeviceState,
+    EmergencyStop,
+    Heartbeat,
+    Output,
+    Parameter,
+    Request,
+    Samples,
+    Status,
+    Stream,
+)
+from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec
+from rig.wire.serial.frames import FrameReader, frame
+from rig.wire.serial.load import line_load
+from tests.docs import wire
+from tests.docs.tables import table_under
+from tests.docs.test_keys import shown_default, shown_range
+from tests.rig.wire.serial.strategies import same
+
+KINDS = {
+    "Request": Request,
+    "Answer": Answer,
+    "Samples": Samples,
+    "Output": Output,
+    "Heartbeat": Heartbeat,
+    "Emergency stop": EmergencyStop,
+}
+TABLES = {
+    "Commands": (Command, Status),
+    "States": (DeviceState,),
+    "Parameters": (Parameter,),
+    "Flags": (DeviceFlag,),
+}
+
+
+def numbers(text):
+    return {(int(number), name) for number, name in re.findall(r"^\| (\d+) \| ([A-Z_0-9]+) \|", text, re.MULTILINE)}
+
+
+def spaced(text):
+    return bytes.fromhex(text.replace(" ", ""))
+
+
+@pytest.mark.parametrize("section", TABLES)
+def test_its_tables_name_every_number_and_no_other(section):
+    ours = {(int(one), one.name) for table in TABLES[section] for one in table}
+    assert numbers(wire.sections()[section]) == ours
+
+
+def test_the_version_and_the_key_that_arms_are_those_in_force():
+    page = wire.PAGE.read_text(encoding="utf-8")
+    assert re.findall(r"Version of the protocol: \*\*(\d+)\*\*", page) == [str(VERSION)]
+    assert f"0x{ARM_KEY:08X}" in wire.sections()["Commands"]
+    assert re.findall(r"longer than (\d+) bytes", wire.sections()["Frames"]) == [str(LARGEST_PAYLOAD)]
+
+
+def test_the_keys_of_the_driver_are_those_of_its_options():
+    heading = "Keys of `[driver.options]` of the serial driver"
+    table = table_under(heading, wire.PAGE.read_text(encoding="utf-8"))["table"]
+    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table, re.MULTILINE)
+    fields = SerialOptions.model_fields
+    assert {key for key, _, _ in rows} == set(fields)
+    for key, default, allowed in rows:
+        assert default.strip() == shown_default(fields[key]), key
+        assert allowed.strip().startswith(shown_range(fields[key])), key
+
+
+def test_its_words_on_cobs_and_crc_hold_for_its_own_examples():
+    text = wire.sections()["Frames"]
+    examples = re.findall(r"`([0-9a-f ]+)` becomes `([0-9a-f ]+)`", text)
+    assert len(examples) == 2
+    for plain, encoded in examples:
+        assert wire.cobs(spaced(plain)) == spaced(encoded)
+        assert wire.uncobs(spaced(encoded)) == spaced(plain)
+    assert f"`123456789` it is 0x{wire.crc32(b'123456789'):08X}" in text
+
+
+def message_of(vector):
+    kind = KINDS[vector["message"]]
+    values = {name: vector[name] for name in kind._fields if name in vector}
+    if "counts" in values:
+        values["counts"] = np.array(values["counts"], f"int{vector['bits']}")
+    return kind(**values)
+
+
+@pytest.mark.parametrize("number", range(8))
+def test_known_answers_follow_from_its_tables_and_are_what_the_product_speaks(number):
+    vectors = wire.vectors()
+    assert len(vectors) == 8
+    vector = vectors[number]
+    payload, line = bytes.fromhex(vector["payload"]), bytes.fromhex(vector["line"])
+    bits = vector.get("bits", 16)
+    section = f"{vector['message']}, type {vector['type']}"
+    assert wire.packed(section, {**vector, "version": VERSION}, bits) == payload
+    assert wire.on_the_line(payload) == line
+
+    stream = Stream(2, 2, 1000.0, bits)
+    codec, counters = Codec(), {}
+    codec.configure(stream)
+    message = message_of(vector)
+    assert frame(codec.encode(message)) == line
+    (got,) = FrameReader(codec, counters).feed(line)
+    assert same(got, message)
+    assert not any(counters.values())
+
+
+def test_a_line_is_loaded_as_its_table_says():
+    rows = {
+        name: [float(value.strip(" %")) for value in values.split("|")]
+        for name, values in re.findall(r"^\| ([\w ,]+?) \| ([\d |%]+) \|$", wire.sections()["Load"], re.MULTILINE)
+    }
+    columns = zip(
+        rows["samples a block"], rows["bytes a block"], rows["line at 5 kHz"], rows["highest rate, Hz"], strict=True
+    )
+    for block, size, percent, highest_hz in columns:
+        payload = 28 + 2 * block * 4 + 4
+        assert size == payload + payload // 254 + 2
+        load = line_load(Stream(4, int(block), 5000.0), 3_000_000)
+        assert load.needed_bit_s == 10 * (5000 / block * size + 10 * 23)
+        assert round(100 * load.share) == percent
+        assert line_load(Stream(4, int(block), highest_hz), 3_000_000).share == pytest.approx(0.9, abs=1e-4)

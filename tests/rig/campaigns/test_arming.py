@@ -1,0 +1,201 @@
+"""Who may let something physical move, and what is recorded of it."""
+
+import io
+import json
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+import rig
+from rig.campaigns.about import About
+from rig.campaigns.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
+from rig.check.check import check
+from rig.cli_arming import ask
+from rig.errors import ConfigurationError, NotArmed
+from rig.summary import summarise
+from rig.tables import print_summary
+from rig.tuning.tuning import tune
+from tests.rig.check.rewired import flipped, rewire
+from tests.rig.rigs import bench_with
+from tests.rig.test_runs import plan_with
+
+PLAN = plan_with(levels_v=(0.4,), record_periods=4)
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path, monkeypatch):
+    """A state folder of our own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@pytest.fixture
+def physical(monkeypatch):
+    """Everything that is opened passes for something physical."""
+    rewire(monkeypatch, None, virtual=False)
+
+
+def bench(**arming):
+    return bench_with({"name": "beam next door", "block": 50, "arming": arming})
+
+
+def passed(chosen, hours_ago=0.0, failed=()):
+    at = datetime.now(UTC) - timedelta(hours=hours_ago)
+    return RememberedCheck(at.isoformat(), failed, "check.h5", fingerprint(chosen))
+
+
+def armed(run):
+    return run.recording.parts[-1].information["about"]["armed"]
+
+
+def test_a_virtual_rig_arms_itself_and_nothing_is_remembered_of_it(tmp_path, state):
+    with rig.run(PLAN, bench=bench()) as run:
+        assert armed(run)["how"] == "virtual"
+    check(bench(), tmp_path / "check.h5")
+    assert not state.exists()
+
+
+@pytest.mark.usefixtures("physical")
+@pytest.mark.parametrize("arm", [None, False])
+def test_nobody_has_armed_it_nothing_moves_and_the_line_says_how(tmp_path, arm):
+    with pytest.raises(NotArmed, match=r"beam next door: .*--arm.*arm=True"):
+        rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=arm)
+    assert not (tmp_path / "run.h5").exists()
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_word_given_beforehand_arms_and_is_recorded_with_what_spoke_against_it(monkeypatch):
+    monkeypatch.setenv("VIBROLOCK_OPERATOR", "Ada")
+    with rig.run(PLAN, bench=bench(), arm=True) as run:
+        assert run.complete
+        assert (armed(run)["how"], armed(run)["by"]) == ("switch", "Ada")
+        assert "never checked" in armed(run)["cautions"][0]
+        assert run.recording.parts[0].information["about"]["device"]["serial number"] == "7"
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_person_is_shown_bench_device_limits_and_check_and_types_the_name(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdin", io.StringIO("beam next door\n"))
+    with rig.run(PLAN, bench=bench(), arm=ask) as run:
+        assert armed(run)["how"] == "person"
+    shown = capsys.readouterr().err
+    for part in ("beam next door", "serial number 7", "9.5 V, 40 N", "never", "CAUTION"):
+        assert part in shown
+    monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
+    with pytest.raises(NotArmed, match="nothing has moved"):
+        rig.run(PLAN, bench=bench(), arm=ask)
+
+
+@pytest.mark.usefixtures("physical")
+@pytest.mark.parametrize(
+    ("remembered", "caution"),
+    [
+        (lambda b: passed(b), None),
+        (lambda b: passed(b, failed=("polarity drive",)), "failed: polarity drive"),
+        (lambda b: passed(b, hours_ago=25.0), "25.0 h old"),
+        (lambda b: replace(passed(b), fingerprint="another"), "other channels"),
+    ],
+)
+def test_an_automated_bench_arms_itself_only_with_a_check_that_counts(remembered, caution):
+    chosen = bench(automated=True)
+    remember(chosen, check=remembered(chosen))
+    if caution is None:
+        with rig.run(PLAN, bench=chosen) as run:
+            assert armed(run)["how"] == "automated"
+        return
+    with pytest.raises(NotArmed, match=caution):
+        rig.run(PLAN, bench=chosen)
+    with rig.run(PLAN, bench=bench(automated=True, require_check=False)) as run:
+        assert caution in armed(run)["cautions"][0]
+
+
+@pytest.mark.usefixtures("physical")
+def test_after_a_trip_an_automated_bench_waits_for_a_person(tmp_path):
+    chosen = bench(automated=True, require_check=False)
+    tight = chosen.model_copy(update={"limits": chosen.limits.model_copy(update={"acceleration_m_s2": 0.5})})
+    with rig.run(PLAN, bench=tight) as run:
+        assert run.recording.parts[-1].end["tripped"]
+    with pytest.raises(NotArmed, match="the last run tripped: response above its limit"):
+        rig.run(PLAN, bench=chosen)
+    with rig.run(PLAN, bench=chosen, arm=True) as run:
+        assert run.complete
+    with rig.run(PLAN, bench=chosen) as run:
+        assert armed(run)["how"] == "automated"
+
+
+@pytest.mark.usefixtures("physical")
+def test_what_cannot_be_read_may_have_been_a_trip():
+    chosen = bench(automated=True, require_check=False)
+    remember(chosen, trip=RememberedTrip("2026-01-01T00:00:00+00:00", "x", ""))
+    memory_path(chosen).write_text("{")
+    with pytest.raises(NotArmed, match="cannot be read"):
+        rig.run(PLAN, bench=chosen)
+
+
+def test_a_check_needs_arming_and_is_remembered_with_what_failed(tmp_path, monkeypatch):
+    rewire(monkeypatch, flipped("acc_magnet"), virtual=False)
+    with pytest.raises(NotArmed):
+        check(bench(), tmp_path / "check.h5")
+    asked = []
+    check(bench(), tmp_path / "check.h5", arm=lambda request: asked.append(request.what) or True)
+    assert asked == ["check"]
+    memory = memory_of(bench())
+    assert memory.check.failed == ("polarity acc_magnet",)
+    assert memory.check.recording == str(tmp_path / "check.h5")
+    assert memory.check.fingerprint == fingerprint(bench())
+
+
+@pytest.mark.usefixtures("physical")
+def test_tuning_asks_once_and_resuming_asks_again(tmp_path):
+    with pytest.raises(NotArmed):
+        tune(bench(), tmp_path / "tuned.h5")
+    asked = []
+
+    def yes(request):
+        asked.append(request.what)
+        return True
+
+    with rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True):
+        pass
+    more = plan_with(levels_v=(0.4, 0.5), record_periods=4)
+    with pytest.raises(NotArmed):
+        rig.resume(tmp_path / "run.h5", plan=more)
+    with rig.resume(tmp_path / "run.h5", plan=more, arm=yes, operator="Grace") as run:
+        assert run.complete
+        assert run.recording.parts[1].information["about"]["operator"] == "Grace"
+    assert asked == ["backbone"]
+
+
+def test_the_record_says_who_tested_what_and_that_a_calibration_is_over(tmp_path, capsys):
+    channels = list(bench_with().model_dump()["channels"])
+    channels[1] |= {"serial_number": "LW1234", "calibrated": "2020-02-01", "calibration_due": "2021-02-01"}
+    output = tmp_path / "run.h5"
+    told = {"operator": "Ada", "specimen_serial": "B-7", "notes": ["bolts at 20 N m", "stinger new"]}
+    with rig.run(PLAN, bench=bench_with({"channels": channels}), output=output, **told):
+        pass
+    summary = summarise(output)
+    assert {key: summary["parts"][0]["about"][key] for key in told} == told
+    print_summary(summary)
+    shown = capsys.readouterr().out
+    for line in (
+        "operator: Ada",
+        "specimen serial: B-7",
+        "stinger new",
+        "channel drive: calibration was due on 2021-02-01",
+    ):
+        assert line in shown
+    json.dumps(summary)
+
+
+@pytest.mark.parametrize("key", ["calibrated", "calibration_due"])
+def test_a_day_that_is_none_is_refused(key):
+    channels = list(bench_with().model_dump()["channels"])
+    channels[0][key] = "2026-02-30"
+    with pytest.raises(ValueError, match=f"{key} = '2026-02-30': allowed is a day"):
+        bench_with({"channels": channels})
+
+
+def test_text_that_is_no_line_is_refused():
+    with pytest.raises(ConfigurationError, match="note = "):
+        About(notes=("two\nlines",))

@@ -1,0 +1,98 @@
+"""The parts of a check against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.signal import freqs
+
+from rig.check.findings import graded
+from rig.check.responses import fit_mode
+from rig.check.silence import hum, silent_findings
+from rig.check.wiring import best_assignment, by_magnitude
+from tests.rig.rigs import bench_with
+
+RATE_HZ = 5000.0
+
+
+def two_modes(frequency_hz, shapes, f1_hz=50.0, zeta=0.01, f2_hz=140.0):
+    """Accelerance of two normal modes at several points, from scipy's transfer functions."""
+    omega, out = 2.0 * np.pi * frequency_hz, []
+    for first, second in shapes:
+        parts = []
+        for product, f_hz in ((first, f1_hz), (second, f2_hz)):
+            w = 2.0 * np.pi * f_hz
+            parts.append(freqs([product, 0.0, 0.0], [1.0, 2.0 * zeta * w, w**2], omega)[1])
+        out.append(sum(parts))
+    return np.array(out)
+
+
+@pytest.mark.parametrize("near_hz", [46.0, 50.0, 54.0])
+def test_the_mode_is_found_beside_another_one(near_hz):
+    frequency = np.arange(20.0, 125.0, 0.5)
+    mode = fit_mode(frequency, two_modes(frequency, [(0.8, 0.5), (-1.3, 0.9), (0.1, -0.4)]), near_hz)
+    assert mode.frequency_hz == pytest.approx(50.0, rel=1e-3)
+    assert mode.damping_ratio == pytest.approx(0.01, rel=0.02)
+    np.testing.assert_allclose(mode.residue.real, [0.8, -1.3, 0.1], rtol=0.02)
+
+
+def test_a_delay_turns_the_residue():
+    frequency = np.arange(20.0, 125.0, 0.5)
+    late_s = 1e-4
+    values = two_modes(frequency, [(0.8, 0.5)]) * np.exp(-2j * np.pi * frequency * late_s)
+    mode = fit_mode(frequency, values, 50.0)
+    assert np.angle(mode.residue[0]) == pytest.approx(-2.0 * np.pi * 50.0 * late_s, rel=0.02)
+
+
+def test_where_no_mode_is_none_is_found():
+    frequency = np.arange(20.0, 125.0, 0.5)
+    assert fit_mode(frequency, np.full((1, frequency.size), 2.0 + 0.0j) * frequency**2, 50.0) is None
+    assert fit_mode(frequency[:5], two_modes(frequency[:5], [(1.0, 0.0)]), 50.0) is None
+
+
+def test_as_long_as_the_wiring_fits_no_other_is_proposed():
+    expected = np.array([1.0, 1.1, 1.6])
+    assert best_assignment(by_magnitude(expected * 1.03, expected)) is None
+    assert best_assignment(by_magnitude(expected[[0, 2, 1]] * 1.02, expected)) == (0, 2, 1)
+    assert best_assignment(by_magnitude(expected * 2.0, expected)) is None  # a gain, not a place
+
+
+def test_hum_is_measured_with_its_harmonics_and_noise_is_none():
+    time = np.arange(15000) / RATE_HZ
+    noise = 0.1 * np.random.default_rng(3).standard_normal(time.size)
+    assert hum(noise, 50.0, RATE_HZ) == 0.0
+    tones = 0.3 * np.cos(2 * np.pi * 50.0 * time + 0.4) + 0.1 * np.sin(2 * np.pi * 150.0 * time)
+    assert hum(noise + tones, 50.0, RATE_HZ) == pytest.approx(np.sqrt((0.3**2 + 0.1**2) / 2.0), rel=0.02)
+    assert hum(noise + tones, 60.0, RATE_HZ) == 0.0
+
+
+def verdicts(readings):
+    bench = bench_with()
+    return {f.label: f.verdict for f in silent_findings(bench, readings)}
+
+
+def test_silence_tells_of_offset_hum_noise_and_a_channel_that_stands_still():
+    generator = np.random.default_rng(8)
+    readings = np.column_stack([0.0005 * generator.standard_normal(15000), *np.zeros((3, 15000))])
+    assert set(verdicts(readings).values()) == {"ok"}
+    time = np.arange(15000) / RATE_HZ
+    hummed = readings.copy()
+    hummed[:, 1] += 0.5 * np.cos(2 * np.pi * 50.0 * time)
+    found = verdicts(hummed)
+    assert (found["mains hum drive"], found["noise drive"]) == ("warn", "warn")
+    off = readings.copy()
+    off[:, 2] += 100.0  # 1.02 of 5 V
+    assert verdicts(off)["offset acc_drive"] == "warn"
+    off[:, 2] += 400.0
+    assert verdicts(off)["offset acc_drive"] == "fail"
+
+
+def test_a_load_cell_that_should_make_noise_and_does_not_is_doubted():
+    channels = list(bench_with().model_dump()["channels"])
+    channels[0]["noise_rms"] = 0.01  # more than two bits
+    bench = bench_with({"channels": channels})
+    found = {f.label: f.verdict for f in silent_findings(bench, np.zeros((15000, 4)))}
+    assert found["noise force"] == "warn"
+
+
+def test_a_number_that_is_none_fails():
+    assert graded(float("nan"), (0.0, 1.0), (0.0, 2.0)) == "fail"
+    assert graded(1.5, (0.0, 1.0), (0.0, 2.0)) == "warn"

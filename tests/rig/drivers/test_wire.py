@@ -1,0 +1,436 @@
+"""The host's half of the wire protocol over a wire in memory: what it returns, and what it says of devices that misbehave."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.daq import LOST, State
+from rig.drivers import make_daq
+from rig.drivers.wire import WireOptions
+from rig.errors import (
+    DaqDisconnected,
+    DaqEmergencyStop,
+    DaqError,
+    DaqMismatch,
+    DaqProtocol,
+    DaqRefused,
+    DaqReset,
+    DaqTimeout,
+    DaqWatchdog,
+)
+from rig.wire.device import Device, Faults, VirtualPlant
+from rig.wire.device.description import described
+from rig.wire.messages import (
+    ARM_KEY,
+    Answer,
+    Command,
+    DeviceState,
+    EmergencyStop,
+    Heartbeat,
+    Message,
+    Output,
+    Parameter,
+    Request,
+    Samples,
+    float_word,
+)
+from tests.rig.rigs import bench_with
+from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink
+
+BLOCKS = 60
+
+
+def drive(daq: MemoryDAQ, blocks: int, block: int = 5, volts: float = 0.1) -> None:
+    for _ in range(blocks):
+        daq.exchange(np.full(block, volts))
+
+
+def voltages(block: int, blocks: int = BLOCKS) -> np.ndarray:
+    return np.random.default_rng(1).uniform(-0.5, 0.5, (blocks, block))
+
+
+def answers(daq: Any, block: int, blocks: int = BLOCKS) -> tuple[np.ndarray, np.ndarray]:
+    """Inputs and flags of an open-loop run."""
+    with daq:
+        daq.start(block)
+        rows, flags = [], []
+        for volts in voltages(block, blocks):
+            rows.append(daq.exchange(volts))
+            flags.append(daq.flags.copy())
+    return np.vstack(rows), np.concatenate(flags)
+
+
+def virtual(block: int, queue_blocks: int = 1, seed: int = 3) -> np.ndarray:
+    return answers(make_daq(bench_with(queue_blocks=queue_blocks), seed), block)[0]
+
+
+def device_with(**changes: Any) -> MemoryDAQ:
+    """A driver whose device says something else of itself, by parameter name and item."""
+    daq = MemoryDAQ(bench_with())
+    for name, word in changes.items():
+        parameter, _, item = name.partition("__")
+        daq.device.words[Parameter[parameter], int(item or 0)] = word
+    return daq
+
+
+def message_of(kind: type[DaqError], daq: MemoryDAQ) -> str:
+    with pytest.raises(DaqError) as caught:
+        daq.open()
+    assert type(caught.value) is kind
+    assert daq.state is State.CLOSED
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+@pytest.mark.parametrize(("block", "queue"), [(1, 1), (1, 4), (5, 1), (5, 2), (10, 3), (64, 1)])
+def test_it_returns_bit_for_bit_what_the_virtual_driver_with_that_queue_does(
+    block: int, queue: int, lockstep: bool
+) -> None:
+    daq = MemoryDAQ(bench_with(), 3, WireOptions(queue_blocks=queue), lockstep=lockstep)
+    inputs, flags = answers(daq, block)
+    np.testing.assert_array_equal(inputs, virtual(block, queue))
+    assert not flags.any()
+    assert np.abs(inputs).max() > 0.05
+
+
+def test_its_latency_is_the_queue_and_half_a_sample() -> None:
+    with MemoryDAQ(bench_with(), 0, WireOptions(queue_blocks=3)) as daq:
+        daq.start(5)
+        assert daq.latency_samples - daq.filter_delay_samples == pytest.approx(15.5)
+
+
+def test_filter_delay_that_the_device_tells_is_part_of_the_latency() -> None:
+    converter = {"oversampling": 2, "anti_alias_hz": 800.0}
+    bench = bench_with(converter=converter)
+    with make_daq(bench) as reference, MemoryDAQ(bench) as daq:
+        daq.start(1)
+        assert daq.filter_delay_samples == pytest.approx(reference.filter_delay_samples, abs=1e-5)
+        assert daq.latency_samples == pytest.approx(1.5 + reference.filter_delay_samples, abs=1e-5)
+
+
+def test_lost_blocks_are_gaps_in_their_place() -> None:
+    faults = Faults(drop_every=10, drop_burst=2)
+    daq = MemoryDAQ(bench_with(), 3, WireOptions(queue_blocks=4), lockstep=False, faults=faults)
+    inputs, flags = answers(daq, 5)
+    lost = np.isnan(inputs).any(axis=1)
+    blocks = np.arange(1, BLOCKS + 1)
+    expected = np.repeat((blocks >= 10) & (blocks % 10 < 2), 5)
+    np.testing.assert_array_equal(lost, expected)
+    np.testing.assert_array_equal(flags[lost], LOST)
+    assert not flags[~lost].any()
+    np.testing.assert_array_equal(inputs[~lost], virtual(5, 4)[~lost])
+    assert daq.counters["lost_samples"] == lost.sum()
+
+
+def test_repeated_blocks_are_counted_and_change_nothing() -> None:
+    daq = MemoryDAQ(bench_with(), 3, faults=Faults(repeat_every=7))
+    inputs, _ = answers(daq, 5)
+    np.testing.assert_array_equal(inputs, virtual(5))
+    assert daq.counters["repeated_blocks"] == BLOCKS // 7
+
+
+def test_a_block_that_comes_after_its_successor_is_a_gap() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False, faults=Faults(reorder_every=9))
+    inputs, _ = answers(daq, 5)
+    lost = np.isnan(inputs).any(axis=1)
+    np.testing.assert_array_equal(lost, np.repeat(np.arange(1, BLOCKS + 1) % 9 == 0, 5))
+    assert daq.counters["repeated_blocks"] == np.count_nonzero(lost) // 5
+
+
+def test_a_late_block_holds_outputs_and_says_so() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False, faults=Faults(late_every=20, late_s=0.02))
+    inputs, flags = answers(daq, 5)
+    assert np.isfinite(inputs).all()
+    assert daq.counters["output_held"] > 0
+    assert np.count_nonzero(flags & 4) == daq.counters["output_held"]
+
+
+def test_a_device_that_calls_its_channels_otherwise_is_refused() -> None:
+    names = ("force", "drive", "acc_drive", "nose")
+    assert "nose" in message_of(DaqMismatch, MemoryDAQ(bench_with(), faults=Faults(channel_names=names)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "words"),
+    [
+        ({"N_CHANNELS": 3}, DaqMismatch, ("acc_magnet", "not these")),
+        ({"CHANNEL_NAME__0": 0x41414141}, DaqMismatch, ("AAAA", "force")),
+        ({"CHANNEL_RANGE_V__1": float_word(2.0)}, DaqMismatch, ("drive", "range_v = 5", "2 V")),
+        ({"CHANNEL_UNIT__8": 0x41}, DaqMismatch, ("drive", "'A'")),
+        ({"OUTPUT_RANGE_V": float_word(5.0)}, DaqMismatch, ("output_range_v = 10", "5 V")),
+        ({"HIGHEST_RATE_MHZ": 1_000_000, "LOWEST_RATE_MHZ": 1000}, DaqMismatch, ("sample_rate_hz = 5000", "1000 Hz")),
+        ({"LAYOUT_CRC": 7}, DaqMismatch, ("00000007",)),
+        ({"N_CHANNELS": 0}, DaqProtocol, ("0 channels",)),
+        ({"BITS": 12}, DaqProtocol, ("12 bits",)),
+        ({"CHANNEL_V_PER_COUNT__0": float_word(math.nan)}, DaqProtocol, ("not positive",)),
+        ({"LOWEST_VERSION": 2, "HIGHEST_VERSION": 3}, DaqProtocol, ("versions 2 to 3", "speaks 1")),
+    ],
+)
+def test_a_device_that_is_not_the_benchs_is_refused_with_what_differs(
+    changes: dict[str, int], kind: type[DaqError], words: tuple[str, ...]
+) -> None:
+    message = message_of(kind, device_with(**changes))
+    assert message.startswith("memory: ")
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_channels_in_another_order_are_said_to_be_so() -> None:
+    bench = bench_with()
+    order = [bench.channels[i] for i in (0, 2, 1, 3)]
+    daq = MemoryDAQ(bench)
+    daq._bench = bench.model_copy(update={"channels": tuple(order)})
+    assert "in another order" in message_of(DaqMismatch, daq)
+
+
+def test_a_silent_port_is_said_to_be_no_device() -> None:
+    daq = MemoryDAQ(bench_with())
+    daq.device.handle = lambda *_: None  # type: ignore[method-assign]
+    assert "nothing answers" in message_of(DaqProtocol, daq)
+
+
+def test_answers_that_get_lost_are_asked_for_again() -> None:
+    daq = MemoryDAQ(bench_with(), 3)
+    heard = daq.device.handle
+    seen = [0]
+
+    def hard_of_hearing(message: Any, now_s: float) -> None:
+        seen[0] += 1
+        if seen[0] % 3:
+            heard(message, now_s)
+
+    daq.device.handle = hard_of_hearing  # type: ignore[method-assign]
+    daq.open()
+    assert daq.counters["retries"] > 10
+    daq.close()
+
+
+def test_two_devices_that_answer_as_one_are_noticed() -> None:
+    daq = MemoryDAQ(bench_with())
+    twin = Device(
+        VirtualPlant(bench_with()), described(daq.device.plant, serial_number="0002"), MemoryLink(daq.wire, host=False)
+    )
+    heard = daq.device.handle
+
+    def both(message: Any, now_s: float) -> None:
+        heard(message, now_s)
+        twin.handle(message, now_s)
+
+    daq.device.handle = both  # type: ignore[method-assign]
+    assert "two devices" in message_of(DaqProtocol, daq)
+
+
+def test_a_rate_beyond_the_wire_is_refused_with_the_sum() -> None:
+    message = message_of(DaqRefused, MemoryDAQ(bench_with(), available_bit_s=850_000.0))
+    assert "94 %" in message  # 5000 Hz x 8 bit x (12 + 2 x 4) byte = 800 000 bit/s
+    assert "800000 of 850000 bit/s" in message
+
+
+def test_a_device_that_still_runs_for_a_dead_host_is_stopped_first() -> None:
+    daq = MemoryDAQ(bench_with(), lockstep=False)
+    for request in (
+        Request(1, Command.SET, Parameter.BLOCK, 0, 5),
+        Request(2, Command.START),
+        Request(3, Command.ARM, value=ARM_KEY),
+    ):
+        daq.device.handle(request, 0.0)
+    daq.wire.pass_time(0.05)
+    assert len(daq.wire.to_host) > 20
+    with daq:
+        assert daq.device.state is DeviceState.IDLE
+        assert any("still running" in remark for remark in daq.remarks)
+        daq.start(5)
+        np.testing.assert_array_equal(daq.exchange(np.zeros(5)).shape, (5, 4))
+
+
+def test_a_watchdog_that_has_latched_is_cleared_by_the_next_start_and_remarked() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        daq.exchange(np.zeros(5))
+        daq.wire.pass_time(1.0)
+        with pytest.raises(DaqWatchdog, match="watchdog"):
+            drive(daq, 1000)
+        daq.stop()
+        assert daq.device.state is DeviceState.LATCHED
+        daq.start(5)
+        assert np.isfinite(daq.exchange(np.zeros(5))).all()
+        assert any("latched" in remark for remark in daq.remarks)
+
+
+def test_start_itself_starts_no_clock() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        daq.wire.pass_time(30.0)
+        inputs = np.vstack([daq.exchange(volts) for volts in voltages(5)])
+    np.testing.assert_array_equal(inputs, virtual(5))
+
+
+def run_until_error(faults: Faults, lockstep: bool = False) -> tuple[MemoryDAQ, DaqError]:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=lockstep, faults=faults)
+    with daq:
+        daq.start(5)
+        with pytest.raises(DaqError) as caught:
+            drive(daq, 1000)
+    daq.wire.pass_time(1.0)
+    assert not daq.device.output_v.any()
+    assert daq.state is State.CLOSED
+    return daq, caught.value
+
+
+@pytest.mark.parametrize(
+    ("faults", "kind", "word"),
+    [
+        (Faults(silent_after_s=0.1), DaqTimeout, "has not come within 0.25 s"),
+        (Faults(deaf_after_s=0.1), DaqWatchdog, "watchdog"),
+        (Faults(reset_after_s=0.1), DaqReset, "started anew"),
+        (Faults(late_every=100, late_s=1.0), DaqTimeout, "has not come"),
+    ],
+)
+def test_what_goes_wrong_on_the_way_has_its_error_and_ends_at_0_v(
+    faults: Faults, kind: type[DaqError], word: str
+) -> None:
+    _, error = run_until_error(faults)
+    assert type(error) is kind
+    assert word in str(error)
+
+
+def test_an_emergency_stop_at_the_device_is_told() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        drive(daq, 20)
+        daq.device.press_emergency_stop()
+        with pytest.raises(DaqEmergencyStop, match="emergency stop"):
+            drive(daq, 20)
+    assert not daq.device.output_v.any()
+
+
+def test_the_host_can_press_the_emergency_stop() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        daq.exchange(np.full(5, 0.1))
+        daq.emergency_stop()
+        with pytest.raises(DaqEmergencyStop):
+            daq.exchange(np.full(5, 0.1))
+
+
+def test_an_unplugged_cable_is_told_and_the_device_comes_to_0_v_by_itself() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        drive(daq, 20)
+        daq.wire.cut = True
+        with pytest.raises(DaqDisconnected):
+            drive(daq, 1)
+    assert daq.device.output_v.any()
+    daq.wire.pass_time(0.2)
+    assert not daq.device.output_v.any()
+    assert daq.device.state is DeviceState.LATCHED
+
+
+def test_another_who_starts_the_device_is_noticed() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        drive(daq, 50)
+        for number, command in enumerate((Command.STOP, Command.START)):
+            daq.device.handle(Request(240 + number, command), daq.wire.now_s)
+        with pytest.raises(DaqReset):
+            drive(daq, 50)
+
+
+def test_a_watchdog_shorter_than_two_blocks_is_refused() -> None:
+    with MemoryDAQ(bench_with(), 0, WireOptions(watchdog_s=0.01)) as daq, pytest.raises(DaqRefused, match=r"0\.02 s"):
+        daq.start(50)
+
+
+def test_round_trips_are_measured_before_and_during_the_run() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        before = daq.statistics
+        assert before["round_trips"] >= 20
+        assert before["round_trip_p50_us"] == pytest.approx(20.0)  # the flight of the wire in memory
+        daq.start(5)
+        for volts in voltages(5, 1000):
+            daq.exchange(volts)
+        assert daq.statistics["round_trips"] == pytest.approx(before["round_trips"] + 20, abs=2)
+        assert daq.statistics["sustainable_rate_hz"] == 5000.0
+
+
+def test_it_says_who_the_device_is() -> None:
+    with MemoryDAQ(bench_with(), serial_number="A-17", firmware="2.3") as daq:
+        assert daq.identity["serial_number"] == "A-17"
+        assert daq.identity["firmware"] == "2.3"
+        assert daq.capabilities.virtual
+
+
+def test_a_device_that_does_not_say_it_is_simulated_is_not_virtual() -> None:
+    daq = MemoryDAQ(bench_with(), simulated=0)
+    assert not daq.capabilities.virtual
+    with daq:
+        assert not daq.capabilities.virtual
+
+
+def test_sensors_wired_wrongly_read_so_and_leave_the_plant_as_it_is() -> None:
+    right = virtual(5)
+    daq = MemoryDAQ(
+        bench_with(), 3, wiring={"flip": ("drive",), "dead": ("acc_magnet",), "swap": (("force", "acc_drive"),)}
+    )
+    inputs, _ = answers(daq, 5)
+    np.testing.assert_array_equal(inputs[:, 1], -right[:, 1])
+    np.testing.assert_array_equal(inputs[:, [2, 0]], right[:, [0, 2]])
+    assert np.abs(inputs[:, 3]).max() < 1e-3
+
+
+def test_counts_of_32_bits_carry_a_converter_of_24() -> None:
+    bench = bench_with(converter={"adc_bits": 24, "dac_bits": 20}, queue_blocks=1)
+    reference, _ = answers(make_daq(bench, 3), 5)
+    inputs, _ = answers(MemoryDAQ(bench, 3), 5)
+    np.testing.assert_array_equal(inputs, reference)
+
+
+BLOCK_OF_5 = np.zeros((5, 4), np.int16)
+NOISE = st.one_of(
+    st.builds(
+        Samples,
+        st.integers(0, 60) | st.integers(0, 2**64 - 1),
+        st.sampled_from([BLOCK_OF_5, BLOCK_OF_5[:3], BLOCK_OF_5[:, :2]]),
+        st.sampled_from([0, 0, 0, 1, 2, 4, 8, 16]),
+        st.integers(0, 2**32 - 1),
+    ),
+    st.builds(Answer, *(st.integers(0, 255),) * 4, st.integers(0, 2**32 - 1)),
+    st.builds(Heartbeat, st.integers(0, 7), st.integers(0, 31), st.integers(0, 3), st.integers(0, 100)),
+    st.builds(Output, st.integers(0, 60), st.just(np.zeros(5, np.int16))),
+    st.builds(EmergencyStop),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(NOISE, max_size=40))
+def test_whatever_a_mad_device_sends_ends_in_rows_or_in_one_of_our_errors(noise: list[Message]) -> None:
+    daq = MemoryDAQ(bench_with(), 3, WireOptions(queue_blocks=2))
+    with daq:
+        daq.start(5)
+        drive(daq, 3)
+        daq.wire.to_host.extend(noise)
+        said = said_of(daq)
+    assert said == "" or (said.startswith("memory: ") and "\n" not in said)
+
+
+def said_of(daq: MemoryDAQ) -> str:
+    """What ends a few more blocks, if anything; rows that were lost are NaN and no others."""
+    try:
+        for _ in range(20):
+            rows = daq.exchange(np.zeros(5))
+            np.testing.assert_array_equal(np.isnan(rows).all(axis=1), (daq.flags & LOST).astype(bool))
+    except DaqError as error:
+        return str(error)
+    return ""

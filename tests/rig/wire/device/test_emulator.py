@@ -1,0 +1,144 @@
+"""Emulators as processes: reached by ordinary benches, safe when the host dies."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.bench import Bench, DriverChoice, load_bench
+from rig.daq import DAQ
+from rig.drivers import make_daq
+from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqEmergencyStop, DaqTimeout
+from rig.wire.device import VirtualPlant, Wiring
+from rig.wire.device.emulator import Emulator, emulated
+from tests.rig.drivers.test_wire import answers, virtual
+from tests.rig.rigs import bench_with
+from tests.rig.wire.device.host_process import RAMP_S, WATCHDOG_S
+
+MARGIN_S = 1.0  # of a machine that runs other tests besides
+
+
+def rig_command(*arguments: str) -> list[str]:
+    return [sys.executable, "-c", "from rig.cli import main; main()", *arguments]
+
+
+@pytest.fixture(scope="module")
+def serial_bench() -> Iterator[Bench]:
+    with emulated(bench_with(), seed=3) as bench:
+        yield bench
+
+
+@pytest.fixture(scope="module")
+def can_bench() -> Iterator[Bench]:
+    with emulated(bench_with(), "can", seed=3) as bench:
+        yield bench
+
+
+@pytest.mark.parametrize("wire", ["serial", "can"])
+def test_over_a_real_line_it_returns_bit_for_bit_what_the_virtual_driver_does(
+    wire: str, request: pytest.FixtureRequest
+) -> None:
+    bench = request.getfixturevalue(f"{wire}_bench")
+    for queue, block in ((1, 1), (1, 5), (3, 20)):
+        options = {**bench.driver.options, "queue_blocks": queue}
+        daq = make_daq(bench.model_copy(update={"driver": DriverChoice(name=wire, options=options)}))
+        inputs, flags = answers(daq, block)
+        np.testing.assert_array_equal(inputs, virtual(block, queue))
+        assert not flags.any()
+
+
+def test_a_port_that_somebody_holds_is_busy_and_free_afterwards(serial_bench: Bench) -> None:
+    with make_daq(serial_bench), pytest.raises(DaqBusy):
+        make_daq(serial_bench).open()
+    with make_daq(serial_bench) as daq:
+        assert daq.identity["model"] == "vibrolock emulator"
+
+
+def test_what_is_reached_over_a_wire_cannot_be_emulated_itself(serial_bench: Bench) -> None:
+    with pytest.raises(ConfigurationError, match="allowed is 'virtual'"):
+        VirtualPlant(serial_bench)
+
+
+def test_its_emergency_stop_reaches_the_host_and_its_end_is_an_unplugged_cable() -> None:
+    with Emulator(bench_with(), lockstep=True) as emulator:
+        with make_daq(emulator.bench) as daq:
+            daq.start(5)
+            daq.exchange(np.zeros(5))
+            emulator.press_emergency_stop()
+            with pytest.raises(DaqEmergencyStop):
+                exchange_for(daq, 10.0)
+        with make_daq(emulator.bench) as daq:
+            daq.start(5)
+            daq.exchange(np.zeros(5))
+            emulator.stop()
+            with pytest.raises(DaqDisconnected):
+                daq.exchange(np.zeros(5))
+
+
+def exchange_for(daq: DAQ, seconds: float) -> None:
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        daq.exchange(np.zeros(5))
+
+
+def test_a_device_that_sends_other_channels_than_it_says_is_not_believed() -> None:
+    options = {"timeout_s": 0.3}
+    with emulated(bench_with(), options=options, faults={"channels_sent": 3}) as bench, make_daq(bench) as daq:
+        daq.start(5)
+        with pytest.raises(DaqTimeout, match="malformed"):
+            daq.exchange(np.zeros(5))
+        assert daq.counters["malformed"] > 0
+
+
+def test_a_host_that_is_killed_leaves_the_output_at_0_v_within_watchdog_and_ramp(tmp_path: Path) -> None:
+    log = tmp_path / "output.txt"
+    with Emulator(bench_with(), lockstep=False, log_output=str(log)) as emulator:
+        port = str(emulator.bench.driver.options["port"])
+        with subprocess.Popen(
+            [sys.executable, "-m", "tests.rig.wire.device.host_process", port], stdout=subprocess.PIPE, text=True
+        ) as host:
+            assert host.stdout is not None
+            assert host.stdout.readline() == "driving\n"
+            killed_s = time.monotonic()
+            host.kill()
+        time.sleep(WATCHDOG_S + RAMP_S + MARGIN_S)
+    at_s, _, volts = np.loadtxt(log, unpack=True)
+    driven = np.flatnonzero(volts)
+    assert volts[at_s < killed_s][-1] == pytest.approx(0.2, abs=1e-3)
+    assert at_s[driven[-1]] < killed_s + WATCHDOG_S + RAMP_S + MARGIN_S
+    assert not volts[driven[-1] + 1 :].any()
+    assert volts.size - driven[-1] > 5  # it went on sampling
+    assert emulator.counted["watchdog_trips"] == 1
+
+
+def test_the_command_says_where_it_is_and_writes_a_bench_that_reaches_it(tmp_path: Path) -> None:
+    link, file = tmp_path / "device", tmp_path / "emulated.toml"
+    arguments = ["emulate", "serial", "--lockstep", "--link", str(link), "--bench-file", str(file), "--json"]
+    with subprocess.Popen(rig_command(*arguments), stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        ready = json.loads(process.stdout.readline())
+        assert ready["port"] == str(link)
+        bench = load_bench(file)
+        assert bench.driver.name == "serial"
+        assert bench.driver.options["port"] == str(link)
+        assert link.is_symlink()
+        os.kill(process.pid, signal.SIGINT)
+        assert json.loads(process.stdout.readline()) == {}
+        assert process.wait(10.0) == 0
+    assert not link.exists()
+
+
+def test_what_cannot_be_emulated_is_refused_in_one_line() -> None:
+    with pytest.raises(ConfigurationError, match="there is no such channel"):
+        Wiring(("force", "drive"), flip=("nose",))
+    with pytest.raises(ConfigurationError, match="wire = 'usb'"):
+        Emulator(bench_with(), "usb")
+    with pytest.raises(ConfigurationError, match="allowed is version"):
+        Emulator(bench_with(), faults={"vers": 2})

@@ -1,0 +1,41 @@
+"""Messages for property tests."""
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
+
+U8, U16, U32, U64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
+
+streams = st.builds(
+    Stream,
+    n_channels=st.integers(1, 8),
+    block=st.integers(1, 20),
+    rate_hz=st.just(1000.0),
+    bits=st.sampled_from([16, 32]),
+)
+
+
+def counts(stream: Stream, *shape: int) -> st.SearchStrategy[np.ndarray]:
+    dtype = np.dtype(f"int{stream.bits}")
+    return arrays(dtype, shape, elements=st.integers(np.iinfo(dtype).min, np.iinfo(dtype).max))
+
+
+def messages(stream: Stream) -> st.SearchStrategy[Message]:
+    samples = counts(stream, stream.block, stream.n_channels)
+    return st.one_of(
+        st.builds(Request, U8, U8, U8, U8, U32),
+        st.builds(Answer, U8, U8, U8, U8, U32),
+        st.builds(Samples, U64, samples, U16, U32, U64, U16),
+        st.builds(Output, U64, counts(stream, stream.block), U16),
+        st.builds(Heartbeat, U8, U16, U8, U32, U32),
+        st.builds(EmergencyStop, U8),
+    )
+
+
+def same(ours: Message, theirs: Message) -> bool:
+    if type(ours) is not type(theirs):
+        return False
+    pairs = zip(ours, theirs, strict=True)
+    return all(a.dtype == b.dtype and np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b for a, b in pairs)

@@ -1,0 +1,93 @@
+"""Messages survive their way over the wire, and nothing else becomes a message."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.errors import DaqRefused
+from rig.wire.messages import VERSION, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
+from rig.wire.serial.codec import Codec, ForeignVersion, Malformed
+from tests.rig.wire.serial.strategies import messages, same, streams
+
+STREAM = Stream(n_channels=4, block=5, rate_hz=5000.0)
+
+
+def configured(stream=STREAM):
+    codec = Codec()
+    codec.configure(stream)
+    return codec
+
+
+@given(st.data())
+def test_every_message_comes_out_as_it_went_in(data):
+    stream = data.draw(streams)
+    message = data.draw(messages(stream))
+    assert same(configured(stream).decode(configured(stream).encode(message)), message)
+
+
+SIZES = (5, 12, 16, 22, 68)  # of every type, with 5 x 4 counts
+payloads = st.sampled_from(SIZES).flatmap(lambda size: st.binary(min_size=size, max_size=size)) | st.binary(
+    max_size=120
+)
+
+
+@given(payloads, st.integers(0, 7))
+def test_any_bytes_are_a_message_or_malformed(payload, kind):
+    codec = configured()
+    payload = payload[:1] + bytes([kind]) + payload[2:]
+    try:
+        message = codec.decode(payload)
+    except Malformed:
+        return
+    assert same(codec.decode(codec.encode(message)), message)
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+def test_counts_of_samples_can_be_used_where_they_are(bits):
+    codec = configured(Stream(3, 2, 1000.0, bits))
+    counts = np.arange(6, dtype=f"int{bits}").reshape(2, 3)
+    got = codec.decode(codec.encode(Samples(2**40, counts))).counts
+    assert got.flags.aligned
+    assert got.dtype == counts.dtype
+
+
+def test_blocks_of_another_shape_are_malformed_and_not_sent():
+    other = configured(STREAM._replace(block=6))
+    counts = np.zeros((6, 4), np.int16)
+    for message in (Samples(0, counts), Output(0, counts[:, 0])):
+        with pytest.raises(Malformed):
+            configured().decode(other.encode(message))
+        with pytest.raises(DaqRefused, match="of shape"):
+            configured().encode(message)
+
+
+def test_blocks_are_neither_sent_nor_understood_before_their_shape_is_known():
+    samples = Samples(0, np.zeros((5, 4), np.int16))
+    with pytest.raises(Malformed):
+        Codec().decode(configured().encode(samples))
+    with pytest.raises(DaqRefused, match="configure"):
+        Codec().encode(samples)
+
+
+def test_commands_are_understood_in_every_version_and_streams_in_ours_alone():
+    def of_version(message, version):
+        return bytes([version]) + configured().encode(message)[1:]
+
+    for message in (Request(1, 2, 3, 4, 5), EmergencyStop(6)):
+        assert configured().decode(of_version(message, 77)) == message
+    with pytest.raises(ForeignVersion):
+        configured().decode(of_version(Heartbeat(0, 0, 1, 0), VERSION + 1))
+
+
+def test_streams_that_no_frame_holds_are_refused():
+    with pytest.raises(DaqRefused, match="80028 bytes: allowed is 65536"):
+        Codec().configure(Stream(n_channels=8, block=5000, rate_hz=1e4))
+    with pytest.raises(DaqRefused, match="24 bits: allowed is 16 or 32"):
+        Codec().configure(Stream(n_channels=8, block=5, rate_hz=1e4, bits=24))
+
+
+def test_what_is_counted_without_end_stays_in_its_field():
+    samples = Samples(2**63, np.zeros((5, 4), np.int16), dropped=2**40, sequence=2**16 + 3)
+    got = configured().decode(configured().encode(samples))
+    assert (got.first, got.dropped, got.sequence) == (2**63, 2**32 - 1, 3)
