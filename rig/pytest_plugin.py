@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from simulators.virtual_rig import VirtualRig
 
 DEFAULT_BENCH = "magnet-beam"
-RESULTS = pytest.StashKey["Results"]()
+RESULTS: "pytest.StashKey[Results]" = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
