@@ -11,6 +11,7 @@ import pytest
 if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.daq import DAQ
+    from rig.hil.results import Results
     from rig.hil.subject import ArmedRig, Subject
     from simulators.virtual_rig import VirtualRig
 
