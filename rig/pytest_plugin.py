@@ -11,11 +11,12 @@ import pytest
 if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.daq import DAQ
+    from rig.hil.results import Results
     from rig.hil.subject import ArmedRig, Subject
     from simulators.virtual_rig import VirtualRig
 
 DEFAULT_BENCH = "magnet-beam"
-RESULTS = pytest.StashKey["Results"]()
+RESULTS: "pytest.StashKey[Results]" = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -31,8 +31,8 @@ class Results:
         entry["measured"] = {str(name): value for name, value in report.user_properties}
         if report.outcome != "passed" and entry["outcome"] == "passed":
             entry["outcome"] = "error" if report.failed and report.when != "call" else report.outcome
-            skipped = isinstance(report.longrepr, tuple)
-            entry["reason"] = report.longrepr[2] if skipped else str(report.longrepr).strip().splitlines()[-1]
+            why = report.longrepr
+            entry["reason"] = why[2] if isinstance(why, tuple) else str(why).strip().splitlines()[-1]
 
     def write(self, path: str, status: int) -> None:
         """Write everything as JSON."""

@@ -93,17 +93,19 @@ def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: flo
 
 
 @kernel
-def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float, omega: float) -> None:
+def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float, omega: float) -> float:
     """Go on with a motion that is not seen for a sample, as the vibration at ``omega`` (rad/s) that it was.
 
     Integrated with a hole in it, an acceleration would leave a velocity behind and pass for travel. With the leak l (1/s),
     ``x' = v - l x``; of ``x'' = -w^2 x`` follows ``v' = l v - (w^2 + l^2) x``, a turn by w dt for any l.
+    Returns the acceleration (m/s^2) that goes with it, ``v' + l v``.
     """
     leak = limits.integrator_leak / limits.integrator_gain
     velocity, displacement = watch.velocity, watch.displacement
     share = sin_step / omega
     watch.velocity = cos_step * velocity + share * (leak * velocity - (omega * omega + leak * leak) * displacement)
     watch.displacement = cos_step * displacement + share * (velocity - leak * displacement)
+    return float(2.0 * leak * velocity - (omega * omega + leak * leak) * displacement)
 
 
 @kernel

@@ -118,9 +118,12 @@ def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: 
     cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
     for index in range(t.inputs.size):
         if t.inputs[index].watch_displacement == 1:
-            carry_motion(limits, t.watches[index], cos_step, sin_step, omega)
+            watch = t.watches[index]
+            # The mean swings a little with the vibration: held anywhere, it would be integrated as travel for seconds.
+            watch.mean += t.law[0].mean_gain * carry_motion(limits, watch, cos_step, sin_step, omega)
     force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
     loop.force = force.real * cos_theta - force.imag * sin_theta
+    t.watches[loop.force_channel].mean += t.law[0].mean_gain * loop.force
     loop.drive_motion = drive.real * cos_theta - drive.imag * sin_theta
     watch_gap(t.guard[0], limits, loop.lost, loop.sample, dt)
     return 0
