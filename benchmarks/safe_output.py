@@ -42,7 +42,7 @@ import rig
 from rig.bench import Bench
 from rig.campaigns.plans import load_plan
 bench = Bench.model_validate_json(open(sys.argv[1]).read())
-plan = load_plan("magnet-beam/backbone").model_copy(update={"levels_v": [0.6], "record_periods": 2000})
+plan = load_plan("magnet-beam/backbone").model_copy(update={"levels_v": (0.6,), "record_periods": 2000})
 rig.run(plan, bench=bench, output=sys.argv[2]).close()
 """
 DRIVEN_V = 0.1
