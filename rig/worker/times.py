@@ -27,7 +27,8 @@ class BlockTimes:
         self._pace, self._deadline_ns = pace, deadline_ns
         histograms = memory.histograms
         self._counts = histograms["wake_up"].add, histograms["execution"].add, histograms["response"].add
-        self._begun_ns = self._release_ns = self._computed_ns = 0
+        self._begun_ns = self._release_ns = 0
+        self._computed_ns = _computed()
         self.late = self.stalls = self.own_stalls = self.busy_ns = 0
 
     def report(self) -> dict[str, int]:
