@@ -13,8 +13,9 @@ def disturbances() -> dict[str, int]:
     Of this thread too, where the system tells: switches that it did not ask for, page faults with (major) and without
     (minor) the disk.
     """
+    system = _of_the_system()  # which imports something the first time
     collections = sum(int(generation["collections"]) for generation in gc.get_stats())
-    return {"imports": len(sys.modules), "collections": collections, **_of_the_system()}
+    return {"imports": len(sys.modules), "collections": collections, **system}
 
 
 def since(before: dict[str, int]) -> dict[str, int]:

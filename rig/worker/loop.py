@@ -74,11 +74,6 @@ class WallClockLoop:
         self.disturbances: dict[str, int] = {}
 
     @property
-    def pacing(self) -> str:
-        """Who paces it: ``host``, ``device``, or nobody (``lockstep``)."""
-        return "host" if not self._pace.by_device else "device" if self._pace.has_clock else "lockstep"
-
-    @property
     def deadline_s(self) -> float:
         """Longest time from the release of a block to the handing over of its outputs."""
         return 1e-9 * self._deadline_ns

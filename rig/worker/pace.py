@@ -2,11 +2,12 @@
 
 import math
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 from rig.daq import DAQ
 
-__all__ = ["DevicePace", "HostPace", "Lockstep", "Pace", "pace_of"]
+__all__ = ["DevicePace", "HostPace", "Lockstep", "Pace", "pace_of", "pacing_of"]
 
 DRIFT = 2e-4  # crystals of host and device differ by less
 WINDOW_S = 0.2  # of which no block was on time, before a device is thought to have stood still
@@ -138,12 +139,21 @@ class Lockstep:
         return begun_ns
 
 
-def pace_of(daq: DAQ) -> Pace:
-    """How a started device is paced.
+def pacing_of(daq: DAQ) -> str:
+    """Who paces a device that is open: ``host``, ``device``, or nobody (``lockstep``).
 
     One that paces and is repeatable must wait for the host: with a clock of its own, no two runs would be alike.
     """
+    capabilities = daq.capabilities
+    return "host" if not capabilities.paced else "lockstep" if capabilities.repeatable else "device"
+
+
+def pace_of(daq: DAQ) -> Pace:
+    """The pace of a started device."""
     period_s = daq.block / daq.sample_rate_hz
-    if not daq.capabilities.paced:
-        return HostPace(period_s)
-    return Lockstep() if daq.capabilities.repeatable else DevicePace(period_s)
+    paces: dict[str, Callable[[], Pace]] = {
+        "host": lambda: HostPace(period_s),
+        "device": lambda: DevicePace(period_s),
+        "lockstep": Lockstep,
+    }
+    return paces[pacing_of(daq)]()

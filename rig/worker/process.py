@@ -17,6 +17,7 @@ from rig.session import TickSettings
 from rig.tick.kernels import tick_block
 from rig.worker.loop import WallClockLoop
 from rig.worker.memory import Layout, SharedMemory, packed
+from rig.worker.pace import pacing_of
 from rig.worker.privileges import prepare
 from rig.worker.probe import probe, round_trips
 
@@ -62,8 +63,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         memory = SharedMemory(descriptor, layout, create=True)
         _load_kernels(daq, bench, settings)
         came = _listen()
-        lockstep = daq.capabilities.paced and daq.capabilities.repeatable  # in no hurry, and never asleep
-        said = prepare(privileged=privileged and not lockstep)
+        said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")  # in no hurry, and never asleep
         daq.start(bench.block)
         loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
@@ -124,6 +124,6 @@ def _asked(came: list[str], commands: Connection) -> str:
 
 def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
     """What the loop process alone knows, as plain data for the record."""
-    counted = {"pacing": loop.pacing, **loop.disturbances, **loop.times.report()}
+    counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
     real_time = {**said, **{name: str(value) for name, value in counted.items()}}
     return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}
