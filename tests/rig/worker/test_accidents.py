@@ -38,7 +38,7 @@ def loop_here(bench, settings, asked=lambda: ""):
 
 
 def test_a_computer_that_has_slept_brings_the_output_down_and_says_how_long(tmp_path, noting, monkeypatch):
-    loop = loop_here(slow_bench(log=str(tmp_path / "outputs")), tone(slow_bench(), 60.0))
+    loop = loop_here(slow_bench(paced=True, log=str(tmp_path / "outputs")), tone(slow_bench(), 60.0))
     monkeypatch.setattr(rig.worker.loop, "suspended_s", lambda: 3600.0 if loop.daq.blocks > 60 else 0.0)
     loop.run()
     assert loop.cause == "the computer was suspended for 3600.0 s"
