@@ -9,7 +9,8 @@ to a second journal, at the same pace. ``--unprivileged`` takes real-time schedu
 ``missed_percent``, on one footing for both: periods that began more than a period late or were left out, of all.
 ``overrun_percent`` counts, of the loop alone, also those that took too long. ``stalls_per_minute``: begun more than 1 ms late.
 Of the loop's stalls (handed over more than 1 ms late) ``by_its_own_computing`` are those in which its thread itself computed
-for more than 1 ms: only these can be Python's, and a virtual machine's host may have caused them too. In all others somebody else had the processor, as in every stall of
+for more than 1 ms: only these can be Python's, and a virtual machine's host may have caused
+them too. In all others somebody else had the processor, as in every stall of
 cyclictest, a C program. What could have made one, the collector, imports, page faults and switches, is counted with it.
 """
 
