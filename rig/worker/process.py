@@ -2,6 +2,7 @@
 
 import signal
 import sys
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
@@ -16,6 +17,7 @@ from rig.session import TickSettings
 from rig.tick.kernels import tick_block
 from rig.worker.loop import WallClockLoop
 from rig.worker.memory import Layout, SharedMemory, packed
+from rig.worker.pace import pacing_of
 from rig.worker.privileges import prepare
 from rig.worker.probe import probe, round_trips
 
@@ -60,10 +62,10 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         layout = Layout.of(bench, trial.arrays, len(daq.counters), ring_s)
         memory = SharedMemory(descriptor, layout, create=True)
         _load_kernels(daq, bench, settings)
-        asked = _listen()
-        said = prepare(privileged=privileged)
+        came = _listen()
+        said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")  # in no hurry, and never asleep
         daq.start(bench.block)
-        loop = _begin(daq, settings, memory, facts, asked)
+        loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
         try:
             loop.run()
@@ -79,11 +81,11 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
 
 
 def _begin(
-    daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: list[str]
+    daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
 ) -> WallClockLoop:
     tick = settings.build(daq.latency_samples)
     tick.arrays, state = packed(tick.arrays)
-    return WallClockLoop(daq, tick, state, memory, facts, lambda: asked[0] if asked else "")
+    return WallClockLoop(daq, tick, state, memory, facts, asked)
 
 
 def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
@@ -113,9 +115,15 @@ def _listen() -> list[str]:
     return came
 
 
+def _asked(came: list[str], commands: Connection) -> str:
+    """Who has asked this process to end, in a sentence: a signal, or a campaign that talks to it no more."""
+    if came:
+        return f"the loop's process was asked to end ({came[0]})"
+    return "the campaign has let go of the loop" if commands.poll() else ""  # nothing else comes once it runs
+
+
 def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
     """What the loop process alone knows, as plain data for the record."""
-    pacing = "device" if loop.daq.capabilities.paced else "host"
-    counted = {"imports": str(loop.imports), "collections": str(loop.collections)}
-    real_time = {**said, "pacing": pacing, **counted}
+    counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
+    real_time = {**said, **{name: str(value) for name, value in counted.items()}}
     return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}
