@@ -152,6 +152,7 @@ class WallClockLoop:
 
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
         """Complete a chunk and announce it. Without anybody there the slot is filled again."""
+        self._announce()  # the chunk before, where this one ended before it came to it
         if self._alone:
             return
         overruns = self._overruns + self._pace.skipped

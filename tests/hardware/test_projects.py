@@ -94,7 +94,7 @@ def test_an_emulator_that_is_killed_ends_the_run_and_is_an_error_for_the_next_te
     assert status == 1
     assert found["test_a_emulator_dies_in_mid_run"] == ("passed", ""), text
     measured = result["tests"][0]["measured"]
-    assert measured["reason"] == "driver_error"
+    assert measured["reason"] == "driver_failed"
     assert "/dev/" in measured["text"]
     outcome, reason = found["test_b_the_next_one_is_told"]
     assert outcome == "error"
