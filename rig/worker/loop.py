@@ -133,6 +133,7 @@ class WallClockLoop:
 
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
         """Complete a chunk and announce it. Without anybody there the slot is filled again."""
+        self._announce()  # the chunk before, where this one ended before it came to it
         if self._alone:
             return
         slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns

@@ -200,6 +200,15 @@ def test_errors_of_the_driver_arrive_with_their_class_and_message(noting):
     assert loop.report["real_time"]["pacing"] == "device"
 
 
+@pytest.mark.parametrize("hold_s", [0.30, 0.31])
+def test_the_output_comes_down_in_the_rows_whichever_block_of_a_chunk_is_the_last(hold_s):
+    bench = slow_bench("virtual")  # chunks are of two blocks
+    with WorkerSession(bench) as session:
+        rows, loop = ran(session, tone(bench, hold_s))
+    assert rows.size == loop.report["samples"]
+    assert rows["output_v"][-1] == 0.0
+
+
 @pytest.mark.filterwarnings("default")
 def test_a_driver_with_a_fault_of_its_own_ends_the_run_as_a_failed_driver(noting):
     with open_session(slow_bench(fails_after=30, fails_with="TypeError")) as session:
