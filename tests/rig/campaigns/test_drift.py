@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import rig
+from rig.campaigns.plans import load_plan
 from rig.measurements import backbone, frequency_responses
 from rig.models.points_left_out import points_left_out
 from rig.recording.reader import Recording
@@ -86,11 +87,12 @@ def test_a_repetition_that_is_missing_is_left_out_of_nothing_but_the_drift(begun
 
 
 def test_a_stepped_phase_s_response_holds_every_lag_once(tmp_path):
-    plan = stepped(repeat_first=True, levels_n=[0.2], start_deg=-90.0)
+    changes = {"repeat_first": True, "levels_n": (0.25,), "start_deg": -120.0, "stop_deg": -60.0, "step_deg": 30.0}
+    plan = load_plan("magnet-beam/stepped-phase-fast").model_copy(update=changes)
     with rig.run(plan, output=tmp_path / "run.h5", seed=2) as run:
         assert run.complete
         (response,) = frequency_responses(run.recording)
-    assert np.allclose(response.phase_lag_deg, [90.0, 120.0], atol=1.0)
+    assert np.allclose(response.phase_lag_deg, [60.0, 90.0, 120.0], atol=1.0)
     drift = summarise(tmp_path / "run.h5")["drift"]
     assert abs(drift["frequency"]) < 1e-4
     assert abs(drift["amplitude"]) < 0.01
