@@ -95,8 +95,8 @@ def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> 
     part = recording.parts[-1]
     peak_v = float(np.abs(part.rows("output_v")).max(initial=0.0))
     text = (
-        f"played was no more than {peak_v:.2g} V of the {bench.limits.voltage_v:g} V allowed: where amplifier and shaker clip "
-        "above it, the force purity of a run's points tells"
+        f"played were up to {peak_v:.2g} V of the {bench.limits.voltage_v:g} V allowed; amplifier and shaker that clip "
+        "above lower the force purity of a run's points"
     )
     return [Finding("clipping", "", "not tested", peak_v, "V", f"up to {bench.limits.voltage_v:g}", text)]
 

@@ -32,7 +32,9 @@ __all__ = ["plot"]
 def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
     """Draw what is in ``source`` into ``figure`` (png, pdf or svg by its ending).
 
-    With ``lateness`` how punctual the loop of a recording was. Raises `RecordingError` where the file cannot be read or the figure not be written.
+    With ``lateness`` it is how punctual the loop of a recording was.
+
+    Raises `RecordingError` where the file cannot be read or the figure not be written.
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure

@@ -37,7 +37,9 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
         for axis in (counts, beyond):
             axis.axvline(deadline_us, color=REJECTED, ls="--", lw=0.9)
     counts.set(yscale="log", ylabel="blocks per bin")
-    beyond.set(xscale="log", yscale="log", xlabel="time, µs (dashed: deadline)", ylabel="share of blocks that took longer")
+    beyond.set(
+        xscale="log", yscale="log", xlabel="time, µs (dashed: deadline)", ylabel="share of blocks that took longer"
+    )
     beyond.legend(fontsize=8, loc="lower left")
     overruns = sum(loop["overruns"] for loop in loops)
     specimen = recording.configuration["bench"]["specimen"]["name"]

@@ -131,8 +131,8 @@ def test_after_a_trip_an_automated_bench_waits_for_a_person(tmp_path):
         "{",
         "[]",
         *(
-            '{"check": {"at": %s, "failed": [], "recording": "", "fingerprint": ""}, "trip": null}' % at
-            for at in ('"yesterday"', '"2026-01-01T00:00:00"', "5")
+            json.dumps({"check": {"at": at, "failed": [], "recording": "", "fingerprint": ""}, "trip": None})
+            for at in ("yesterday", "2026-01-01T00:00:00", 5)
         ),
     ],
 )
