@@ -28,7 +28,7 @@ class BackbonePlan(SettledPlan):
     direction: Literal["up", "down", "up-down"] = "up"
     """Order of the levels."""
     repeat_first: bool = False
-    """Whether the first point is measured again at the end, to see how far the specimen has drifted; it is part of no result."""
+    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
     ramp_periods: float = Field(20.0, ge=1, le=1e5)
     """Length of the ramp between two levels, periods."""
     record_periods: int = Field(50, ge=4, le=1_000_000)

@@ -26,8 +26,8 @@ def of_the_result(points: Iterable[Point]) -> list[Point]:
 def drift_of(points: Iterable[Point]) -> dict[str, Any] | None:
     """Relative changes from the first point to its repetition, and their numbers in the recording.
 
-    ``points``: the results in the order of the plan. None where the plan repeats nothing or the first point or its repetition was
-    not measured; the change of a quantity that is missing in one of the two is None.
+    ``points``: the results in the order of the plan. None where the plan repeats nothing, or one of the two was not accepted; a
+    single change is None where one of the two has no such number.
     """
     known = list(points)
     again = next((point for point in known if point.get("repeats_first")), None)

@@ -38,7 +38,7 @@ class SteppedPhasePlan(SettledPlan):
     direction: Literal["up", "down", "up-down"] = "up"
     """Whether the lag rises, falls, or rises and falls."""
     repeat_first: bool = False
-    """Whether the first point is measured again at the end, to see how far the specimen has drifted; it is part of no result."""
+    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
     approach_deg: float | None = None
     """Lag at which a level is reached before the first lag is stepped to, deg; the first lag if not given."""
     approach_periods: float = Field(40.0, ge=1, le=1e5)
