@@ -5,7 +5,10 @@ from typing import Any
 
 from rig.console import number, print_table
 
-__all__ = ["TIMES", "print_loop"]
+__all__ = ["PACED", "TIMES", "print_loop"]
+
+PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep": "in lockstep with the device"}
+"""What a recorded pacing is called."""
 
 TIMES = {"wake_up": "wake-up", "execution": "execution", "response": "response"}
 """The times that are counted of every block, and what they are called."""
@@ -23,7 +26,7 @@ def print_loop(loop: Mapping[str, Any], counters: Mapping[str, int]) -> None:
     if not said:
         return
     granted = [f"{name.replace('_', ' ')} {said[name]}" for name in GRANTED if name in said]
-    print(f"  paced by the {said['pacing']}; {'; '.join(granted)}")
+    print(f"  {PACED.get(said['pacing'], said['pacing'])}; {'; '.join(granted)}")
     counted = {name: loop[f"{key}_us"] for key, name in TIMES.items() if f"{key}_us" in loop}
     rows = [(f"  {name}", *(number(found[key], ".1f") for key in SHARES)) for name, found in counted.items()]
     print_table(("  of a block, us", *SHARES.values()), rows)

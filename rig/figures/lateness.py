@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.figures.style import MAIN, REJECTED, SECOND, title
+from rig.loop_table import PACED, TIMES
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_lateness", "exceedance"]
 
-TIMES = {"wake_up": ("wake-up", MAIN), "execution": ("execution", "#4f8f4f"), "response": ("response", SECOND)}
+COLOURS = {"wake_up": MAIN, "execution": "#4f8f4f", "response": SECOND}
 
 
 def draw_lateness(page: "Figure", recording: Recording) -> None:
@@ -26,11 +27,11 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     if not loops:
         raise RecordingError(f"{recording.path}: its loop did not run by the clock, there is no lateness to draw")
     counts, beyond = page.subplots(2, 1, sharex=True)
-    for key, (name, colour) in TIMES.items():
+    for key, colour in COLOURS.items():
         edges, blocks = together([loop["histograms"][key] for loop in loops])
         if not edges.size:
             continue
-        label = f"{name}, largest {max(loop[f'{key}_us']['largest'] for loop in loops):.0f} µs"
+        label = f"{TIMES[key]}, largest {max(loop[f'{key}_us']['largest'] for loop in loops):.0f} µs"
         counts.step(edges, blocks, where="mid", color=colour)
         beyond.step(edges, exceedance(blocks), where="post", color=colour, label=label)
     for deadline_us in sorted({loop["deadline_us"] for loop in loops}):
@@ -43,7 +44,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     beyond.legend(fontsize=8, loc="lower left")
     overruns = sum(loop["overruns"] for loop in loops)
     specimen = recording.configuration["bench"]["specimen"]["name"]
-    title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, paced by the {_pacing(loops)}")
+    title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, {_pacing(loops)}")
 
 
 def together(histograms: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
@@ -65,4 +66,6 @@ def _blocks(loop: Mapping[str, Any]) -> int:
 
 
 def _pacing(loops: Sequence[Mapping[str, Any]]) -> str:
-    return " and the ".join(sorted({loop["real_time"]["pacing"] for loop in loops}))
+    return " and ".join(
+        sorted({PACED.get(pacing, pacing) for pacing in (loop["real_time"]["pacing"] for loop in loops)})
+    )
