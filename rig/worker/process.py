@@ -12,7 +12,7 @@ import numpy as np
 from rig.bench import Bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
-from rig.errors import DaqError, RigError
+from rig.errors import ConfigurationError, DaqError, RigError
 from rig.session import TickSettings
 from rig.tick.kernels import tick_block
 from rig.worker.loop import WallClockLoop
@@ -32,7 +32,7 @@ def main() -> None:
     facts = Connection(int(sys.argv[2]), readable=False)
     memory = int(sys.argv[3])
     try:
-        name, *arguments = commands.recv()
+        name, *arguments = _told(commands)
         if name == "probe":
             facts.send(("probed", probe(*arguments)))
         elif name == "round trips":
@@ -48,6 +48,17 @@ def main() -> None:
         raise
 
 
+def _told(commands: Connection) -> Any:
+    """The next order; `ConfigurationError` where it holds an object of a class that only the campaign's process has."""
+    try:
+        return commands.recv()
+    except (AttributeError, ImportError) as error:
+        raise ConfigurationError(
+            f"the loop's process cannot import what it was sent ({error}): a law, plan or driver of one's own must be "
+            "defined in a module that can be imported, not in the script that is run"
+        ) from None
+
+
 def described(error: RigError) -> tuple[tuple[str, ...], str]:
     """An error for the other process: names of its classes, the closest first, and its message."""
     return tuple(kind.__name__ for kind in type(error).__mro__), str(error)
@@ -57,7 +68,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
     """Open the driver, and run one loop over it if the campaign says so."""
     with make_daq(bench, seed) as daq:
         facts.send(("opened", daq.capabilities, dict(daq.identity), daq.remarks, dict(daq.counters)))
-        _, settings, ring_s = commands.recv()
+        _, settings, ring_s = _told(commands)
         trial = settings.build(0.0)
         layout = Layout.of(bench, trial.arrays, len(daq.counters), ring_s)
         memory = SharedMemory(descriptor, layout, create=True)
