@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 
 from rig.bench import Bench
-from rig.drivers.wire.dialogue import Dialogue
+from rig.drivers.wire.dialogue import ANSWER_S, Dialogue
 from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
 from rig.drivers.wire.round_trips import RoundTrips
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
@@ -59,6 +59,11 @@ class Connection:
                 state = dialogue.ask(Command.GET, Parameter.STATE, tries=1).value
                 break
             if attempt == FIND_TRIES - 1:
+                if dialogue.stray_answers:
+                    raise DaqTimeout(
+                        f"{name}: the device answers later than {ANSWER_S:g} s after it was asked: too slow for a test; "
+                        "is the line, or what is in between, overloaded?"
+                    )
                 raise DaqProtocol(
                     f"{name}: nothing answers that speaks this protocol{dialogue.damage()}; "
                     "is it the right port, and the device switched on?"
