@@ -102,12 +102,12 @@ class Sampling:
         self._gate.close(instant, ramp_s * self._rate_hz)
 
     def stand_still(self, now_s: float) -> float:
-        """Where nobody let us run for longer than the queue, our clock stood still: the host could do nothing meanwhile.
+        """Where nobody let us run for half the queue, our clock stood still: the host waits for the block that is late.
 
-        Returns for how long, s.
+        Half of the queue is then left to it at the least. Returns for how long, s.
         """
         late_s = now_s - self.due_s
-        if late_s <= self._queue * self._block / self._rate_hz:
+        if late_s <= 0.5 * self._queue * self._block / self._rate_hz:
             return 0.0
         self._origin_s += late_s
         return late_s
