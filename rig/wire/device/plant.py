@@ -131,7 +131,14 @@ class VirtualPlant:
         if self._raised.size != n:
             self._buffers_for(n)
         exchange_block(
-            self._arrays, self._state, NO_QUEUE, self._first, voltages, self._readings_v, self._raised, self._raised_count
+            self._arrays,
+            self._state,
+            NO_QUEUE,
+            self._first,
+            voltages,
+            self._readings_v,
+            self._raised,
+            self._raised_count,
         )
         counts, flags = self._counted()
         if self._wiring is not None:
