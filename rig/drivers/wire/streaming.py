@@ -73,7 +73,7 @@ class Streaming:
         link.send(Output(self._due, self._scaling.to_counts(voltages), self._blocks_out & 0xFFFF))
         self._due += self._block
         self._blocks_out += 1
-        if self._blocks_out % self._blocks_between_pings == 0 and self._ping is None:
+        if self._blocks_out % self._blocks_between_pings == 0:  # the answer to the last one may have been lost
             request = self._dialogue.next_request(Command.GET, Parameter.PING, self._blocks_out & 0xFF)
             self._ping = request.number, self._connection.clock()
             link.send(request)

@@ -11,7 +11,7 @@ from rig.drivers.wire import WireOptions
 from rig.errors import DaqProtocol, DaqTimeout, DaqWatchdog
 from rig.wire.device import Device, VirtualPlant
 from rig.wire.device.description import described
-from rig.wire.messages import DeviceState, Message, Output
+from rig.wire.messages import DeviceState, Message, Output, Request
 from tests.rig.drivers.test_wire import BLOCKS, answers, drive, message_of, virtual
 from tests.rig.rigs import bench_with
 from tests.rig.wire.mangled import MangledDAQ
@@ -137,3 +137,23 @@ def test_a_device_whose_answers_come_too_late_is_said_to_be_slow() -> None:
     daq.device.handle = slowly  # type: ignore[method-assign]
     assert "later than 0.1 s" in message_of(DaqTimeout, daq)
     assert daq.counters["stray_answers"] > 0
+
+
+def test_round_trips_are_measured_on_after_the_answer_to_one_was_lost() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(BLOCK)
+        drive(daq, 10, BLOCK)
+        before = daq.statistics["round_trips"]
+        heard, lost = daq.device.handle, []
+
+        def one_lost(message: Message, now_s: float) -> None:
+            if isinstance(message, Request) and not lost:
+                lost.append(message)
+            else:
+                heard(message, now_s)
+
+        daq.device.handle = one_lost  # type: ignore[method-assign]
+        drive(daq, 1000, BLOCK)  # a second
+        assert lost
+        assert daq.statistics["round_trips"] - before == pytest.approx(19, abs=1)
