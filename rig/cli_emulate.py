@@ -63,7 +63,7 @@ def emulate(
 
     def when_ready(ready: "Ready") -> None:
         if bench_file is not None:
-            bench_file.write_text(_bench_text(bench, ready), encoding="utf-8")
+            _write_bench(bench_file, _bench_text(bench, ready))
         if json:
             print(jsonlib.dumps({"wire": wire, **ready.options, "process": ready.process}), flush=True)
         else:
@@ -92,6 +92,15 @@ def _check_bench_file(path: Path | None) -> None:
 
     if path is not None and (path.suffix != ".toml" or not path.parent.is_dir()):
         raise ConfigurationError(f"--bench-file {path}: allowed is a .toml file in a folder that exists")
+
+
+def _write_bench(path: Path, text: str) -> None:
+    from rig.errors import ConfigurationError
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"--bench-file {path}: cannot be written: {error.strerror}") from error
 
 
 def _bench_text(bench: str, ready: "Ready") -> str:

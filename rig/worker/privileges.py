@@ -19,7 +19,7 @@ SET_TIMER_SLACK = 29  # <sys/prctl.h>
 NO_SUCH = "not on this system"
 
 
-def prepare(*, privileged: bool = True) -> dict[str, str]:
+def prepare(*, privileged: bool = True, priority: int = PRIORITY) -> dict[str, str]:
     """Ask for all of it in this process; returns what came of each.
 
     ``privileged`` false leaves out what needs a permission. The garbage collector is off from here on: what is there is kept
@@ -30,7 +30,7 @@ def prepare(*, privileged: bool = True) -> dict[str, str]:
     gc.disable()
     steps: dict[str, Callable[[], str]] = {"timer_slack": _timer_slack, "processor": _affinity}
     if privileged:
-        steps |= {"memory": _lock_memory, "scheduling": _schedule}
+        steps |= {"memory": _lock_memory, "scheduling": lambda: _schedule(priority)}
     out = {"garbage_collector": "off"}
     for name, step in steps.items():
         try:
@@ -42,15 +42,15 @@ def prepare(*, privileged: bool = True) -> dict[str, str]:
     return {"memory": "not asked for", "scheduling": "not asked for"} | out
 
 
-def _schedule() -> str:
+def _schedule(priority: int) -> str:
     """SCHED_FIFO for every thread that there is by now; new ones inherit it."""
     if not hasattr(os, "sched_setscheduler"):
         return NO_SUCH
     folder = Path("/proc/self/task")
     threads = [int(path.name) for path in folder.iterdir()] if folder.exists() else [0]
     for thread in threads:
-        os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    return f"SCHED_FIFO {PRIORITY}"
+        os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+    return f"SCHED_FIFO {priority}"
 
 
 def _lock_memory() -> str:

@@ -5,7 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from rig.drivers.serial import SerialOptions
+from rig import errors
+from rig.bench import DriverChoice
+from rig.drivers.serial import SerialDAQ, SerialOptions
+from rig.drivers.wire.connection import Connection
 from rig.wire.messages import (
     ARM_KEY,
     VERSION,
@@ -28,6 +31,7 @@ from rig.wire.serial.load import line_load
 from tests.docs import wire
 from tests.docs.tables import table_under
 from tests.docs.test_keys import shown_default, shown_range
+from tests.rig.rigs import bench_with
 from tests.rig.wire.serial.strategies import same
 
 KINDS = {
@@ -48,6 +52,21 @@ TABLES = {
 
 def numbers(text):
     return {(int(number), name) for number, name in re.findall(r"^\| (\d+) \| ([A-Z_0-9]+) \|", text, re.MULTILINE)}
+
+
+def test_what_goes_wrong_names_errors_and_counters_that_there_are():
+    table = table_under("What goes wrong", wire.PAGE.read_text(encoding="utf-8"))["table"]
+    words = set(re.findall(r"`(\w+)`", table)) - {one.name for one in Parameter}
+    named = {word for word in words if word.startswith("Daq")}
+    assert named == {name for name in errors.__all__ if name.startswith("Daq")} - {"DaqError", "DaqOverrun"}
+    daq = SerialDAQ(bench_on_a_port())
+    daq._connection = Connection(daq._make_link(), daq.clock)
+    assert words - named == set(daq.counters) - {"overload", "output_clipped", "unsent_frames"}
+
+
+def bench_on_a_port():
+    driver = DriverChoice(name="serial", options={"port": "/dev/ttyACM0"})
+    return bench_with().model_copy(update={"driver": driver})
 
 
 def spaced(text):

@@ -20,7 +20,7 @@ from rig.wire.messages import (
     as_text,
 )
 
-__all__ = ["Dialogue"]
+__all__ = ["ANSWER_S", "Dialogue"]
 
 TRIES = 5
 ANSWER_S = 0.1

@@ -124,5 +124,5 @@ class Incoming:
             )
         raise DaqWatchdog(
             f"{self._link.name}: the device's watchdog has brought the output to 0 V, for no output had come in time "
-            "(driver.options.watchdog_s)"
+            f"(driver.options.watchdog_s){self._dialogue.damage()}"
         )

@@ -79,15 +79,26 @@ def _pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
         raise DaqRefused(f"this system has no pseudo-terminals: {error}") from error
     try:
         if link is not None:
-            if link.is_symlink():
-                link.unlink()
-            try:
-                link.symlink_to(line.path)
-            except OSError as error:
-                raise ConfigurationError(f"link = {str(link)!r}: cannot be made: {error.strerror}") from error
+            _name(link, line.path)
         yield line.descriptor, str(link.absolute()) if link is not None else line.path
     finally:
-        if link is not None and link.is_symlink():
-            with suppress(OSError):
-                link.unlink()
+        if link is not None:
+            with suppress(OSError):  # it may have been removed, or lead elsewhere by now
+                if link.readlink() == Path(line.path):
+                    link.unlink()
         line.close()
+
+
+def _name(link: Path, path: str) -> None:
+    """Have a symbolic link lead to a port. One that leads nowhere was left behind and gives way."""
+    try:
+        if link.is_symlink():
+            target = link.readlink()
+            if target != Path(path) and link.exists():
+                raise ConfigurationError(
+                    f"link = {str(link)!r}: leads to {target} already; end the emulator there, or remove the link"
+                )
+            link.unlink()
+        link.symlink_to(path)
+    except OSError as error:
+        raise ConfigurationError(f"link = {str(link)!r}: cannot be made: {error.strerror}") from error

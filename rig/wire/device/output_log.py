@@ -1,21 +1,32 @@
 """What a device puts out, written down: so that somebody else can see when it came to 0 V."""
 
+import os
 import time
 from pathlib import Path
 
 import numpy as np
 
+from rig.errors import ConfigurationError
 from rig.wire.device.plant import Plant
 
 __all__ = ["LoggedPlant"]
 
 
 class LoggedPlant:
-    """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V."""
+    """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V.
+
+    A file that cannot be made is a `ConfigurationError`; a disk that is full later ends the writing and nothing else.
+    """
 
     def __init__(self, plant: Plant, path: Path) -> None:
         self._plant = plant
-        self._file = path.open("w", buffering=1, encoding="ascii")
+        try:
+            self._descriptor = os.open(
+                path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644
+            )  # for as long as the device lives
+        except OSError as error:
+            raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
+        self._is_full = False
         self._first = 0
         for name in ("names", "range_v", "v_per_count", "skew_s", "output_range_v", "output_v_per_count"):
             setattr(self, name, getattr(plant, name))
@@ -35,6 +46,11 @@ class LoggedPlant:
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
         """Write down, then measure."""
-        self._file.write(f"{time.monotonic():.6f} {self._first} {np.abs(voltages).max():.6g}\n")
+        if not self._is_full:
+            line = f"{time.monotonic():.6f} {self._first} {np.abs(voltages).max():.6g}\n"
+            try:
+                os.write(self._descriptor, line.encode("ascii"))
+            except OSError:
+                self._is_full = True
         self._first += voltages.size
         return self._plant.step(voltages)

@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
+from rig.drivers.virtual.kernels import exchange_block
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.layout import Flag
@@ -14,6 +15,7 @@ from simulators.layout import Flag
 __all__ = ["Plant", "VirtualPlant", "Wiring"]
 
 WHOLE_RANGE = 2.0**31  # counts of a converter without steps, in 32 bits
+NO_QUEUE = np.zeros(0)  # what is under way is the device's
 
 
 class Plant(Protocol):
@@ -88,44 +90,56 @@ class VirtualPlant:
             key: value for key, value in bench.driver.options.items() if key not in ("queue_blocks", "delay_samples")
         }
         driver = bench.driver.model_copy(update={"options": dict(options)})
-        self._daq = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed)
-        converter = self._daq.rig.converter
-        self.names = tuple(self._daq.rig.channel_names)
+        daq = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed)
+        self._rig, self._seed = daq.rig, seed
+        converter = self._rig.converter
+        self.names = tuple(self._rig.channel_names)
         self.bits = 16 if 1 <= converter.adc_bits <= 16 and 1 <= converter.dac_bits <= 16 else 32
         step_v = converter.adc_step_v or converter.adc_range_v / WHOLE_RANGE
         self.v_per_count = np.full(len(self.names), step_v)
         self.range_v = np.full(len(self.names), converter.adc_range_v)
-        self.skew_s = self._daq.rig.channel_delays_samples / bench.sample_rate_hz
+        self.skew_s = self._rig.channel_delays_samples / bench.sample_rate_hz
         self.output_range_v = converter.dac_range_v
         self.output_v_per_count = converter.dac_step_v or converter.dac_range_v / WHOLE_RANGE
         self.rate_hz = bench.sample_rate_hz
-        self.filter_delay_s = self._daq.rig.filter_delay_samples / bench.sample_rate_hz
+        self.filter_delay_s = daq.filter_delay_samples / bench.sample_rate_hz
         self._wiring = wiring if wiring is not None and not wiring.as_it_should_be else None
+        self._raised_count = np.zeros(len(Flag), np.int64)
         self._dtype = np.dtype(f"<i{self.bits // 8}")
-        self._first = 0
-        self._volts = np.empty((0, len(self.names)))
-        self._flags = {
+        self._device_flags = {
             int(Flag.SENSOR_CLIPPED): int(DeviceFlag.OVERLOAD),
             int(Flag.DIVERGED): int(DeviceFlag.OVERLOAD),
             int(Flag.DAC_CLIPPED): int(DeviceFlag.OUTPUT_CLIPPED),
             int(Flag.AMPLIFIER_CLIPPED): int(DeviceFlag.OUTPUT_CLIPPED),
         }
-        self._daq.open()
+        self.reset()
 
     def reset(self) -> None:
         """Back to rest, at sample 0, with the noise of the same seed."""
-        self._daq.stop()
-        self._daq.start(1)  # its flags are those of one sample now: the buffers are made anew with the first block
-        self._volts = np.empty((0, len(self.names)))
+        self._arrays, self._state = self._rig.build(self._seed)
         self._first = 0
+        self._buffers_for(0)
+
+    def _buffers_for(self, n: int) -> None:
+        """The kernel writes into these without asking for their size: they are always those of the block at hand."""
+        self._readings_v = np.empty((n, len(self.names)))
+        self._raised = np.zeros(n, np.uint16)
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
         """Advance the virtual rig by one sample a voltage."""
         n = voltages.size
-        if self._volts.shape[0] != n:
-            self._volts = np.empty((n, len(self.names)))
-            self._daq.flags = np.zeros(n, np.uint16)
-        self._daq._exchange(voltages, self._volts)
+        if self._raised.size != n:
+            self._buffers_for(n)
+        exchange_block(
+            self._arrays,
+            self._state,
+            NO_QUEUE,
+            self._first,
+            voltages,
+            self._readings_v,
+            self._raised,
+            self._raised_count,
+        )
         counts, flags = self._counted()
         if self._wiring is not None:
             counts = self._wiring.connect(counts, self._first)
@@ -134,11 +148,11 @@ class VirtualPlant:
 
     def _counted(self) -> tuple[np.ndarray, int]:
         """The readings as counts: they lie on the converter's steps and within its range, so nothing is lost."""
-        raised = int(self._daq.flags[0]) if self._daq.flags.size == 1 else int(np.bitwise_or.reduce(self._daq.flags))
-        scaled = self._volts / self.v_per_count
+        raised = int(np.bitwise_or.reduce(self._raised))
+        scaled = self._readings_v / self.v_per_count
         flags = 0
         if raised:
-            for bit, device_bit in self._flags.items():
+            for bit, device_bit in self._device_flags.items():
                 flags |= device_bit if raised & bit else 0
             if raised & Flag.DIVERGED:
                 scaled = np.nan_to_num(scaled, nan=2.0 ** (self.bits - 1) - 1.0)

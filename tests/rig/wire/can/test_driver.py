@@ -44,7 +44,7 @@ def test_a_device_in_lockstep_returns_what_the_virtual_driver_returns_bit_for_bi
     channel = uuid4().hex
     options = {"fd": fd, "queue_blocks": queue_blocks, "data_bitrate": 8_000_000}
     bench = bench_on("virtual", channel, block, **options)
-    monkeypatch.setattr("rig.drivers.wire.driver.MOST_LOAD", 2.0)  # in lockstep 5 kHz may be too much for the wire
+    monkeypatch.setattr("rig.drivers.wire.connection.MOST_LOAD", 2.0)  # in lockstep 5 kHz may be too much for the wire
     with device_on(virtual_bus(channel, fd), fd):
         daq = CanDAQ(bench)
         np.testing.assert_array_equal(readings(daq, block), expected(block, queue_blocks))
@@ -111,7 +111,7 @@ def test_a_device_with_another_definition_is_refused(tmp_path: Path) -> None:
 
 
 def test_nobody_on_the_bus_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rig.drivers.wire.driver.FIND_TRIES", 2)
+    monkeypatch.setattr("rig.drivers.wire.connection.FIND_TRIES", 2)
     with pytest.raises(DaqProtocol, match="nothing answers"):
         CanDAQ(bench_on("virtual", uuid4().hex)).open()
 

@@ -13,12 +13,16 @@ import numpy as np
 import pytest
 
 from rig.bench import Bench, DriverChoice, load_bench
+from rig.cli_emulate import _write_bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqEmergencyStop, DaqTimeout
 from rig.wire.device import VirtualPlant, Wiring
 from rig.wire.device.emulator import Emulator, emulated
-from tests.rig.drivers.test_wire import answers, virtual
+from rig.wire.device.ends import device_end
+from rig.wire.device.output_log import LoggedPlant
+from rig.wire.device.settings import EmulatorSettings
+from tests.rig.drivers.test_wire import answers, virtual, voltages
 from tests.rig.rigs import bench_with
 from tests.rig.wire.device.host_process import RAMP_S, WATCHDOG_S
 
@@ -129,6 +133,8 @@ def test_the_command_says_where_it_is_and_writes_a_bench_that_reaches_it(tmp_pat
         assert bench.driver.name == "serial"
         assert bench.driver.options["port"] == str(link)
         assert link.is_symlink()
+        with make_daq(bench) as daq:
+            assert daq.identity["port"] == str(link)
         os.kill(process.pid, signal.SIGINT)
         assert json.loads(process.stdout.readline()) == {}
         assert process.wait(10.0) == 0
@@ -142,3 +148,64 @@ def test_what_cannot_be_emulated_is_refused_in_one_line() -> None:
         Emulator(bench_with(), "usb")
     with pytest.raises(ConfigurationError, match="allowed is version"):
         Emulator(bench_with(), faults={"vers": 2})
+
+
+def test_a_host_may_come_back_as_often_as_it_likes(serial_bench: Bench) -> None:
+    expected = virtual(5)[:10]
+    for _ in range(20):
+        with make_daq(serial_bench) as daq:
+            daq.start(5)
+            inputs = np.vstack([daq.exchange(volts) for volts in voltages(5, 2)])
+            np.testing.assert_array_equal(inputs, expected)
+            assert not daq.remarks
+
+
+def test_a_device_that_streams_to_a_dead_host_is_taken_over_by_the_next() -> None:
+    with Emulator(bench_with(), lockstep=False, options={"watchdog_s": 2.0, "timeout_s": 5.0}) as emulator:
+        port = str(emulator.bench.driver.options["port"])
+        with subprocess.Popen(
+            [sys.executable, "-m", "tests.rig.wire.device.host_process", port], stdout=subprocess.PIPE, text=True
+        ) as host:
+            assert host.stdout is not None
+            assert host.stdout.readline() == "driving\n"
+            host.kill()
+        for found in ("still running", ""):
+            with make_daq(emulator.bench) as daq:
+                daq.start(250)
+                inputs = np.vstack([daq.exchange(np.zeros(250)) for _ in range(8)])
+                assert np.isfinite(inputs).all()
+                assert daq.counters["lost_samples"] == 0
+                assert found in "".join(daq.remarks)
+
+
+def test_a_link_left_behind_gives_way_and_one_in_use_does_not(tmp_path: Path) -> None:
+    link = tmp_path / "device"
+    settings = EmulatorSettings(wire="serial", bench=bench_with(), link=link)
+    link.symlink_to(tmp_path / "yesterday")
+    with device_end(settings) as (_, options):
+        assert options["port"] == str(link)
+        assert link.resolve().is_char_device()
+        with (
+            pytest.raises(ConfigurationError, match=r"leads to .* already; end the emulator there"),
+            device_end(settings),
+        ):
+            pass
+        assert link.is_symlink()
+        link.unlink()
+        link.symlink_to(tmp_path / "another")
+    assert link.is_symlink()  # another's, by now
+    link.unlink()
+    link.write_text("notes")
+    with pytest.raises(ConfigurationError, match="cannot be made: File exists"), device_end(settings):
+        pass
+    assert link.read_text() == "notes"
+
+
+def test_a_full_disk_is_one_line_and_a_log_that_ends_does_not_end_the_device(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match="--bench-file /dev/full: cannot be written: No space left"):
+        _write_bench(Path("/dev/full"), "base")
+    with pytest.raises(ConfigurationError, match=r"log_output = .* cannot be written"):
+        LoggedPlant(VirtualPlant(bench_with()), tmp_path / "no" / "log")
+    plant = LoggedPlant(VirtualPlant(bench_with()), Path("/dev/full"))
+    for _ in range(3):
+        assert plant.step(np.zeros(5))[0].shape == (5, 4)

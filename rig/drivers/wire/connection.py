@@ -1,0 +1,112 @@
+"""A device at the other end of an open link: found, brought to rest, compared with the bench, and timed."""
+
+import contextlib
+import math
+from collections.abc import Callable
+
+from rig.bench import Bench
+from rig.drivers.wire.dialogue import ANSWER_S, Dialogue
+from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
+from rig.drivers.wire.round_trips import RoundTrips
+from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
+from rig.wire.link import Link
+from rig.wire.messages import Command, DeviceState, Parameter, Stream
+
+__all__ = ["Connection"]
+
+MOST_LOAD = 0.9  # of what the wire carries
+FIND_TRIES = 20
+OPENING_PINGS = 50
+
+
+class Connection:
+    """A link and who answers at its other end.
+
+    Errors: those of `rig.errors`, each in one line that begins with the name of the port.
+    """
+
+    def __init__(self, link: Link, clock: Callable[[], float]) -> None:
+        self.link, self.clock = link, clock
+        self.dialogue = Dialogue(link, clock)
+        self.facts: DeviceFacts | None = None
+        """What the device says of itself, once it has been met."""
+        self.round_trips = RoundTrips()
+        self.load_share = 0.0
+        """Of what the wire carries, taken by the stream that was checked last."""
+        self.sustainable_hz = math.inf
+        """Sample rate that wire and device would carry with such blocks."""
+        self.found_running = self.cleared = False
+        """In what state it was found."""
+
+    def meet(self, bench: Bench, queue: int) -> None:
+        """Find the device, and refuse it where it is not the bench's or the wire cannot carry its stream."""
+        self._find()
+        negotiate(self.dialogue)
+        facts = read_facts(self.dialogue)
+        compare(facts, bench, self.link.name, self.link.layout_crc)
+        self.facts = facts
+        self.check_capacity(Stream(len(bench.channels), bench.block, bench.sample_rate_hz, facts.bits, queue))
+        for number in range(OPENING_PINGS):
+            began = self.clock()
+            self.dialogue.ask(Command.GET, Parameter.PING, number)
+            self.round_trips.add(self.clock() - began)
+
+    def _find(self) -> None:
+        """Ask until something answers, and bring what a dead host has left running to rest."""
+        dialogue, name = self.dialogue, self.link.name
+        for attempt in range(FIND_TRIES):
+            with contextlib.suppress(DaqTimeout):
+                state = dialogue.ask(Command.GET, Parameter.STATE, tries=1).value
+                break
+            if attempt == FIND_TRIES - 1:
+                if dialogue.stray_answers:
+                    raise DaqTimeout(
+                        f"{name}: the device answers later than {ANSWER_S:g} s after it was asked: too slow for a test; "
+                        "is the line, or what is in between, overloaded?"
+                    )
+                raise DaqProtocol(
+                    f"{name}: nothing answers that speaks this protocol{dialogue.damage()}; "
+                    "is it the right port, and the device switched on?"
+                )
+        self.found_running = state in (DeviceState.RUNNING, DeviceState.ARMED)
+        dialogue.do(Command.STOP)
+        dialogue.forget()
+
+    def check_capacity(self, stream: Stream) -> None:
+        """`DaqRefused`, with the sum, where the wire cannot carry a stream."""
+        assert self.facts is not None
+        load = self.link.load(stream)
+        self.load_share = load.share
+        highest_hz = self.facts.rate_hz[1]
+        self.sustainable_hz = min(highest_hz, MOST_LOAD * stream.rate_hz / load.share if load.share else math.inf)
+        if load.share >= MOST_LOAD:
+            raise DaqRefused(
+                f"{self.link.name}: {stream.rate_hz:g} Hz in blocks of {stream.block} would take "
+                f"{100.0 * load.share:.0f} % of the wire, allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
+            )
+
+    def clear(self) -> None:
+        """Release a watchdog or emergency stop that has latched in an earlier run."""
+        if self.dialogue.get(Parameter.STATE) == DeviceState.LATCHED:
+            self.dialogue.do(Command.CLEAR)
+            self.cleared = True
+
+    def set(self, parameter: Parameter, value: int, key: str, scale: float, unit: str) -> None:
+        """Set a parameter; ``key``, ``scale`` and ``unit`` are those of the bench, for the message that it cannot be."""
+        answer = self.dialogue.ask(Command.SET, parameter, value=value)
+        if answer.status != 0 or answer.value != value:
+            raise DaqMismatch(
+                f"{self.link.name}: {key} = {value * scale:g} {unit}: not what the device can do, "
+                f"the nearest is {answer.value * scale:g} {unit}"
+            )
+
+    def close(self) -> None:
+        """Tell the device to stop, if there still is one, and let go of the port."""
+        with contextlib.suppress(DaqError):
+            self.link.send(self.dialogue.next_request(Command.STOP))
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Let go of the port."""
+        with contextlib.suppress(DaqError):
+            self.link.close()

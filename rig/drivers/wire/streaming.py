@@ -1,0 +1,113 @@
+"""One run over a wire, from the setting of the device's parameters on: outputs go out, blocks come in, pings in between."""
+
+import math
+
+import numpy as np
+
+from rig.daq import LOST
+from rig.drivers.wire.connection import Connection
+from rig.drivers.wire.facts import DeviceFacts
+from rig.drivers.wire.incoming import Incoming
+from rig.drivers.wire.options import WireOptions
+from rig.drivers.wire.scaling import Scaling
+from rig.errors import DaqRefused
+from rig.wire.messages import ARM_KEY, Answer, Command, DeviceFlag, Output, Parameter, Stream
+
+__all__ = ["FLAG_NAMES", "Streaming"]
+
+PINGS_PER_S = 20.0
+SHORTEST_WATCHDOG_BLOCKS = 2
+FLAG_NAMES = tuple(str(flag.name).lower() for flag in DeviceFlag)
+
+
+class Streaming:
+    """The two streams of a run.
+
+    The device begins to sample, and is armed, with the first call of `exchange`.
+    """
+
+    def __init__(self, connection: Connection, stream: Stream, options: WireOptions) -> None:
+        self._connection, self._dialogue, self._link = connection, connection.dialogue, connection.link
+        self._block, self._began = stream.block, False
+        facts = connection.facts
+        assert facts is not None
+        connection.check_capacity(stream)
+        watchdog_s = _watchdog_s(stream, options, facts)
+        connection.clear()
+        self._set_up(stream, watchdog_s, options.ramp_s)
+        block_s = stream.block / stream.rate_hz
+        timeout_s = options.timeout_s or max(0.25, 10.0 * block_s)
+        self._dialogue.early.clear()
+        longest_gap = math.ceil((watchdog_s + timeout_s) * stream.rate_hz) + stream.block
+        shape = stream.block, stream.n_channels
+        self.incoming = Incoming(self._dialogue, shape, longest_gap, timeout_s, facts.boot)
+        self.incoming.on_answer = self._take_answer
+        self.flag_counts = dict.fromkeys(FLAG_NAMES, 0)
+        """Samples by device flag."""
+        self._scaling = Scaling(facts, stream.block)
+        self._due = stream.queue * stream.block
+        self._blocks_out = 0
+        self._blocks_between_pings = max(1, round(1.0 / block_s / PINGS_PER_S))
+        self._ping: tuple[int, float] | None = None
+
+    def _set_up(self, stream: Stream, watchdog_s: float, ramp_s: float) -> None:
+        put = self._connection.set
+        put(Parameter.RATE_MHZ, round(1e3 * stream.rate_hz), "sample_rate_hz", 1e-3, "Hz")
+        put(Parameter.BLOCK, stream.block, "block", 1, "samples")
+        put(Parameter.QUEUE, stream.queue, "driver.options.queue_blocks", 1, "blocks")
+        put(Parameter.WATCHDOG_US, round(1e6 * watchdog_s), "driver.options.watchdog_s", 1e-6, "s")
+        put(Parameter.RAMP_US, round(1e6 * ramp_s), "driver.options.ramp_s", 1e-6, "s")
+        self._link.configure(stream)
+
+    def _begin(self) -> None:
+        self._dialogue.forget()
+        self._dialogue.do(Command.START)
+        self._dialogue.do(Command.ARM, value=ARM_KEY)
+        self._began = True
+
+    def exchange(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
+        """Hand over a block of outputs [n], fill in one of inputs [n, n_channels] and its flags [n]."""
+        if not self._began:
+            self._begin()
+        link = self._link
+        link.send(Output(self._due, self._scaling.to_counts(voltages), self._blocks_out & 0xFFFF))
+        self._due += self._block
+        self._blocks_out += 1
+        if self._blocks_out % self._blocks_between_pings == 0:  # the answer to the last one may have been lost
+            request = self._dialogue.next_request(Command.GET, Parameter.PING, self._blocks_out & 0xFF)
+            self._ping = request.number, self._connection.clock()
+            link.send(request)
+        samples = self.incoming.take()
+        if samples is None:
+            inputs.fill(np.nan)
+            flags.fill(LOST)
+            return
+        self._scaling.to_volts(samples.counts, inputs)
+        flags.fill(samples.flags)
+        if samples.flags:
+            for bit, name in enumerate(FLAG_NAMES):
+                if samples.flags & (1 << bit):
+                    self.flag_counts[name] += self._block
+
+    def _take_answer(self, answer: Answer) -> None:
+        if self._ping is not None and answer.number == self._ping[0]:
+            self._connection.round_trips.add(self._connection.clock() - self._ping[1])
+            self._ping = None
+        else:
+            self._dialogue.note_stray(answer)
+
+    def stop(self) -> None:
+        """0 V, no more samples."""
+        self._dialogue.do(Command.STOP)
+        self._dialogue.early.clear()
+
+
+def _watchdog_s(stream: Stream, options: WireOptions, facts: DeviceFacts) -> float:
+    block_s = stream.block / stream.rate_hz
+    watchdog_s = options.watchdog_s or max(0.1, 4.0 * block_s, facts.watchdog_s[0])
+    if watchdog_s < SHORTEST_WATCHDOG_BLOCKS * block_s:
+        raise DaqRefused(
+            f"driver.options.watchdog_s = {watchdog_s:g}: allowed is from {SHORTEST_WATCHDOG_BLOCKS * block_s:g} s on, "
+            f"{SHORTEST_WATCHDOG_BLOCKS} blocks of {stream.block} samples"
+        )
+    return watchdog_s
