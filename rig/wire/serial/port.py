@@ -11,7 +11,7 @@ from serial.tools import list_ports
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqError, DaqRefused
 
-__all__ = ["open_port", "port_names"]
+__all__ = ["open_port", "port_names", "second_descriptor"]
 
 BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: somebody holds its lock
 CONTROL_CHARACTERS = 6  # in the list that termios returns
@@ -40,6 +40,14 @@ def open_port(path: str, baud: int) -> Any:
         port.close()
         raise DaqDisconnected(f"port {path!r}: it went while it was being opened: {error}") from error
     return port
+
+
+def second_descriptor(path: str) -> int:
+    """Another descriptor of a port that is open already: for writing, which never waits, while reading may."""
+    try:
+        return os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError as error:
+        raise DaqDisconnected(f"port {path!r}: it went while it was being opened: {error}") from error
 
 
 def _no_bytes_means_gone(descriptor: int) -> None:
