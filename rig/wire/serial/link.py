@@ -96,15 +96,15 @@ class SerialLink(Link):
     def send(self, message: Message) -> None:
         """Send one message; `DaqTimeout` says that the line takes no more, and that nothing of it was sent."""
         data = frame(self._codec.encode(message))
-        if not isinstance(message, STREAMED):
+        if message.__class__ not in STREAMED:
             data = b"\0" + data  # ends what noise on an idle line may have begun
         if self._unfinished:
             data = self._unfinished + data
         written = self._write(data)
-        if written == len(data):
-            self._unfinished = b""
-        else:
+        if written < len(data):
             self._send_slowly(data, written)
+        elif self._unfinished:
+            self._unfinished = b""
 
     def receive(self, timeout_s: float) -> Message | None:
         """Return the next message; wait for it at most so long."""
@@ -117,10 +117,11 @@ class SerialLink(Link):
                 data = self._input.read(timeout_s)
             except (OSError, ValueError) as error:
                 raise self._gone(error) from error
-            if data:
-                received.extend(self._reader.feed(data))
-                if received:
-                    return received.popleft()
+            messages = self._reader.feed(data) if data else None
+            if messages:
+                if len(messages) > 1:
+                    received.extend(messages[1:])
+                return messages[0]
             timeout_s = deadline - time.monotonic()
             if timeout_s <= 0.0:
                 return None

@@ -8,7 +8,6 @@ import errno
 import os
 import select
 import termios
-from contextlib import suppress
 from typing import Any, Protocol
 
 __all__ = ["CHUNK", "Input", "NoInput", "PolledInput", "TimedInput"]
