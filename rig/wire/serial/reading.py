@@ -36,7 +36,11 @@ class NoInput:
 
 
 class PolledInput:
-    """Any descriptor: waited for, then read. Makes it a descriptor that never blocks."""
+    """Any descriptor: waited for, then read. Makes it a descriptor that never blocks.
+
+    A wait ends at news (edges, which spares the system a second look), and whatever ends it, there is a look at what has come: so
+    nothing stays unread beyond the wait.
+    """
 
     def __init__(self, descriptor: int) -> None:
         os.set_blocking(descriptor, False)
@@ -45,15 +49,14 @@ class PolledInput:
         self._epoll: Any = select.epoll() if hasattr(select, "epoll") else None
         if self._epoll is not None:
             try:
-                self._epoll.register(descriptor, select.EPOLLIN)
+                self._epoll.register(descriptor, select.EPOLLIN | select.EPOLLET)
             except OSError:  # a file, which is always ready
                 self.close()
 
     def read(self, timeout_s: float) -> bytes:
         """What there is, or has come within the time; a long wait may end a millisecond early."""
         if timeout_s >= COARSE_S and self._epoll is not None:
-            if not self._epoll.poll(timeout_s - MILLISECOND_S):  # which it rounds up
-                return b""
+            self._epoll.poll(timeout_s - MILLISECOND_S)  # which it rounds up
         elif timeout_s > 0.0 and not select.select(self._watched, (), (), timeout_s)[0]:
             return b""
         try:
