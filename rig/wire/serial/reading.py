@@ -38,7 +38,7 @@ class NoInput:
 class PolledInput:
     """Any descriptor: waited for, then read. Makes it a descriptor that never blocks.
 
-    A wait ends at news (edges, which spares the system a second look), and whatever ends it, there is a look at what has come: so
+    A wait ends at news (edges: the system need not look twice), and whatever ends it, what has come is read: so
     nothing stays unread beyond the wait.
     """
 
