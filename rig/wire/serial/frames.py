@@ -34,7 +34,7 @@ def payload_of(encoded: bytes) -> bytes:
         data: bytes = decode(encoded)
     except DecodeError as error:
         raise Damaged(str(error)) from error
-    if crc32(data) != RESIDUE:  # nor are fewer bytes than those of a CRC-32 ever intact
+    if crc32(data) != RESIDUE:  # which no three bytes or fewer have
         raise Damaged(f"CRC-32 of {len(data)} bytes")
     return data[:-CRC_SIZE]
 
@@ -67,7 +67,8 @@ class FrameReader:
         """Messages that are complete with these bytes, in order."""
         if self._rest:
             data = self._rest + data
-        *parts, self._rest = data.split(b"\0")
+        parts = data.split(b"\0")
+        self._rest = parts.pop()
         if self._skipping and parts:
             self._counters["garbage_bytes"] += len(parts.pop(0))
             self._skipping = False
