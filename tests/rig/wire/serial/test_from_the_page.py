@@ -51,14 +51,16 @@ def bench_at(port: str, **options: object) -> Bench:
 
 class TestMadeFromThePage(DriverContract):
     @pytest.fixture(autouse=True)
-    def _reached(self, port):
-        self.port = port
+    def _reached(self):
+        with device() as (self.process, self.port):
+            yield
 
     def make(self):
         return make_daq(bench_at(self.port))
 
-    def test_a_device_that_is_gone_is_a_daq_error_and_can_be_closed(self):
-        """Has a test of its own below."""
+    def unplug(self, daq):
+        self.process.kill()
+        return True
 
 
 del DriverContract
