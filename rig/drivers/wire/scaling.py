@@ -11,9 +11,10 @@ class Scaling:
     """The scales of a device, for blocks of one size."""
 
     def __init__(self, facts: DeviceFacts, block: int) -> None:
-        self._counts_per_v = 1.0 / facts.output_v_per_count
+        self._counts_per_v = np.full(block, 1.0 / facts.output_v_per_count)
         self._v_per_count = facts.v_per_count.copy()
-        self._lowest, self._highest = -(2.0 ** (facts.bits - 1)), 2.0 ** (facts.bits - 1) - 1.0
+        beyond = 2.0 ** (facts.bits - 1)
+        self._lowest, self._highest = np.full(block, -beyond), np.full(block, beyond - 1.0)
         self._dtype = np.dtype(f"<i{facts.bits // 8}")
         self._scaled = np.empty(block)
 
@@ -22,7 +23,8 @@ class Scaling:
         scaled = self._scaled
         np.multiply(voltages, self._counts_per_v, out=scaled)
         np.rint(scaled, out=scaled)
-        np.clip(scaled, self._lowest, self._highest, out=scaled)
+        np.maximum(scaled, self._lowest, out=scaled)  # both in a third of the time of np.clip
+        np.minimum(scaled, self._highest, out=scaled)
         return scaled.astype(self._dtype)
 
     def to_volts(self, counts: np.ndarray, inputs: np.ndarray) -> None:

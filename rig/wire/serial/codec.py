@@ -55,7 +55,7 @@ class Codec:
 
     def __init__(self) -> None:
         self._counts = np.dtype("<i2")
-        self._shape = (0, 0)
+        self._shape, self._output_shape = (0, 0), (0,)
         self._samples_size = self._output_size = 0  # of no payload: nothing is understood before `configure`
 
     def configure(self, stream: Stream) -> None:
@@ -72,7 +72,7 @@ class Codec:
                 f"allowed is {LARGEST_PAYLOAD}; ask for a smaller block"
             )
         self._counts = np.dtype(f"<i{stream.bits // 8}")
-        self._shape = (stream.block, stream.n_channels)
+        self._shape, self._output_shape = (stream.block, stream.n_channels), (stream.block,)
         self._samples_size, self._output_size = samples_size, output_size
 
     @staticmethod
@@ -83,15 +83,19 @@ class Codec:
 
     def encode(self, message: Message) -> bytes:
         """The payload of a message; counts must have the shape agreed on."""
-        if isinstance(message, Samples):
+        if message.__class__ is Samples:
             first, counts, flags, dropped, clock_us, sequence = message
-            data = self._bytes_of(counts, self._shape)
-            head = (VERSION, SAMPLES, sequence & 0xFFFF, first, clock_us, min(dropped, MOST_DROPPED), flags)
-            return SAMPLES_HEAD.pack(*head) + data
-        if isinstance(message, Output):
+            if counts.shape != self._shape or counts.dtype is not self._counts:
+                counts = self._fitted(counts, self._shape)
+            if dropped > MOST_DROPPED:
+                dropped = MOST_DROPPED
+            head = SAMPLES_HEAD.pack(VERSION, SAMPLES, sequence & 0xFFFF, first, clock_us, dropped, flags)
+            return head + counts.tobytes()
+        if message.__class__ is Output:
             first, counts, sequence = message
-            data = self._bytes_of(counts, self._shape[:1])
-            return OUTPUT_HEAD.pack(VERSION, OUTPUT, sequence & 0xFFFF, first) + data
+            if counts.shape != self._output_shape or counts.dtype is not self._counts:
+                counts = self._fitted(counts, self._output_shape)
+            return OUTPUT_HEAD.pack(VERSION, OUTPUT, sequence & 0xFFFF, first) + counts.tobytes()
         if isinstance(message, Request):
             return COMMAND.pack(VERSION, REQUEST, 0, *message)
         if isinstance(message, Answer):
@@ -100,7 +104,9 @@ class Codec:
             state, flags, boot, samples, dropped = message
             dropped = min(dropped, MOST_DROPPED)
             return HEARTBEAT_BODY.pack(VERSION, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples & 0xFFFFFFFF)
-        return STOP.pack(VERSION, EMERGENCY_STOP, 0, message.reason)
+        if isinstance(message, EmergencyStop):
+            return STOP.pack(VERSION, EMERGENCY_STOP, 0, message.reason)
+        raise TypeError(f"{message!r} is no message")
 
     def decode(self, payload: bytes) -> Message:
         """The message of a payload; counts are views of its bytes. Raises `Malformed`, and nothing else."""
@@ -112,11 +118,11 @@ class Codec:
             raise ForeignVersion(f"version {version}")
         if kind == SAMPLES and size == self._samples_size:
             _, _, sequence, first, clock_us, dropped, flags = SAMPLES_HEAD.unpack_from(payload)
-            counts = np.frombuffer(payload, self._counts, -1, SAMPLES_HEAD.size).reshape(self._shape)
+            counts = np.ndarray(self._shape, self._counts, payload, SAMPLES_HEAD.size)
             return Samples(first, counts, flags, dropped, clock_us, sequence)
         if kind == OUTPUT and size == self._output_size:
             _, _, sequence, first = OUTPUT_HEAD.unpack_from(payload)
-            return Output(first, np.frombuffer(payload, self._counts, -1, OUTPUT_HEAD.size), sequence)
+            return Output(first, np.ndarray(self._output_shape, self._counts, payload, OUTPUT_HEAD.size), sequence)
         if kind == REQUEST and size == COMMAND.size:
             return Request(*COMMAND.unpack(payload)[3:])
         if kind == ANSWER and size == COMMAND.size:
@@ -128,11 +134,9 @@ class Codec:
             return EmergencyStop(STOP.unpack(payload)[3])
         raise Malformed(f"type {kind} with {size} bytes")
 
-    def _bytes_of(self, counts: np.ndarray, shape: tuple[int, ...]) -> bytes:
+    def _fitted(self, counts: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         if not self._samples_size:
             raise DaqRefused("samples and outputs are sent once their shape has been agreed on (configure)")
         if counts.shape != shape:
             raise DaqRefused(f"counts of shape {counts.shape}: allowed is {shape}, the stream agreed on")
-        if counts.dtype != self._counts:
-            counts = counts.astype(self._counts)
-        return counts.tobytes()
+        return counts.astype(self._counts)

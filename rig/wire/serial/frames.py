@@ -3,9 +3,10 @@
 COBS: S. Cheshire, M. Baker, Consistent overhead byte stuffing, IEEE/ACM Transactions on Networking 7 (1999) 159-172.
 """
 
+import struct
 from zlib import crc32
 
-from cobs import cobs
+from cobs.cobs import DecodeError, decode, encode
 
 from rig.wire.messages import Message, Stream
 from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Oversize
@@ -13,6 +14,7 @@ from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Ov
 __all__ = ["COUNTERS", "FrameReader", "frame", "largest_frame", "payload_of"]
 
 CRC_SIZE = 4
+CRC = struct.Struct("<I").pack
 RESIDUE = crc32(bytes(CRC_SIZE))  # of any bytes with their CRC-32 behind them, low byte first
 LONGEST_RUN = 254  # bytes of a COBS block
 
@@ -22,16 +24,17 @@ COUNTERS = ("crc_errors", "oversize_frames", "malformed", "foreign_versions", "g
 
 def frame(payload: bytes) -> bytes:
     """The bytes of one payload on the line, with the zero that ends them."""
-    return bytes(cobs.encode(payload + crc32(payload).to_bytes(CRC_SIZE, "little"))) + b"\0"
+    encoded: bytes = encode(payload + CRC(crc32(payload)))
+    return encoded + b"\0"
 
 
 def payload_of(encoded: bytes) -> bytes:
     """The payload of one frame without its zero. Raises `Damaged`."""
     try:
-        data: bytes = cobs.decode(encoded)
-    except cobs.DecodeError as error:
+        data: bytes = decode(encoded)
+    except DecodeError as error:
         raise Damaged(str(error)) from error
-    if crc32(data) != RESIDUE or len(data) < CRC_SIZE:
+    if crc32(data) != RESIDUE:  # which no three bytes or fewer have
         raise Damaged(f"CRC-32 of {len(data)} bytes")
     return data[:-CRC_SIZE]
 
@@ -49,7 +52,7 @@ class FrameReader:
     """
 
     def __init__(self, codec: Codec, counters: dict[str, int]) -> None:
-        self._codec = codec
+        self._decode = codec.decode
         self._counters = counters
         self._rest = b""
         self._skipping = False  # inside a frame that is too long already
@@ -62,22 +65,23 @@ class FrameReader:
 
     def feed(self, data: bytes) -> list[Message]:
         """Messages that are complete with these bytes, in order."""
+        if self._rest:
+            data = self._rest + data
         parts = data.split(b"\0")
-        parts[0] = self._rest + parts[0]
         self._rest = parts.pop()
         if self._skipping and parts:
             self._counters["garbage_bytes"] += len(parts.pop(0))
             self._skipping = False
         messages: list[Message] = []
         for part in parts:
-            try:
-                if len(part) >= self._longest:
-                    raise Oversize
-                if part:
-                    messages.append(self._codec.decode(payload_of(part)))
-            except Malformed as remark:
-                self._counters[remark.counter] += 1
-                self._counters["garbage_bytes"] += len(part)
+            if part:
+                try:
+                    if len(part) >= self._longest:
+                        raise Oversize
+                    messages.append(self._decode(payload_of(part)))
+                except Malformed as remark:
+                    self._counters[remark.counter] += 1
+                    self._counters["garbage_bytes"] += len(part)
         if self._skipping or len(self._rest) >= self._longest:
             self._counters["oversize_frames"] += not self._skipping
             self._counters["garbage_bytes"] += len(self._rest)

@@ -5,9 +5,9 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from select import select
-from typing import Any, Self
+from typing import Self
 
 from rig.errors import DaqDisconnected, DaqRefused, DaqTimeout
 from rig.wire.link import Link, Load
@@ -16,11 +16,11 @@ from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame
 from rig.wire.serial.load import line_load
 from rig.wire.serial.pty import is_pseudo_terminal
+from rig.wire.serial.reading import Input, NoInput, PolledInput, TimedInput
 
 __all__ = ["SerialLink"]
 
 STREAMED = (Samples, Output)
-CHUNK = 4096  # bytes a read; a pseudo-terminal holds no more
 PATIENCE_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
 
 
@@ -30,17 +30,20 @@ class SerialLink(Link):
     A write that the line does not take within ``patience_s`` raises `DaqTimeout`; what has been begun of a frame is finished
     first, so that the other end sees whole frames. Not to be used from two threads at a time.
 
-    The descriptor is waited for by ``select`` and then read once, all that there is: many frames may come at a time. On Linux
-    and macOS; Windows gives no descriptors, and `open` says so.
+    All that there is, is read at a time, and may be many frames. On Linux and macOS; Windows gives no descriptors, and `open`
+    says so.
     """
 
-    def __init__(self, name: str, opener: Callable[[], tuple[int, Any]], baud: int, patience_s: float) -> None:
+    def __init__(
+        self, name: str, opener: Callable[[ExitStack], tuple[int, Input]], baud: int, patience_s: float
+    ) -> None:
         super().__init__(name)
         self._opener = opener
         self._baud = baud
         self._patience_s = patience_s
         self._descriptor = -1
-        self._port: Any = None
+        self._input: Input = NoInput()
+        self._held = ExitStack()
         self._codec = Codec()
         self._reader = FrameReader(self._codec, self.counters)
         self._received: deque[Message] = deque()
@@ -51,15 +54,18 @@ class SerialLink(Link):
     def port(cls, path: str, baud: int, patience_s: float = PATIENCE_S) -> Self:
         """The host's end: a serial port by its name, or the far end of a pseudo-terminal."""
 
-        def opened() -> tuple[int, Any]:
+        def opened(held: ExitStack) -> tuple[int, Input]:
             if sys.platform == "win32":
                 raise DaqRefused(
                     f"port {path!r}: serial devices are driven on Linux and macOS only; on Windows use CAN"
                 )
-            from rig.wire.serial.port import open_port
+            from rig.wire.serial.port import open_port, second_descriptor
 
             port = open_port(path, baud)
-            return port.fileno(), port
+            held.callback(port.close)
+            writer = second_descriptor(path)
+            held.callback(os.close, writer)
+            return writer, TimedInput(port.fileno())
 
         return cls(path, opened, baud, patience_s)
 
@@ -67,16 +73,19 @@ class SerialLink(Link):
     def on(cls, descriptor: int, name: str, baud: int = 0, patience_s: float = 0.0) -> Self:
         """A descriptor that is open already and stays the caller's, such as the near end of a pseudo-terminal."""
 
-        def opened() -> tuple[int, Any]:
-            os.set_blocking(descriptor, False)
-            return descriptor, None
+        def opened(held: ExitStack) -> tuple[int, Input]:
+            waiting = PolledInput(descriptor)
+            held.callback(waiting.close)
+            return descriptor, waiting
 
         return cls(name, opened, baud, patience_s)
 
     def open(self) -> None:
         """Open the port and forget what it still held; nothing is sent."""
         self.close()
-        self._descriptor, self._port = self._opener()
+        with ExitStack() as held:
+            self._descriptor, self._input = self._opener(held)
+            self._held = held.pop_all()
         self._reader = FrameReader(self._codec, self.counters)
 
     def configure(self, stream: Stream) -> None:
@@ -87,31 +96,35 @@ class SerialLink(Link):
     def send(self, message: Message) -> None:
         """Send one message; `DaqTimeout` says that the line takes no more, and that nothing of it was sent."""
         data = frame(self._codec.encode(message))
-        if not isinstance(message, STREAMED):
+        if message.__class__ not in STREAMED:
             data = b"\0" + data  # ends what noise on an idle line may have begun
         if self._unfinished:
             data = self._unfinished + data
         written = self._write(data)
-        if written == len(data):
-            self._unfinished = b""
-        else:
+        if written < len(data):
             self._send_slowly(data, written)
+        elif self._unfinished:
+            self._unfinished = b""
 
     def receive(self, timeout_s: float) -> Message | None:
         """Return the next message; wait for it at most so long."""
         received = self._received
         if received:
             return received.popleft()
-        if timeout_s <= 0.0:
-            received.extend(self._reader.feed(self._read()))
-            return received.popleft() if received else None
         deadline = time.monotonic() + timeout_s
-        while timeout_s > 0.0 and self._ready(timeout_s):
-            received.extend(self._reader.feed(self._read()))
-            if received:
-                return received.popleft()
+        while True:
+            try:
+                data = self._input.read(timeout_s)
+            except (OSError, ValueError) as error:
+                raise self._gone(error) from error
+            messages = self._reader.feed(data) if data else None
+            if messages:
+                if len(messages) > 1:
+                    received.extend(messages[1:])
+                return messages[0]
             timeout_s = deadline - time.monotonic()
-        return None
+            if timeout_s <= 0.0:
+                return None
 
     def load(self, stream: Stream) -> Load:
         """Bits per second of the busier direction, ten a byte, against the baud rate; once open."""
@@ -120,29 +133,11 @@ class SerialLink(Link):
 
     def close(self) -> None:
         """Let go of the port."""
-        port, self._port, self._descriptor = self._port, None, -1
+        self._descriptor, self._input = -1, NoInput()
         self._received.clear()
         self._unfinished = b""
-        if port is not None:
-            with suppress(Exception):  # what a vanished port raises differs by system, and it is gone either way
-                port.close()
-
-    def _ready(self, timeout_s: float) -> bool:
-        try:
-            return bool(select((self._descriptor,), (), (), timeout_s)[0])
-        except (OSError, ValueError) as error:
-            raise self._gone(error) from error
-
-    def _read(self) -> bytes:
-        try:
-            data = os.read(self._descriptor, CHUNK)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
-            raise self._gone(error) from error
-        if not data:
-            raise self._gone("end of file")
-        return data
+        with suppress(Exception):  # what a vanished port raises differs by system, and it is gone either way
+            self._held.close()
 
     def _write(self, data: bytes) -> int:
         try:

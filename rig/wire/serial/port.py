@@ -4,6 +4,8 @@ import errno
 import os
 import termios
 from contextlib import suppress
+from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 import serial
@@ -11,15 +13,18 @@ from serial.tools import list_ports
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqError, DaqRefused
 
-__all__ = ["open_port", "port_names"]
+__all__ = ["open_port", "port_names", "second_descriptor"]
 
 BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: somebody holds its lock
+LASTING_NAMES = "/dev/serial/by-id"
+ALIKE = 0.8  # of two names: a character or two that differ
 CONTROL_CHARACTERS = 6  # in the list that termios returns
 
 
 def port_names() -> list[str]:
-    """Serial ports that the system knows of; pseudo-terminals are not among them."""
-    return sorted(str(port.device) for port in list_ports.comports())
+    """Serial ports that the system knows of, by device and by the names that stay; no pseudo-terminals."""
+    lasting = (str(path) for path in Path(LASTING_NAMES).glob("*"))
+    return sorted({*(str(port.device) for port in list_ports.comports()), *lasting})
 
 
 def open_port(path: str, baud: int) -> Any:
@@ -42,6 +47,14 @@ def open_port(path: str, baud: int) -> Any:
     return port
 
 
+def second_descriptor(path: str) -> int:
+    """Another descriptor of a port that is open already: for writing, which never waits, while reading may."""
+    try:
+        return os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError as error:
+        raise _refusal(path, 0, error) from error
+
+
 def _no_bytes_means_gone(descriptor: int) -> None:
     """VMIN = 1: a read without input says so (EAGAIN), and one of 0 bytes can only mean that the port is gone."""
     os.set_blocking(descriptor, False)
@@ -52,14 +65,28 @@ def _no_bytes_means_gone(descriptor: int) -> None:
 
 
 def _refusal(path: str, baud: int, error: Exception) -> DaqError:
-    number = getattr(error, "errno", None)
+    number = _number_of(error)
     if number in BUSY:
         return DaqBusy(f"port {path!r}: somebody else holds it; close the other program")
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO):
-        there = ", ".join(port_names()) or "none"
-        return DaqDisconnected(f"port {path!r}: it is not there; serial ports here: {there}")
+        names = port_names()
+        there = ", ".join(names) or "none"
+        like = get_close_matches(path, names, 1, ALIKE)
+        return DaqDisconnected(
+            f"port {path!r}: it is not there; serial ports here: {there}" + (f"; is it {like[0]!r}?" if like else "")
+        )
     if number in (errno.EACCES, errno.EPERM):
         return DaqRefused(f"port {path!r}: no permission to open it; on Linux, join the group that owns it (dialout)")
+    if number in (errno.ENOTTY, errno.EISDIR):
+        return DaqRefused(f"port {path!r}: it is no serial port")
     if number is None:
         return DaqRefused(f"port {path!r} at {baud} baud: {error}")
     return DaqRefused(f"port {path!r}: it cannot be opened as a serial port: {error}")
+
+
+def _number_of(error: BaseException) -> int | None:
+    """The system's number for an error; pyserial words those of termios anew and drops it."""
+    cause = error.__context__
+    if isinstance(cause, termios.error) and cause.args:
+        return int(cause.args[0])
+    return getattr(error, "errno", None)

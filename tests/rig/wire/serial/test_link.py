@@ -1,14 +1,19 @@
 """Links over pseudo-terminals: ports that are there, held, gone, full, or full of old bytes."""
 
 import contextlib
+import errno
 import itertools
 import math
 import os
+import subprocess
+import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
+import serial
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqRefused, DaqTimeout
 from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
@@ -136,10 +141,102 @@ def test_a_port_that_is_not_there_is_said_with_those_that_are():
         SerialLink.port("/dev/no-such-port", BAUD).open()
 
 
+def test_a_port_that_is_almost_there_is_suggested(monkeypatch):
+    monkeypatch.setattr("rig.wire.serial.port.port_names", lambda: ["/dev/no-such-port-0", "/dev/ttyS0"])
+    with pytest.raises(DaqDisconnected, match="is it '/dev/no-such-port-0'"):
+        SerialLink.port("/dev/no-such-port-1", BAUD).open()
+    with pytest.raises(DaqDisconnected, match=r"ttyS0$"):
+        SerialLink.port("/dev/another", BAUD).open()
+
+
+def test_a_port_that_another_process_holds_is_busy(line):
+    holder = (
+        "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print(flush=True); sys.stdin.read()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", holder, line.path], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        process.stdout.readline()
+        host = SerialLink.port(line.path, BAUD)
+        with pytest.raises(DaqBusy):
+            host.open()
+        process.kill()
+        process.wait()
+        host.open()  # the system has let go of it
+        host.close()
+
+
 @pytest.mark.parametrize("path", ["/dev/null", "/dev"])
 def test_what_is_no_serial_port_is_refused(path):
     with pytest.raises(DaqRefused, match=f"'{path}'"):
         SerialLink.port(path, BAUD).open()
+
+
+@pytest.mark.parametrize("made", [Path.touch, os.mkfifo])
+def test_a_file_of_any_kind_is_no_serial_port(tmp_path, made):
+    made(tmp_path / "port")
+    with pytest.raises(DaqRefused, match="/port': it is no serial port"):
+        SerialLink.port(str(tmp_path / "port"), BAUD).open()
+
+
+def test_a_port_without_permission_says_which_group_helps(monkeypatch):
+    def denied(*_, **__):
+        raise serial.SerialException(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("serial.Serial", denied)
+    with pytest.raises(DaqRefused, match="no permission to open it; on Linux, join the group"):
+        SerialLink.port("/dev/ttyS0", BAUD).open()
+
+
+def test_a_port_that_goes_while_it_is_being_opened_is_let_go_of(line, monkeypatch):
+    def gone(*_):
+        raise DaqDisconnected("gone")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("rig.wire.serial.port.second_descriptor", gone)
+        with pytest.raises(DaqDisconnected, match="gone"):
+            SerialLink.port(line.path, BAUD).open()
+    with contextlib.closing(SerialLink.port(line.path, BAUD)) as host:
+        host.open()
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.ENODEV, errno.ENXIO, errno.EBADF])
+def test_whatever_an_adapter_says_when_it_vanishes_the_port_is_gone(ends, monkeypatch, number):
+    def vanished(*_):
+        raise OSError(number, os.strerror(number))
+
+    for link in ends:
+        for name in ("read", "write"):
+            with monkeypatch.context() as patch:
+                patch.setattr(os, name, vanished)
+                with pytest.raises(DaqDisconnected, match="the port is gone") as said:
+                    link.send(Request(1, 1)) if name == "write" else link.receive(0.0 if link is ends[1] else 1.0)
+            assert os.strerror(number) in str(said.value)
+
+
+def test_the_devices_end_sees_its_line_go_as_well(line, ends):
+    device = ends[1]
+    ends[0].close()
+    os.close(line.far_descriptor)
+    with pytest.raises(DaqDisconnected, match="device: the port is gone"):
+        device.receive(PATIENCE_S)
+
+
+@pytest.mark.parametrize("wait_s", [0.0, 0.005, 0.05, 0.25])
+def test_a_silent_line_is_waited_for_as_long_as_asked_at_both_ends(ends, wait_s):
+    for link in ends:
+        began = time.monotonic()
+        assert link.receive(wait_s) is None
+        assert wait_s <= time.monotonic() - began < wait_s + PATIENCE_S
+
+
+def test_nothing_stays_unread_when_much_comes_at_a_time(ends):
+    host, device = ends
+    sent = [messages()[0][1]._replace(first=5 * number) for number in range(120)]  # more than one read takes
+    for message in sent:
+        host.send(message)
+    got = [device.receive(PATIENCE_S) for _ in sent]
+    assert [message.first for message in got] == [message.first for message in sent]
 
 
 def test_an_unplugged_cable_is_said_by_reading_and_by_writing(line, ends):
