@@ -2,13 +2,16 @@
 
 1. Decoding a frame of 32 signals: compiled layout beside cantools.
 2. Receiving a frame of 64 bytes through an adapter on a pseudo-terminal: our lines beside python-can's slcan.
-3. CAN FD frames of 64 bytes at 5000/s between two processes over udp_multicast: lost frames and processor time. Needs
-   root, for it runs in a network namespace of its own that has nothing but loopback.
+3. CAN FD frames of 64 bytes at 5000/s between two processes over udp_multicast, the receiver stopped (SIGSTOP) for a fifth
+   of a second in the middle: lost frames and processor time, with our bus and with python-can's as it is. Needs root, for it
+   runs in a network namespace of its own that has nothing but loopback.
 """
 
+import argparse
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -31,6 +34,7 @@ from rig.wire.serial.pty import open_pseudo_terminal
 ROUNDS = 60
 BATCH = 16
 RATE_HZ = 5000.0
+STALL_S = 0.2
 GROUP = "239.74.163.2"  # any will do where there is only loopback
 SIGNALS = "".join(f' SG_ s{n} : {16 * n}|16@1- (0.5,0) [0|0] "V" B\n' for n in range(32))
 DBC = (
@@ -115,11 +119,15 @@ def multicast_bus() -> PythonCanBus:
 
 
 def send(seconds: float) -> None:
-    """The sender: a frame of 64 bytes each period, at absolute deadlines; prints how many, and its processor time."""
+    """The sender: a frame of 64 bytes each period, at absolute deadlines; prints how many, and its processor time.
+
+    In the middle it stops its parent, the receiver, for `STALL_S`, and goes on sending.
+    """
     bus = multicast_bus()
     bus.open()
     time.sleep(1.0)
     count, begin = round(RATE_HZ * seconds), time.monotonic()
+    signals = {count // 2: signal.SIGSTOP, count // 2 + round(RATE_HZ * STALL_S): signal.SIGCONT}
     cpu = time.process_time()
     latest = 0.0
     for number in range(count):
@@ -127,6 +135,8 @@ def send(seconds: float) -> None:
         if late < 0.0:
             time.sleep(-late)
         latest = max(latest, late)
+        if number in signals:
+            os.kill(os.getppid(), signals[number])
         bus.send(Frame(0x301, number.to_bytes(4, "little") + bytes(60), True), 0.1)
     took = time.monotonic() - begin
     print(
@@ -137,25 +147,36 @@ def send(seconds: float) -> None:
     bus.close()
 
 
-def receive(seconds: float) -> None:
+def receiver(bare: bool) -> tuple[Callable[[float], bytes | None], Callable[[], None]]:
+    """How to wait for the data of a frame, and how to end: with our bus, or with python-can's as it is."""
+    if not bare:
+        ours = multicast_bus()
+        ours.open()
+        return lambda timeout_s: None if (frame := ours.receive(timeout_s)) is None else frame.data, ours.close
+    theirs = can.Bus(interface="udp_multicast", channel=GROUP, fd=True)
+    return lambda timeout_s: None if (got := theirs.recv(timeout_s)) is None else bytes(got.data), theirs.shutdown
+
+
+def receive(seconds: float, bare: bool) -> None:
     """Inside the namespace: start the sender, count what comes."""
-    bus = multicast_bus()
-    bus.open()
+    wait, end = receiver(bare)
     sender = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.can_wire", "--send", str(seconds)], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "benchmarks.can_wire", "--send", "--seconds", str(seconds)],
+        stdout=subprocess.PIPE,
+        text=True,
     )
-    numbers, cpu, begin = [], 0.0, 0.0
-    while True:
-        frame = bus.receive(5.0 if not numbers else 1.0)
-        if frame is None:
-            break
+    numbers, longest_s, cpu, begin, latest = [], 0.0, 0.0, 0.0, 0.0
+    while (data := wait(1.0 if numbers else 10.0)) is not None:
+        now = time.monotonic()
         if not numbers:
-            cpu, begin = time.process_time(), time.monotonic()
-        numbers.append(int.from_bytes(frame.data[:4], "little"))
-        last = (time.process_time() - cpu, time.monotonic() - begin)
+            cpu, begin = time.process_time(), now
+        else:
+            longest_s = max(longest_s, now - latest)
+        latest, spent = now, time.process_time() - cpu
+        numbers.append(int.from_bytes(data[:4], "little"))
     out, _ = sender.communicate()
     said = json.loads(out)
-    bus.close()
+    end()
     print(
         json.dumps(
             {
@@ -163,18 +184,19 @@ def receive(seconds: float) -> None:
                 "frames received": len(numbers),
                 "lost": said["sent"] - len(set(numbers)),
                 "out of order": sum(later <= earlier for earlier, later in pairwise(numbers)),
+                "receiver stood still, ms": 1e3 * longest_s,
                 "sent a second": said["rate_hz"],
                 "sender's share of a core": said["share"],
-                "receiver's share of a core": last[0] / last[1],
+                "receiver's share of a core": spent / (latest - begin),
                 "latest send, ms": 1e3 * said["latest_s"],
             }
         )
     )
 
 
-def multicast(seconds: float) -> dict[str, float]:
+def multicast(seconds: float, bare: bool = False) -> dict[str, float]:
     """The figures of `receive` in a network namespace that has nothing but loopback; empty without the privilege."""
-    again = f"{sys.executable} -m benchmarks.can_wire --receive {seconds}"
+    again = f"{sys.executable} -m benchmarks.can_wire --receive --seconds {seconds} {'--bare' * bare}"
     command = f"ip link set lo up && ip route add 224.0.0.0/4 dev lo && {again}"
     done = subprocess.run(["unshare", "-n", "sh", "-c", command], capture_output=True, text=True, check=False)
     if done.returncode:
@@ -185,27 +207,29 @@ def multicast(seconds: float) -> dict[str, float]:
 
 
 def main() -> None:
-    arguments = sys.argv[1:]
-    seconds = float(arguments[arguments.index("--seconds") + 1]) if "--seconds" in arguments else 12.0
-    if "--send" in arguments:
-        return send(float(arguments[-1]))
-    if "--receive" in arguments:
-        return receive(float(arguments[-1]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=12.0, help="of multicast")
+    parser.add_argument("--json", action="store_true")
+    for hidden in ("--send", "--receive", "--bare"):
+        parser.add_argument(hidden, action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.send:
+        return send(given.seconds)
+    if given.receive:
+        return receive(given.seconds, given.bare)
+    stream = f"udp_multicast, 64 bytes at {RATE_HZ:g} frames/s, receiver stopped for {1e3 * STALL_S:g} ms"
     results = {
         "decoding 32 signals, us": decoding(),
         "frame of 64 bytes through an adapter, us": adapter(),
-        f"udp_multicast, 64 bytes at {RATE_HZ:g} frames/s": multicast(seconds),
+        stream: multicast(given.seconds),
+        f"{stream}, python-can's bus as it is": multicast(given.seconds, bare=True),
     }
-    if "--json" in arguments:
+    if given.json:
         return print(json.dumps(results))
     for title, figures in results.items():
         print(title)
         for name, value in figures.items():
-            print(
-                f"  {name:28s} {value:10.3g}"
-                if value < 1e4 or not math.isfinite(value)
-                else f"  {name:28s} {value:10.0f}"
-            )
+            print(f"  {name:32s} {value:10.3g}" if value < 1e4 else f"  {name:32s} {value:10.0f}")
     return None
 
 
