@@ -28,7 +28,8 @@ import numpy as np
 from rig.wire.can.bus import PythonCanBus
 from rig.wire.can.dbc import compile_text
 from rig.wire.can.frames import Frame
-from rig.wire.can.slcan import SlcanBus, encode_line
+from rig.wire.can.slcan import SlcanBus
+from rig.wire.can.slcan_lines import encode_line
 from rig.wire.serial.pty import open_pseudo_terminal
 
 ROUNDS = 60

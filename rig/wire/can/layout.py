@@ -31,7 +31,7 @@ class _Run(NamedTuple):
     kind: np.dtype[Any]
     first: int
     """Byte at which they begin."""
-    count: int
+    n_signals: int
     place: slice
     """Where they are among all signals."""
 
@@ -69,7 +69,7 @@ class CompiledMessage:
         Raises `ValueError` for any other number of bytes than the message has.
         """
         data = memoryview(bytearray(self.length))  # seen as the numbers that it is: nothing is made anew but the values
-        views = [np.frombuffer(data, run.kind, run.count, run.first) for run in self._runs]
+        views = [np.frombuffer(data, run.kind, run.n_signals, run.first) for run in self._runs]
         scale, offset = self.scale, self.offset if self.offset.any() else None
         if len(views) == 1:
             raw, copies = views[0], []
@@ -93,7 +93,7 @@ class CompiledMessage:
         data = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), self.length)
         values = np.empty((len(frames), len(self.signals)))
         for run in self._runs:
-            values[:, run.place] = data[:, run.first : run.first + run.count * run.kind.itemsize].view(run.kind)
+            values[:, run.place] = data[:, run.first : run.first + run.n_signals * run.kind.itemsize].view(run.kind)
         values *= self.scale
         values += self.offset
         return values
@@ -129,8 +129,8 @@ class CompiledMessage:
         for place, name in enumerate(self.signals):
             kind, at = self._field(name)
             last = runs[-1] if runs else None
-            if last is not None and last.kind == kind and at == last.first + last.count * kind.itemsize:
-                runs[-1] = last._replace(count=last.count + 1, place=slice(last.place.start, place + 1))
+            if last is not None and last.kind == kind and at == last.first + last.n_signals * kind.itemsize:
+                runs[-1] = last._replace(n_signals=last.n_signals + 1, place=slice(last.place.start, place + 1))
             else:
                 runs.append(_Run(kind, at, 1, slice(place, place + 1)))
         return tuple(runs)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqRefused
 from rig.wire.can.frames import FD_LENGTHS, Frame
-from rig.wire.can.slcan import LONGEST_LINE, SlcanBus, SlcanLines, encode_line
+from rig.wire.can.slcan import SlcanBus
+from rig.wire.can.slcan_lines import LONGEST_LINE, SlcanLines, encode_line
 from rig.wire.serial.pty import PseudoTerminal, open_pseudo_terminal
 
 
