@@ -2,9 +2,9 @@
 
 import errno
 import os
-import select
 import time
 from collections.abc import Callable
+from select import select
 
 from rig.errors import DaqDisconnected
 
@@ -27,25 +27,28 @@ class TextPort:
         self._tail = b""
         """What is left of a line of which the beginning is written."""
         os.set_blocking(descriptor, False)
-        self._coming, self._room = select.poll(), select.poll()
-        self._coming.register(descriptor, select.POLLIN)
-        self._room.register(descriptor, select.POLLOUT)
 
     def forget(self, longest_s: float) -> None:
         """Read what an earlier conversation has left on the line."""
         deadline = time.monotonic() + longest_s
-        while time.monotonic() < deadline and self._coming.poll(0):
+        while time.monotonic() < deadline and self._has_come(0.0):
             if not self._bytes():
                 return
 
     def read(self, timeout_s: float) -> bytes:
         """What has come; waits at most so long for something."""
-        if timeout_s > 0.0 and not self._coming.poll(timeout_s * 1e3):
+        if timeout_s > 0.0 and not self._has_come(timeout_s):
             return b""
         data = self._bytes()
         if not data and timeout_s > 0.0:
-            time.sleep(min(timeout_s, _NOBODY_S))  # nobody at the other end: poll returns at once
+            time.sleep(min(timeout_s, _NOBODY_S))  # nobody at the other end: select returns at once
         return data
+
+    def _has_come(self, timeout_s: float) -> bool:
+        try:
+            return bool(select((self._descriptor,), (), (), timeout_s)[0])  # poll knows whole milliseconds only
+        except (OSError, ValueError) as error:
+            raise DaqDisconnected(f"{self.name}: is gone ({error})") from None
 
     def _bytes(self) -> bytes:
         try:
@@ -84,7 +87,7 @@ class TextPort:
             if left <= 0:
                 self._tail = data if started else data[: len(data) - len(line)]
                 return started  # what has begun will be ended before the next line, and so is sent
-            self._room.poll(left * 1e3)
+            select((), (self._descriptor,), (), left)
 
     def _gone(self, error: OSError) -> None:
         if self._on_hang_up is not None and error.errno == errno.EIO:

@@ -173,6 +173,18 @@ def test_a_line_that_takes_no_more_lets_frames_expire_whole(line: PseudoTerminal
     host.close()
 
 
+def test_waiting_ends_within_a_millisecond_for_a_device_keeps_deadlines_of_parts_of_it(line: PseudoTerminal) -> None:
+    _, host = open_pair(line)
+    everything(host)
+    took_s = []
+    for _ in range(50):  # the machine may be late once, not always
+        begin = time.monotonic()
+        assert host.receive(2e-4) is None
+        took_s.append(time.monotonic() - begin)
+    assert 2e-4 <= min(took_s) < 8e-4
+    host.close()
+
+
 def test_a_pulled_cable_is_said_and_the_adapter_waits_on(line: PseudoTerminal) -> None:
     adapter, host = open_pair(line)
     os.close(line.far_descriptor)
