@@ -118,9 +118,10 @@ class PythonCanBus(FrameBus):
             data=frame.data,
         )
         deadline = time.monotonic() + timeout_s
+        left_s = timeout_s  # the same time after time: backends are slow to change it
         while True:
             try:
-                self._bus.send(message, timeout=max(deadline - time.monotonic(), 0.0) or None)
+                self._bus.send(message, timeout=left_s or None)
                 return True
             except (can.CanError, OSError) as error:
                 if _code(error) in _GONE:
@@ -131,6 +132,7 @@ class PythonCanBus(FrameBus):
             except AttributeError:
                 raise DaqDisconnected(f"{self.name}: is not open") from None
             time.sleep(_RETRY_S)
+            left_s = max(deadline - time.monotonic(), 0.0)
 
     def receive(self, timeout_s: float) -> Frame | None:
         """The next data frame; error frames are counted, and end the connection where they say that the bus is off."""

@@ -4,10 +4,11 @@ import struct
 
 import numpy as np
 
-from rig.errors import DaqMismatch, DaqRefused
-from rig.wire.can.frames import Frame, padded_length
+from rig.errors import DaqRefused
+from rig.wire.can.frames import Frame
 from rig.wire.can.groups import Blocks
 from rig.wire.can.protocol import Kind, Protocol
+from rig.wire.can.streams import COUNT, StreamFrames, check_stream
 from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
 
 __all__ = ["COUNTERS", "CanCodec"]
@@ -16,7 +17,7 @@ COUNTERS = ("foreign_frames", "own_frames", "damaged_frames", "repeated_frames",
 """What a codec counts: frames of others, our own come back, of a wrong length, come twice; torn blocks; indices put right."""
 
 _LARGEST_DROPPED = 255
-_COUNT = np.dtype("<i2")
+_NEVER = -(1 << 30)
 
 
 class CanCodec:
@@ -40,38 +41,17 @@ class CanCodec:
         self._last_beat: Heartbeat | None = None
         self._flags_told = 0
 
-    def check(self, stream: Stream) -> None:
-        """Raise `DaqRefused` for a block or a resolution that frames cannot carry, `DaqMismatch` for other channels."""
-        shape = self._shape
-        if stream.n_channels != shape.n_channels:
-            raise DaqMismatch(f"{stream.n_channels} channels, but the bus is defined for {shape.n_channels}")
-        if stream.bits != 16:
-            raise DaqRefused(f"counts of {stream.bits} bits: allowed over CAN is 16")
-        if not 1 <= stream.block <= shape.largest_block:
-            raise DaqRefused(
-                f"block = {stream.block}: allowed over {'CAN FD' if shape.fd else 'classical CAN'} with "
-                f"{shape.n_channels} channels is 1 to {shape.largest_block} samples"
-            )
-
     def configure(self, stream: Stream) -> None:
-        """Agree on the shape of samples and outputs; both begin anew. Errors: those of `check`."""
-        self.check(stream)
-        shape = self._shape
+        """Agree on the shape of samples and outputs; both begin anew. Errors: those of `check_stream`."""
+        check_stream(self._shape, stream)
         self._stream = stream
         self._flags, self._dropped = 0, 0
-        self._reported = -(1 << 30)  # group at which the receiver was last told its index
-        # Whole blocks, so that a loss of a whole wrap cannot make one block of the frames of two.
-        self._sample_groups = -(-stream.block // shape.rows)
-        self._sample_wrap = shape.wrap - shape.wrap % self._sample_groups
-        self._output_groups = -(-stream.block // shape.output_rows)
-        self._output_wrap = shape.output_wrap - shape.output_wrap % self._output_groups
+        self._reported = _NEVER  # group at which the receiver was last told its index
+        samples, outputs = (StreamFrames(self.protocol, kind, stream.block) for kind in (Kind.SAMPLES, Kind.OUTPUT))
+        self._sent, self._received = (samples, outputs) if self._device else (outputs, samples)
+        self._incoming = Blocks(self._counters, self._received)
         if self._device:
-            self._incoming = Blocks(self._counters, self._output_wrap, 1, shape.output_rows, stream.block, 1)
             self._incoming.begin(stream.queue)
-        else:
-            self._incoming = Blocks(
-                self._counters, self._sample_wrap, shape.parts, shape.rows, stream.block, shape.n_channels
-            )
 
     def encode(self, message: Message) -> list[Frame]:
         """The frames of a message, in the order in which they must be sent."""
@@ -94,44 +74,26 @@ class CanCodec:
         return Frame(self._identifiers[Kind.HEARTBEAT, 0], data)
 
     def _encode_samples(self, message: Samples) -> list[Frame]:
-        stream, shape, groups, wrap = self._streaming(), self._shape, self._sample_groups, self._sample_wrap
-        first = message.first // stream.block * groups
-        frames = []
-        beat = self._last_beat
-        stale = first + groups - self._reported > wrap // 2
-        if beat is not None and (stale or (not shape.fd and message.flags != self._flags_told)):
-            frames.append(
-                self._heartbeat(beat._replace(flags=message.flags, samples=message.first, dropped=message.dropped))
-            )
-            self._reported = first
-        for group in range(groups):
-            rows = message.counts[group * shape.rows : (group + 1) * shape.rows]
-            sequence = (first + group) % wrap
-            for part in range(shape.parts):
-                counts = rows if shape.parts == 1 else rows[:, shape.columns(part)]
-                number = part if shape.fd else sequence * shape.parts + part
-                frames.append(self._stream_frame(Kind.SAMPLES, number, sequence, message.flags, counts))
+        frames = self._streaming().frames(message.first, message.counts, message.flags)
+        beat, tells = self._last_beat, not self._shape.fd and message.flags != self._flags_told
+        if beat is not None and (self._must_tell(message.first) or tells):
+            self._reported = message.first // self._sent.block * self._sent.groups
+            now = beat._replace(flags=message.flags, samples=message.first, dropped=message.dropped)
+            return [self._heartbeat(now), *frames]
         return frames
 
     def _encode_output(self, message: Output) -> list[Frame]:
-        stream, shape, groups, wrap = self._streaming(), self._shape, self._output_groups, self._output_wrap
-        first = message.first // stream.block * groups
-        frames = []
-        if first + groups - self._reported > wrap // 2:
-            frames.append(Frame(self._identifiers[Kind.OUTPUT_INDEX, 0], self._index.pack(message.first & 0xFFFFFFFF)))
-            self._reported = first
-        for group in range(groups):
-            sequence = (first + group) % wrap
-            counts = message.counts[group * shape.output_rows : (group + 1) * shape.output_rows]
-            frames.append(self._stream_frame(Kind.OUTPUT, 0 if shape.fd else sequence, sequence, 0, counts))
+        frames = self._streaming().frames(message.first, message.counts, 0)
+        if self._must_tell(message.first):
+            self._reported = message.first // self._sent.block * self._sent.groups
+            data = self._index.pack(message.first & 0xFFFFFFFF)
+            return [Frame(self._identifiers[Kind.OUTPUT_INDEX, 0], data), *frames]
         return frames
 
-    def _stream_frame(self, kind: Kind, number: int, sequence: int, flags: int, counts: np.ndarray) -> Frame:
-        data = counts.astype(_COUNT, copy=False).tobytes()
-        if not self._shape.fd:
-            return Frame(self._identifiers[kind, number], data)
-        data = bytes((sequence, flags & 0xFF)) + data
-        return Frame(self._identifiers[kind, number], data.ljust(padded_length(len(data)), b"\0"), True)
+    def _must_tell(self, first: int) -> bool:
+        """Whether a block would end more than half a wrap after the last index that the receiver was told."""
+        sent = self._sent
+        return (first // sent.block + 1) * sent.groups - self._reported > sent.wrap // 2
 
     def decode(self, frame: Frame) -> Message | None:
         """The message that a frame completes, if any; frames that are none of ours are counted and dropped."""
@@ -169,34 +131,35 @@ class CanCodec:
         return None
 
     def _decode_stream(self, frame: Frame, number: int) -> Message | None:
-        shape, data = self._shape, frame.data
-        if self._stream is None or frame.fd != shape.fd or len(data) < shape.header:
-            self._counters["damaged_frames" if self._stream else "foreign_frames"] += 1
+        if self._stream is None:
+            self._counters["foreign_frames"] += 1
             return None
-        if shape.fd:
-            sequence, flags, part = data[0], data[1], number
-        else:
-            sequence, part = (number, 0) if self._device else divmod(number, shape.parts)
-            flags = self._flags if not self._device else 0
-        columns = slice(0, 1) if self._device else shape.columns(part)
-        width = columns.stop - columns.start
-        rows = self._incoming.rows_of(sequence)
-        n_bytes = shape.header + 2 * rows * width
-        if len(data) != (padded_length(n_bytes) if shape.fd else n_bytes):
+        received, incoming, data = self._received, self._incoming, frame.data
+        if frame.fd != received.fd or len(data) < received.header:
             self._counters["damaged_frames"] += 1
             return None
-        counts = np.frombuffer(data, _COUNT, rows * width, shape.header).reshape(rows, width)
-        whole = self._incoming.put(sequence, part, columns, counts, flags)
+        if received.fd:
+            sequence, flags, part = data[0], data[1], number
+        else:
+            sequence, part = divmod(number, received.parts)
+            flags = self._flags
+        group = incoming.group(sequence)
+        piece = received.pieces[group % received.groups][part]
+        if len(data) != piece.n_bytes:
+            self._counters["damaged_frames"] += 1
+            return None
+        counts = np.frombuffer(data, COUNT, piece.size, received.header).reshape(piece.shape)
+        whole = incoming.put(group, part, piece, counts, flags)
         return None if whole is None else self._block(*whole)
 
     def _block(self, block: int, counts: np.ndarray, flags: int) -> Message:
-        assert self._stream is not None
-        first = block * self._stream.block
+        first = block * self._received.block
+        sequence = self._received.sequence_of(first)
         if self._device:
-            return Output(first, counts[:, 0], block * self._output_groups % self._output_wrap)
-        return Samples(first, counts, flags, self._dropped, 0, block * self._sample_groups % self._sample_wrap)
+            return Output(first, counts[:, 0], sequence)
+        return Samples(first, counts, flags, self._dropped, 0, sequence)
 
-    def _streaming(self) -> Stream:
+    def _streaming(self) -> StreamFrames:
         if self._stream is None:
             raise DaqRefused("samples and outputs cannot be sent before the stream is configured")
-        return self._stream
+        return self._sent

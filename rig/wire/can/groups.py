@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from rig.wire.can.streams import Piece, StreamFrames
+
 __all__ = ["OPEN_BLOCKS", "Blocks"]
 
 OPEN_BLOCKS = 4
@@ -29,11 +31,11 @@ class Blocks:
     index from elsewhere (`mark`) puts right what a loss of half a wrap or more has confused, once a frame agrees with it.
     """
 
-    def __init__(self, counters: dict[str, int], wrap: int, parts: int, rows: int, n: int, n_channels: int) -> None:
+    def __init__(self, counters: dict[str, int], stream: StreamFrames) -> None:
         self._counters = counters
-        self._wrap, self._parts, self._rows = wrap, parts, rows
-        self._shape = (n, n_channels)
-        self._per_block = -(-n // rows)
+        self._wrap, self._parts = stream.wrap, stream.parts
+        self._shape = (stream.block, stream.n_channels)
+        self._per_block = stream.groups
         self._open: dict[int, _Open] = {}
         self._oldest = 0
         """The first block that may still come."""
@@ -57,16 +59,16 @@ class Blocks:
         far = sample % n == 0 and group - self._next >= self._wrap // 2
         self._mark = group if far else None
 
-    def rows_of(self, sequence: int) -> int:
-        """Rows in the group of this number."""
-        row = self._group(sequence) % self._per_block * self._rows
-        return min(self._rows, self._shape[0] - row)
+    def group(self, sequence: int) -> int:
+        """The group that a sequence number stands for; below 0 from before the start, and too old."""
+        base = self._next if self._mark is None or sequence != self._mark % self._wrap else self._mark
+        ahead = (sequence - base) % self._wrap
+        return base + ahead - self._wrap * (ahead >= self._wrap // 2)
 
     def put(
-        self, sequence: int, part: int, columns: slice, counts: np.ndarray, flags: int
+        self, group: int, part: int, piece: Piece, counts: np.ndarray, flags: int
     ) -> tuple[int, np.ndarray, int] | None:
         """Take the counts (int16, rows by columns) of a frame; return number, counts and flags of a block that is whole now."""
-        group = self._group(sequence)
         if self._mark is not None and group == self._mark:
             self._count("resynchronised")
             self._drop(group // self._per_block)
@@ -79,10 +81,10 @@ class Blocks:
         if self._per_block * self._parts == 1:
             self._drop(block + 1)
             return block, counts, flags
-        return self._add(block, place, part, columns, counts, flags)
+        return self._add(block, place * self._parts + part, piece, counts, flags)
 
     def _add(
-        self, block: int, place: int, part: int, columns: slice, counts: np.ndarray, flags: int
+        self, block: int, frame: int, piece: Piece, counts: np.ndarray, flags: int
     ) -> tuple[int, np.ndarray, int] | None:
         held = self._open.get(block)
         if held is None:
@@ -91,8 +93,7 @@ class Blocks:
                 self._drop(sorted(self._open)[1])
                 if block < self._oldest:
                     return None
-        frame = place * self._parts + part
-        into = held.counts[place * self._rows : place * self._rows + len(counts), columns]
+        into = held.counts[piece.rows, piece.columns]
         if held.seen[frame]:
             self._count("repeated_frames")
             if not np.array_equal(into, counts):
@@ -108,15 +109,11 @@ class Blocks:
         self._drop(block + 1)
         return block, held.counts, held.flags
 
-    def _group(self, sequence: int) -> int:
-        """The group that a sequence number stands for."""
-        base = self._next if self._mark is None or sequence != self._mark % self._wrap else self._mark
-        ahead = (sequence - base) % self._wrap
-        return base + ahead - self._wrap * (ahead >= self._wrap // 2)  # below 0: from before the start, and too old
-
     def _drop(self, oldest: int) -> None:
         """Give up what is older than this block."""
         self._oldest = oldest
+        if not self._open:
+            return
         for block in [block for block in self._open if block < oldest]:
             del self._open[block]
             self._count("incomplete_blocks")

@@ -1,19 +1,16 @@
-"""Messages of a DBC file compiled to numpy dtypes: what cantools reads once at the start, numpy decodes from then on."""
+"""Layouts of CAN messages as numpy dtypes: frames to values and back, as fast as numpy is."""
 
 import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import cantools
 import numpy as np
 
-from rig.errors import ConfigurationError
+__all__ = ["STRUCT_CODES", "CompiledMessage", "Layout"]
 
-__all__ = ["CompiledMessage", "Layout", "compile_layout", "compile_text"]
-
-_STRUCT_CODES = {
+STRUCT_CODES = {
     "u1": "B",
     "i1": "b",
     "u2": "H",
@@ -25,6 +22,18 @@ _STRUCT_CODES = {
     "f4": "f",
     "f8": "d",
 }
+"""Kinds of signals that can be compiled, without their byte order: codes of `struct`."""
+
+
+class _Run(NamedTuple):
+    """Signals of one type side by side."""
+
+    kind: np.dtype[Any]
+    first: int
+    """Byte at which they begin."""
+    n_signals: int
+    place: slice
+    """Where they are among all signals."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +62,41 @@ class CompiledMessage:
         record: np.void = np.frombuffer(data, self.dtype, 1)[0]
         return record
 
-    def physical(self, data: bytes) -> np.ndarray:
-        """The scaled values of a frame, float64[n_signals] in the order of `signals`."""
-        alike, first, count = self._alike
-        if alike is not None:
-            raw = np.frombuffer(data, alike, count, first)
+    @cached_property
+    def physical(self) -> Callable[[bytes], np.ndarray]:
+        """Takes a frame to its scaled values, float64[n_signals] in the order of `signals`; for one thread at a time.
+
+        Raises `ValueError` for any other number of bytes than the message has.
+        """
+        data = memoryview(bytearray(self.length))  # seen as the numbers that it is: nothing is made anew but the values
+        views = [np.frombuffer(data, run.kind, run.n_signals, run.first) for run in self._runs]
+        scale, offset = self.scale, self.offset if self.offset.any() else None
+        if len(views) == 1:
+            raw, copies = views[0], []
         else:
-            raw = np.array(self.decode(data).tolist(), np.float64)
-        values: np.ndarray = raw * self.scale
-        return values + self.offset if self._has_offset else values
+            raw = np.empty(len(self.signals))
+            copies = [(raw[run.place], view) for run, view in zip(self._runs, views, strict=True)]
+
+        def values_of(frame: bytes) -> np.ndarray:
+            data[:] = frame
+            for part, view in copies:
+                part[:] = view
+            values: np.ndarray = raw * scale
+            if offset is not None:
+                values += offset
+            return values
+
+        return values_of
+
+    def physical_values(self, frames: Sequence[bytes]) -> np.ndarray:
+        """The scaled values of many frames, float64[n_frames, n_signals]. Raises `ValueError` like `physical`."""
+        data = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), self.length)
+        values = np.empty((len(frames), len(self.signals)))
+        for run in self._runs:
+            values[:, run.place] = data[:, run.first : run.first + run.n_signals * run.kind.itemsize].view(run.kind)
+        values *= self.scale
+        values += self.offset
+        return values
 
     def encode(self, *values: int | float) -> bytes:
         """A frame's data from raw values in the order of `signals`; bytes of no signal are 0."""
@@ -75,7 +110,7 @@ class CompiledMessage:
         out, end = "<", 0
         for name in self.signals:
             kind, at = self._field(name)
-            out += f"{at - end}x" * (at > end) + _STRUCT_CODES[kind.str[1:]]
+            out += f"{at - end}x" * (at > end) + STRUCT_CODES[kind.str[1:]]
             end = at + kind.itemsize
         return out + f"{self.length - end}x" * (self.length > end)
 
@@ -89,17 +124,16 @@ class CompiledMessage:
         return f"{name}:{'big-endian ' * (kind.byteorder == '>')}{kind.name}@{at}"
 
     @cached_property
-    def _has_offset(self) -> bool:
-        return bool(self.offset.any())
-
-    @cached_property
-    def _alike(self) -> tuple[np.dtype[Any] | None, int, int]:
-        """One type for all signals and the first byte, where they are of one type and side by side."""
-        kind, first = self._field(self.signals[0])
+    def _runs(self) -> tuple["_Run", ...]:
+        runs: list[_Run] = []
         for place, name in enumerate(self.signals):
-            if self._field(name) != (kind, first + place * kind.itemsize):
-                return None, 0, 0
-        return kind, first, len(self.signals)
+            kind, at = self._field(name)
+            last = runs[-1] if runs else None
+            if last is not None and last.kind == kind and at == last.first + last.n_signals * kind.itemsize:
+                runs[-1] = last._replace(n_signals=last.n_signals + 1, place=slice(last.place.start, place + 1))
+            else:
+                runs.append(_Run(kind, at, 1, slice(place, place + 1)))
+        return tuple(runs)
 
     @cached_property
     def canonical(self) -> str:
@@ -120,66 +154,3 @@ class Layout:
         """CRC-32 over the canonical lines in the order of their identifiers, joined by line feeds."""
         ordered = sorted(self.messages.values(), key=lambda message: message.frame_id)
         return zlib.crc32("\n".join(message.canonical for message in ordered).encode("ascii"))
-
-
-def compile_layout(path: str | Path) -> Layout:
-    """The layout that a DBC file defines.
-
-    Raises `ConfigurationError`, naming file, message and signal, for what cannot be read or compiled.
-    """
-    try:
-        text = Path(path).read_text(encoding="cp1252")  # the encoding of DBC files
-    except OSError as error:
-        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}") from None
-    return compile_text(text, str(path))
-
-
-def compile_text(text: str, source: str = "definition") -> Layout:
-    """The layout in the text of a DBC file; ``source`` names it in errors."""
-    try:
-        database: Any = cantools.database.load_string(text, "dbc")
-    except Exception as error:  # cantools has no common base for what a broken file may raise
-        line = " ".join(str(error).split())
-        raise ConfigurationError(f"{source}: is not a DBC file: {line}") from None
-    messages = (message for message in database.messages if message.frame_id != 0x40000000 and message.signals)
-    return Layout({message.name: _compiled(message, source) for message in messages})
-
-
-def _compiled(message: Any, source: str) -> CompiledMessage:
-    where = f"{source}: message {message.name}"
-    if message.is_multiplexed():
-        raise ConfigurationError(f"{where}: is multiplexed, which cannot be compiled")
-    if message.is_extended_frame:
-        raise ConfigurationError(f"{where}: has an identifier of 29 bits, allowed is 11")
-    placed = sorted(((_first_byte(signal, where), signal) for signal in message.signals), key=lambda pair: pair[0])
-    formats = [_format(signal, where) for _, signal in placed]
-    dtype = np.dtype(
-        {
-            "names": [signal.name for _, signal in placed],
-            "formats": formats,
-            "offsets": [first for first, _ in placed],
-            "itemsize": message.length,
-        }
-    )
-    scale = np.array([float(signal.scale) for _, signal in placed])
-    offset = np.array([float(signal.offset) for _, signal in placed])
-    return CompiledMessage(message.name, message.frame_id, message.length, bool(message.is_fd), dtype, scale, offset)
-
-
-def _first_byte(signal: Any, where: str) -> int:
-    """Place of a signal; a big-endian one starts at the highest bit of its first byte."""
-    little = signal.byte_order == "little_endian"
-    if signal.start % 8 != (0 if little else 7):
-        raise ConfigurationError(
-            f"{where}, signal {signal.name}: starts at bit {signal.start}, allowed is a whole byte"
-        )
-    return int(signal.start) // 8
-
-
-def _format(signal: Any, where: str) -> str:
-    n_bytes, rest = divmod(signal.length, 8)
-    kind = "f" if signal.is_float else "i" if signal.is_signed else "u"
-    if rest or f"{kind}{n_bytes}" not in _STRUCT_CODES:
-        allowed = "32 or 64" if signal.is_float else "8, 16, 32 or 64"
-        raise ConfigurationError(f"{where}, signal {signal.name}: has {signal.length} bits, allowed is {allowed}")
-    return f"{'<' if signal.byte_order == 'little_endian' else '>'}{kind}{n_bytes}"

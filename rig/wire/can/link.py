@@ -7,6 +7,7 @@ from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.load import bus_load
 from rig.wire.can.protocol import protocol
+from rig.wire.can.streams import check_stream
 from rig.wire.link import Link, Load
 from rig.wire.messages import Message, Output, Samples, Stream
 
@@ -55,9 +56,13 @@ class CanLink(Link):
 
     def send(self, message: Message) -> None:
         """Send one message; one that cannot be sent in time is dropped, for what it says will be out of date."""
-        streamed = isinstance(message, Samples | Output)
-        deadline = time.monotonic() + (self._deadline_s if streamed else COMMAND_S)
-        for frame in self._codec.encode(message):
+        left_s = self._deadline_s if isinstance(message, Samples | Output) else COMMAND_S
+        frames = self._codec.encode(message)
+        if len(frames) == 1:
+            self._bus.send(frames[0], left_s)
+            return
+        deadline = time.monotonic() + left_s
+        for frame in frames:
             if not self._bus.send(frame, max(deadline - time.monotonic(), 0.0)):
                 return  # a block without one of its frames is none
 
@@ -81,7 +86,7 @@ class CanLink(Link):
 
         Raises `DaqRefused` for a stream that no frames can carry, however fast the bus.
         """
-        self._codec.check(stream)
+        check_stream(self._protocol.shape, stream)
         return bus_load(self._protocol.shape, stream, *self._rates_hz)
 
     @property

@@ -10,8 +10,8 @@ import pytest
 
 import rig.wire.can
 from rig.errors import ConfigurationError, DaqRefused
+from rig.wire.can.dbc import compile_layout, compile_text
 from rig.wire.can.definition import definition, shape_of
-from rig.wire.can.layout import compile_layout, compile_text
 from rig.wire.can.protocol import protocol
 
 SHIPPED = {
@@ -56,6 +56,12 @@ def test_random_frames_decode_to_the_values_of_cantools(n_channels: int, fd: boo
         record = ours.messages[wanted.name].decode(data)
         assert {name: record[name] for name in ours.messages[wanted.name].signals} == decoded
         np.testing.assert_array_equal(ours.messages[wanted.name].physical(data), list(decoded.values()))
+        frames = [rng.bytes(wanted.length) for _ in range(3)]
+        each = [list(wanted.decode(frame).values()) for frame in frames]
+        np.testing.assert_array_equal(ours.messages[wanted.name].physical_values(frames), each)
+        for wrong in (data[:-1], data + b"x"):
+            with pytest.raises(ValueError, match="different structures"):
+                ours.messages[wanted.name].physical(wrong)
 
 
 def test_other_files_with_scales_floats_and_big_endian_signals_decode_as_cantools_does() -> None:
@@ -64,7 +70,9 @@ def test_other_files_with_scales_floats_and_big_endian_signals_decode_as_cantool
     for _ in range(50):
         data = rng.bytes(16) + np.float32(rng.normal()).tobytes() + bytes(4)
         decoded = theirs.decode_message("Mixed", data)
-        np.testing.assert_allclose(ours.physical(data), [decoded[name] for name in ours.signals], rtol=1e-15)
+        values = [decoded[name] for name in ours.signals]
+        np.testing.assert_allclose(ours.physical(data), values, rtol=1e-15)
+        np.testing.assert_allclose(ours.physical_values([data, data]), [values, values], rtol=1e-15)
         raw = theirs.decode_message("Mixed", data, scaling=False)
         values = [raw[name] for name in ours.signals]
         assert ours.encode(*values)[: len(data) - 4] == data[:3] + b"\0" + data[4:-4]  # the byte of no signal is 0

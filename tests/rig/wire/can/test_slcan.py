@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqRefused
 from rig.wire.can.frames import FD_LENGTHS, Frame
-from rig.wire.can.slcan import LONGEST_LINE, SlcanBus, SlcanLines, encode_line
+from rig.wire.can.slcan import SlcanBus
+from rig.wire.can.slcan_lines import LONGEST_LINE, SlcanLines, encode_line
 from rig.wire.serial.pty import PseudoTerminal, open_pseudo_terminal
 
 
@@ -169,6 +170,18 @@ def test_a_line_that_takes_no_more_lets_frames_expire_whole(line: PseudoTerminal
     assert set(got[:-1]) == {frame}
     assert got[-1].identifier == 5
     assert adapter.counters["damaged_lines"] == 0
+    host.close()
+
+
+def test_waiting_ends_within_a_millisecond_for_a_device_keeps_deadlines_of_parts_of_it(line: PseudoTerminal) -> None:
+    _, host = open_pair(line)
+    everything(host)
+    took_s = []
+    for _ in range(50):  # the machine may be late once, not always
+        begin = time.monotonic()
+        assert host.receive(2e-4) is None
+        took_s.append(time.monotonic() - begin)
+    assert 2e-4 <= min(took_s) < 8e-4
     host.close()
 
 
