@@ -87,7 +87,7 @@ def test_b_the_next_one_is_told(rig_daq):
 """
 
 
-@pytest.mark.parametrize("wire", ["serial"])
+@pytest.mark.parametrize("wire", ["serial", pytest.param("can", marks=pytest.mark.slow)])
 def test_an_emulator_that_is_killed_ends_the_run_and_is_an_error_for_the_next_test(tmp_path, wire):
     (tmp_path / "test_own.py").write_text(KILLED)
     status, text, result, found = ended(tmp_path, "--rig-emulate", wire)
