@@ -4,11 +4,14 @@ At each rate the loop drives the virtual magnet beam, paced by the host, in bloc
 to a journal in one thread while another spins. cyclictest (of Debian's rt-tests) runs in the same minutes, with the same
 interval, priority, locked memory and load: both take turns of a quarter of a minute, because two tasks of one priority on
 few processors would wait for each other. In its turns the parent goes on spinning, and writes the rows of the turn before
-to a second journal, at the same pace. A period that was missed altogether is left out by both, and counted by the loop.
-``--unprivileged`` takes real-time scheduling and locked memory from both.
+to a second journal, at the same pace. ``--unprivileged`` takes real-time scheduling and locked memory from both.
 
-``stall_ms``: largest lateness of either. The collector never runs in the loop's process and nothing is imported there, both of
-which is counted, so what is late beyond the largest of cyclictest is the scheduler's or the machine's.
+``missed_percent``, on one footing for both: periods that began more than a period late or were left out, of all.
+``overrun_percent`` counts, of the loop alone, also those that took too long. ``stalls_per_minute``: begun more than 1 ms late.
+Of the loop's stalls (handed over more than 1 ms late) ``by_its_own_computing`` are those in which its thread itself computed
+for more than 1 ms: only these can be Python's, and a virtual machine's host may have caused
+them too. In all others somebody else had the processor, as in every stall of
+cyclictest, a C program. What could have made one, the collector, imports, page faults and switches, is counted with it.
 """
 
 import argparse
@@ -34,11 +37,15 @@ from rig.sequencer.layout import SegmentKind
 from rig.sequencer.segments import Excitation, Segment, SettleRule
 from rig.session import TickSettings
 from rig.tick.layout import ROW_COLUMNS
+from rig.worker.memory import TIMES
 from rig.worker.privileges import PRIORITY
 from rig.worker.session import WorkerSession
 
 TURN_S = 15.0
 FREQUENCY_HZ = 24.4
+STALL_US = 1000.0
+DISTURBANCES = ("collections", "imports", "major_faults", "minor_faults", "involuntary_switches")
+COUNTED = (*DISTURBANCES, "stalls", "own_stalls", "skipped_periods")
 
 
 def bench_at(rate_hz: float) -> Bench:
@@ -141,28 +148,56 @@ def quantiles(counts: Counter[float]) -> dict[str, float]:
     return out | {"largest": float(values[-1])}
 
 
+def share_missed(counts: Counter[float], period_us: float, left_out: int | None = None) -> float:
+    """Percentage of the periods that began more than a period late or never; where it is not known how many were left out,
+    those that passed while one was late.
+    """
+    late = sum(count for lateness, count in counts.items() if lateness > period_us)
+    passed = sum(count * int(lateness // period_us) for lateness, count in counts.items())
+    never = passed if left_out is None else left_out
+    return 100.0 * (late + never) / (sum(counts.values()) + never)
+
+
+def stalls(counts: Counter[float], minutes: float) -> float:
+    """How many a minute began more than 1 ms late."""
+    return sum(count for lateness, count in counts.items() if lateness > STALL_US) / minutes
+
+
 def at_rate(rate_hz: float, minutes: float, privileged: bool) -> dict[str, Any]:
     """Loop and cyclictest in turns at one rate, for so many minutes each."""
     bench = bench_at(rate_hz)
-    times: dict[str, Counter[float]] = {name: Counter() for name in ("wake_up", "execution", "response", "cyclictest")}
-    missed, samples, periods = 0, 0, 0.0
-    said: dict[str, str] = {}
+    times: dict[str, Counter[float]] = {name: Counter() for name in (*TIMES, "cyclictest")}
+    counted: Counter[str] = Counter()
+    periods = 0.0
+    turns = max(1, round(60.0 * minutes / TURN_S))
     with tempfile.TemporaryDirectory() as name, busy_thread():
-        for _ in range(max(1, round(60.0 * minutes / TURN_S))):
+        for _ in range(turns):
             report, chunks = loop_turn(bench, Path(name), privileged)
             for kind, bins in report["histograms"].items():
                 times[kind].update(dict(zip(bins["upper_edge_us"], bins["count"], strict=True)))
             periods += rate_hz * report["wall_s"]
-            missed, samples, said = missed + report["overruns"], samples + report["samples"], report["real_time"]
+            said = report["real_time"]
+            counted.update({key: int(said[key]) for key in COUNTED if key in said})
+            counted.update(overruns=report["overruns"], samples=report["samples"])
             times["cyclictest"].update(cyclictest_turn(rate_hz, chunks, bench, Path(name), privileged))
     out: dict[str, Any] = {f"{name}_us": quantiles(counts) for name, counts in times.items()}
     loop, other = out["wake_up_us"], out["cyclictest_us"]
+    period_us, took_min = 1e6 / rate_hz, turns * TURN_S / 60.0
     out["wake_up_over_cyclictest"] = {key: loop[key] / max(1.0, other[key]) for key in loop}
-    out["missed_percent"] = 100.0 * missed / periods
+    out["missed_percent"] = {
+        "loop": share_missed(times["wake_up"], period_us, counted["skipped_periods"]),
+        "cyclictest": share_missed(times["cyclictest"], period_us),
+    }
+    out["overrun_percent"] = 100.0 * counted["overruns"] / periods
     out["stall_ms"] = {"loop": 1e-3 * loop["largest"], "cyclictest": 1e-3 * other["largest"]}
-    out["collections_in_the_loop"] = int(said["collections"])
-    out["imports_in_the_loop"] = int(said["imports"])
-    return {**out, "samples": samples, "scheduling": said["scheduling"], "memory": said["memory"]}
+    out["stalls_per_minute"] = {
+        "loop": stalls(times["wake_up"], took_min),
+        "cyclictest": stalls(times["cyclictest"], took_min),
+        "handed_over": counted["stalls"] / took_min,
+        "by_its_own_computing": counted["own_stalls"] / took_min,
+    }
+    out["in_the_loop"] = {key: float(counted[key]) for key in DISTURBANCES}
+    return {**out, "samples": counted["samples"], "scheduling": said["scheduling"], "memory": said["memory"]}
 
 
 def main() -> None:

@@ -20,6 +20,8 @@ from rig.cli_tune import tune_
 
 __all__ = ["app", "main"]
 
+STOPPED = 130
+
 app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
@@ -159,11 +161,12 @@ def show(
 def plot_(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
+    lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
 ) -> None:
     """Draw what is in a file."""
     from rig.figures.draw import plot
 
-    plot(file, output)
+    plot(file, output, lateness=lateness)
 
 
 @app.command()
@@ -196,8 +199,10 @@ def main() -> None:
     debug = len(arguments) < len(sys.argv) - 1
     try:
         status = app(arguments, prog_name="rig", standalone_mode=False)
+        if status == STOPPED:  # typer makes a status of Ctrl-C without a word
+            _complain("interrupted", STOPPED)
     except (KeyboardInterrupt, typer.Abort):
-        status = _complain("interrupted", 130)
+        status = _complain("interrupted", STOPPED)
     except BrokenPipeError:  # whoever read our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1

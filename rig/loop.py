@@ -63,15 +63,18 @@ class RunningLoop(Protocol):
     failure: DaqError | None
     """Why the driver ended the loop, if it did."""
     cause: str
-    """Why the loop asked for the ramp of its own accord, if it did; else empty."""
+    """Why the loop asked for the ramp, or who had it do so, in a sentence; else empty."""
     statistics: LoopStatistics
     """What the loop did so far."""
 
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks, until the output is off."""
 
-    def request_stop(self) -> None:
-        """Ask for the ramp to 0 V; returns at once, may be called any time and from a signal handler."""
+    def request_stop(self, cause: str = "") -> None:
+        """Ask for the ramp to 0 V, for a ``cause`` if there is one to be recorded.
+
+        Returns at once, may be called any time and from a signal handler.
+        """
 
     @property
     def counters(self) -> dict[str, int]:
@@ -134,8 +137,9 @@ class Loop:
                 yield self.tick.joined(readings[:done], rows[:done])
         self.statistics.wall_s = time.perf_counter() - began
 
-    def request_stop(self) -> None:
+    def request_stop(self, cause: str = "") -> None:
         """Ask for the ramp to 0 V; it begins with the next chunk."""
+        self.cause = self.cause or cause
         self.tick.request_stop()
 
     @property

@@ -4,6 +4,7 @@ Every pytest beside which this package is installed loads it: nothing heavy is i
 """
 
 from collections.abc import Generator, Iterator
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,12 +12,11 @@ import pytest
 if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.daq import DAQ
-    from rig.hil.results import Results
     from rig.hil.subject import ArmedRig, Subject
     from simulators.virtual_rig import VirtualRig
 
 DEFAULT_BENCH = "magnet-beam"
-RESULTS: "pytest.StashKey[Results]" = pytest.StashKey()
+FACTS: "pytest.StashKey[dict[str, object]]" = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -39,27 +39,36 @@ def pytest_configure(config: pytest.Config) -> None:
         "rig_needs(channels=None, physical=False, virtual=False): what a bench must have, else the test is skipped and says "
         "so; channels: how many, or their names",
     )
-    if config.getoption("rig_result"):
+    distributed = len(config.getoption("tx", None) or []) > 1  # pytest-xdist's workers, known to its controller only
+    if distributed and config.getoption("rig_bench"):
+        from rig.hil.subject import refuse_sharing
+
+        refuse_sharing(config.getoption("rig_bench"))
+    if config.getoption("rig_result") and not hasattr(config, "workerinput"):
         from rig.hil.results import Results
 
-        config.stash[RESULTS] = Results()
+        config.pluginmanager.register(Results(config.getoption("rig_result")), "rig-results")
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Note the outcome of every test."""
+    """Hand on what was tested with the report, for the report may go to another process."""
     report = yield
-    results = item.config.stash.get(RESULTS, None)
-    if results is not None:
-        results.add(report)
+    facts = item.config.stash.get(FACTS, None)
+    if facts is not None:
+        report.__dict__["rig_facts"] = facts
     return report
 
 
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the result file."""
-    results = session.config.stash.get(RESULTS, None)
-    if results is not None:
-        results.write(session.config.getoption("rig_result"), int(session.exitstatus))
+@contextmanager
+def _said_in_one_line() -> Iterator[None]:
+    """What a bench is refused for is a line for whoever runs the tests; where in the product it was found is not."""
+    from rig.errors import RigError
+
+    try:
+        yield
+    except RigError as error:
+        pytest.fail(str(error), pytrace=False)
 
 
 @pytest.fixture(scope="session")
@@ -67,14 +76,16 @@ def rig_subject(pytestconfig: pytest.Config) -> Iterator["Subject"]:
     """What is under test: its bench, device and capabilities. A bench that is missing or out of reach is an error."""
     from rig.hil.subject import subject
 
-    with subject(
-        pytestconfig.getoption("rig_bench") or DEFAULT_BENCH,
-        wire=pytestconfig.getoption("rig_emulate"),
-        arm=pytestconfig.getoption("rig_arm"),
-    ) as found:
-        results = pytestconfig.stash.get(RESULTS, None)
-        if results is not None:
-            results.subject = found.facts()
+    with ExitStack() as stack:
+        with _said_in_one_line():
+            found = stack.enter_context(
+                subject(
+                    pytestconfig.getoption("rig_bench") or DEFAULT_BENCH,
+                    wire=pytestconfig.getoption("rig_emulate"),
+                    arm=pytestconfig.getoption("rig_arm"),
+                )
+            )
+        pytestconfig.stash[FACTS] = found.facts()
         yield found
 
 
@@ -89,9 +100,14 @@ def rig_daq(rig_subject: "Subject") -> Iterator["DAQ"]:
     """The bench's driver, open; afterwards its output is at 0 V and it is closed. A physical bench has to be armed."""
     from rig.drivers import make_daq
 
-    rig_subject.require_arming()
-    with make_daq(rig_subject.bench) as daq:
+    daq = make_daq(rig_subject.bench)
+    with _said_in_one_line():
+        rig_subject.require_arming()
+        daq.open()
+    try:
         yield daq
+    finally:
+        daq.close()
 
 
 @pytest.fixture(scope="session")
@@ -99,7 +115,8 @@ def armed_rig(rig_subject: "Subject") -> Iterator["ArmedRig"]:
     """A rig that carries out plans (``run``), is ramped down after each, however it ends, and let go of at the end."""
     from rig.hil.subject import ArmedRig
 
-    rig_subject.require_arming()
+    with _said_in_one_line():
+        rig_subject.require_arming()
     rig = ArmedRig(rig_subject)
     yield rig
     rig.close()

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.campaigns.continuation import changed_keys
+from rig.campaigns.drift import drift_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
 from rig.campaigns.quality import what_was_skipped
@@ -52,6 +53,8 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
             "tripped": part.end is not None and part.end["tripped"],
             "changed": changed.get(number, []),
             "about": part.information.get("about"),
+            "loop": None if part.end is None else part.end["loop"],
+            "counters": None if part.end is None else part.end["counters"],
         }
         for number, part in enumerate(recording.parts)
     ]
@@ -67,6 +70,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "points_planned": len(plan.targets()),
         "skipped": what_was_skipped(recording.latest.values(), len(plan.targets())),
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
+        "drift": drift_of(recording.latest.values()),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {

@@ -8,6 +8,7 @@ from rig.campaigns.about import user_name
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.report import say
 from rig.console import number, print_table
+from rig.loop_table import print_loop
 from rig.models.files import KINDS
 
 __all__ = ["print_summary", "say_how_it_ended"]
@@ -48,6 +49,7 @@ def print_summary(summary: dict[str, Any]) -> None:
     _print_points(summary["kind"], summary["points"])
     if summary["skipped"]:
         print(summary["skipped"])
+    _print_drift(summary["drift"])
     if summary["former_points"]:
         print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
         _print_points(summary["kind"], summary["former_points"])
@@ -60,6 +62,18 @@ def print_summary(summary: dict[str, Any]) -> None:
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
         print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
         _print_about(part["about"] or {})
+        print_loop(part["loop"] or {}, part["counters"] or {})
+
+
+def _print_drift(drift: dict[str, Any] | None) -> None:
+    """What has changed from the first point to its repetition at the end."""
+    if drift is None:
+        return
+    told = [
+        f"{name} {number(drift[name], pattern, 100.0)} %"
+        for name, pattern in (("frequency", "+.4f"), ("damping", "+.2f"), ("amplitude", "+.2f"))
+    ]
+    print(f"drift from the first point to the same again (point {drift['again']}): {', '.join(told)}")
 
 
 def _print_about(about: dict[str, Any]) -> None:
@@ -93,7 +107,7 @@ def _print_points(kind: str, points: Sequence[dict[str, Any]]) -> None:
                 p["level_unit"],
                 *(number(p[column.key], column.pattern, column.scale) for column in columns),
                 {True: "yes", False: "no", None: "-"}[p["settled"]],
-                "ok" if p["accepted"] else p["reason"],
+                ("the first again" if p.get("repeats_first") else "ok") if p["accepted"] else p["reason"],
             )
             for p in points
         ],

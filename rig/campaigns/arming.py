@@ -91,7 +91,7 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str) -> tuple[str, ...]
     """What speaks against arming: a trip that nobody has looked at; no check, or one that does not count."""
     out = []
     if memory.trip is not None:
-        out.append(f"the last run tripped: {memory.trip.text}")
+        out.append(f"the last run tripped: {memory.trip.text}" if memory.trip.recording else memory.trip.text)
     check = memory.check
     if what == CHECK:
         return tuple(out)

@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from rig.bench import Bench
+from rig.campaigns.drift import with_first_repeated
 from rig.campaigns.locked import SettledPlan
 from rig.campaigns.plan import Target
 from rig.sequencer.layout import OnFailure, SegmentKind
@@ -26,6 +27,8 @@ class BackbonePlan(SettledPlan):
     """Kind of campaign."""
     direction: Literal["up", "down", "up-down"] = "up"
     """Order of the levels."""
+    repeat_first: bool = False
+    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
     ramp_periods: float = Field(20.0, ge=1, le=1e5)
     """Length of the ramp between two levels, periods."""
     record_periods: int = Field(50, ge=4, le=1_000_000)
@@ -52,7 +55,7 @@ class BackbonePlan(SettledPlan):
             "down": [(level, "down") for level in falling],
             "up-down": [(level, "up") for level in rising] + [(level, "down") for level in falling[1:]],
         }
-        return tuple(
+        targets = tuple(
             Target(number=number, level=level, direction=direction, repeat=repeat)
             for number, (repeat, level, direction) in enumerate(
                 (repeat, level, direction)
@@ -60,6 +63,7 @@ class BackbonePlan(SettledPlan):
                 for level, direction in passes[self.direction]
             )
         )
+        return with_first_repeated(targets) if self.repeat_first else targets
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done`` already.

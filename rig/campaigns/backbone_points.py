@@ -17,6 +17,7 @@ from identification import (
 from rig.bench import Bench
 from rig.campaigns.alien_force import alien_force
 from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.drift import of_the_result
 from rig.campaigns.evaluate import (
     channels_from,
     head,
@@ -144,7 +145,7 @@ def backbone_of(
     phase_lag_target_deg: float,
 ) -> Backbone:
     """The accepted points of a recording as measurements; raises `IdentificationError` where there is none."""
-    accepted = [point for point in points if point["accepted"]]
+    accepted = [point for point in of_the_result(points) if point["accepted"]]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
     kinds = channels_from(channels)

@@ -52,7 +52,7 @@ class RememberedTrip:
     text: str
     """What tripped."""
     recording: str
-    """Path of the recording."""
+    """Path of the recording; empty where it is not a run that tripped, but a file that cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,9 @@ def memory_of(bench: Bench) -> BenchMemory:
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
         check, trip = table["check"], table["trip"]
+        for found in (check, trip):
+            if found is not None:
+                _check_time(found["at"])
         return BenchMemory(
             None if check is None else RememberedCheck(**{**check, "failed": tuple(check["failed"])}),
             None if trip is None else RememberedTrip(**trip),
@@ -95,7 +98,14 @@ def memory_of(bench: Bench) -> BenchMemory:
     except FileNotFoundError:
         return BenchMemory()
     except (OSError, ValueError, KeyError, TypeError) as error:
-        return BenchMemory(trip=RememberedTrip(now(), f"{path} cannot be read: {error}", ""))
+        text = f"{path} cannot be read, it may have held a trip ({type(error).__name__}: {error})"
+        return BenchMemory(trip=RememberedTrip(now(), text, ""))
+
+
+def _check_time(at: str) -> None:
+    """Raise `ValueError` or `TypeError` for what is no moment, or one of an unknown time zone."""
+    if datetime.fromisoformat(at).tzinfo is None:
+        raise ValueError(f"at = {at!r}: has no time zone")
 
 
 def remember(bench: Bench, **changes: Any) -> None:

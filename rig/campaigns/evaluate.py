@@ -63,6 +63,8 @@ def head(plan: Plan, target: Target) -> dict[str, Any]:
         point["asked_phase_lag_deg"] = target.phase_lag_deg
     if target.realisation is not None:
         point["realisation"] = target.realisation
+    if target.repeats_first:
+        point["repeats_first"] = True
     return point
 
 

@@ -13,6 +13,7 @@ from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
 from rig.campaigns.gaps import lost_rows
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.plan import Column, Target
+from rig.daq import Channel
 
 __all__ = ["MULTISINE_COLUMNS", "measure_multisine_point", "spectra_of"]
 
@@ -39,9 +40,10 @@ def measure_multisine_point(
         return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
     roles = {channel.role: channel.name for channel in bench.channels}
     periods = spectra.spectra.shape[1]
+    still = next((c.name for c, column in _watched(bench, rows) if not np.ptp(column)), "")
     change = max(_change(spectra, roles[role]) for role in ("force", "drive")) if periods > 1 else math.nan
-    reason = ""
-    if change > plan.accepted_change:
+    reason = f"channel {still} does not change at all: sensor, cable or supply is dead" if still else ""
+    if not reason and change > plan.accepted_change:
         reason = (
             f"force or drive of the first period differs by {100.0 * change:.1f} % from the others beyond noise, accepted "
             f"up to {100.0 * plan.accepted_change:g} %: more transient_periods, or less disturbance"
@@ -59,6 +61,12 @@ def measure_multisine_point(
         "periods": plan.periods,
         "warnings": _warnings(plan.periods, periods),
     }
+
+
+def _watched(bench: Bench, rows: np.ndarray) -> list[tuple[Channel, np.ndarray]]:
+    """Force and drive with what was read of them, but for lost samples."""
+    readings = rows["inputs"][~lost_rows(rows)]
+    return [(c, readings[:, i]) for i, c in enumerate(bench.channels) if c.role in ("force", "drive")]
 
 
 def _warnings(planned: int, periods: int) -> list[str]:
@@ -101,7 +109,10 @@ def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:
 
 
 def _change(spectra: PeriodicSpectra, name: str) -> float:
-    """Difference between the first period and the mean of the others beyond noise, RMS over the band, relative."""
+    """Difference between the first period and the mean of the others beyond noise, RMS over the band, relative.
+
+    0 where there is nothing in the others: a channel that stands still.
+    """
     periods = spectra.spectra[0, :, spectra.index(name)]
     count, others = periods.shape[0], periods[1:].mean(axis=0)
     difference = periods[0] - others
@@ -110,7 +121,8 @@ def _change(spectra: PeriodicSpectra, name: str) -> float:
     else:
         noise = _rough_power(difference)
     beyond = max(float(np.linalg.norm(difference) ** 2 - noise), 0.0)
-    return math.sqrt(beyond) / float(np.linalg.norm(others))
+    size = float(np.linalg.norm(others))
+    return math.sqrt(beyond) / size if size > 0.0 else 0.0
 
 
 def _rough_power(difference: np.ndarray) -> float:

@@ -33,6 +33,8 @@ class Target(Configured):
     """Wanted lag of the drive-point acceleration behind the force, where the plan gives it, deg."""
     realisation: int | None = None
     """Number of a multisine's realisation, from 0."""
+    repeats_first: bool = False
+    """Whether it is the plan's first point measured again at its end, to see a drift; it is part of no result."""
 
 
 class Column(NamedTuple):

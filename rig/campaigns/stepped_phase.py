@@ -6,6 +6,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from rig.campaigns.drift import with_first_repeated
 from rig.campaigns.locked import SettledPlan
 from rig.campaigns.plan import Target
 from rig.sequencer.layout import OnFailure, SegmentKind
@@ -36,6 +37,8 @@ class SteppedPhasePlan(SettledPlan):
     """Distance of neighbouring lags, deg; the last step may be shorter."""
     direction: Literal["up", "down", "up-down"] = "up"
     """Whether the lag rises, falls, or rises and falls."""
+    repeat_first: bool = False
+    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
     approach_deg: float | None = None
     """Lag at which a level is reached before the first lag is stepped to, deg; the first lag if not given."""
     approach_periods: float = Field(40.0, ge=1, le=1e5)
@@ -94,12 +97,13 @@ class SteppedPhasePlan(SettledPlan):
         rising, falling = [(lag, "up") for lag in self.lags], [(lag, "down") for lag in self.lags[::-1]]
         way = {"up": rising, "down": falling, "up-down": rising + falling[1:]}[self.direction]
         passes = [(level, repeat) for level in self.levels for repeat in range(1, self.repeats + 1)]
-        return tuple(
+        targets = tuple(
             Target.model_validate(
                 {"number": number, "level": level, "direction": to, "repeat": repeat, "phase_lag_deg": lag}
             )
             for number, (level, repeat, lag, to) in enumerate((*one, *point) for one in passes for point in way)
         )
+        return with_first_repeated(targets) if self.repeat_first else targets
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done`` already.
@@ -150,7 +154,7 @@ class SteppedPhasePlan(SettledPlan):
 
 def _same_pass(before: Target, target: Target) -> bool:
     """Whether a point lies on the way that the one before it is on."""
-    return before.level == target.level and before.repeat == target.repeat
+    return (before.level, before.repeat, before.repeats_first) == (target.level, target.repeat, target.repeats_first)
 
 
 def _lag(target: Target) -> float:

@@ -9,6 +9,7 @@ from identification import FrequencyResponse, IdentificationError
 from identification.frequency_responses import Controlled
 from rig.bench import Bench
 from rig.campaigns.alien_force import alien_force
+from rig.campaigns.drift import of_the_result
 from rig.campaigns.evaluate import as_complex, head, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.objections import alien_objection, drift_objection, first_of, level_error, level_objection
 from rig.campaigns.plan import Column, Target
@@ -78,7 +79,7 @@ def frequency_responses_of(
     roles = [channel["role"] for channel in channels]
     force, drive = roles.index("force"), roles.index("drive")
     passes: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
-    for point in points:
+    for point in of_the_result(points):
         if point["accepted"]:
             passes.setdefault(tuple(point[key] for key in ("level", "direction", "repeat", "level_unit")), []).append(
                 point

@@ -84,7 +84,21 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
         text = "no reference was given: drive polarity, volts to newtons and slow changes are not seen"
         findings.append(Finding("reference", "", "not tested", text=text))
     level = plan.levels_rms_v[-1] if found is not None else None
+    findings += _clipping(recording, bench, level)
     return Assessment(bench, recording.path, level, tuple(findings), found, mode, old)
+
+
+def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> list[Finding]:
+    """What the check has not looked at: amplifier and shaker above the voltage that was played."""
+    if level_rms_v is None:
+        return []
+    part = recording.parts[-1]
+    peak_v = float(np.abs(part.rows("output_v")).max(initial=0.0))
+    text = (
+        f"played were up to {peak_v:.2g} V of the {bench.limits.voltage_v:g} V allowed; amplifier and shaker that clip "
+        "above lower the force purity of a run's points"
+    )
+    return [Finding("clipping", "", "not tested", peak_v, "V", f"up to {bench.limits.voltage_v:g}", text)]
 
 
 def responses_in(recording: Recording) -> Responses | None:

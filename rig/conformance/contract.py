@@ -220,9 +220,10 @@ class DriverContract(ABC):
             np.testing.assert_array_equal(answer, answers[0])
 
     def test_stop_leaves_the_output_at_zero(self) -> None:
-        """Driven, stopped and started again with 0 V, the inputs come to rest."""
+        """Driven, stopped at its largest output and started again with 0 V, the inputs come to rest."""
         with self.running(10) as daq:
-            for voltages in self.sine(2000, daq.sample_rate_hz).reshape(-1, 10):
+            blocks = round(8.25 * daq.sample_rate_hz / 20.0) // 10  # to the top of the ninth period: what is kept shows
+            for voltages in self.sine(10 * blocks, daq.sample_rate_hz).reshape(-1, 10):
                 daq.exchange(voltages.copy())
             daq.stop()
             daq.start(10)

@@ -1,6 +1,7 @@
 """Figure of a check: responses beside those of the reference, and what was found."""
 
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from rig.check.assessment import Assessment
 from rig.check.reference import on_lines_of
 from rig.errors import RecordingError
-from rig.figures.style import MAIN, SECOND, STYLE, say_why_empty, title
+from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, say_why_empty, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 __all__ = ["draw_check", "write_check"]
 
 COLOURS = (MAIN, SECOND, "#4f8f4f", "#8064a2", "#c9a227", "#3aa6a6")
-MOST_LINES = 14
+MOST_LINES, WIDTH, LINE_IN = 22, 72, 0.128
+VERDICTS = {"fail": SECOND, "warn": "#b07d00", "not tested": "#707070"}
+"""Colours of what is not in order, the worst first."""
 
 
 def write_check(found: Assessment, figure: Path) -> None:
@@ -54,12 +57,19 @@ def _draw_accelerances(size: "Axes", phase: "Axes", found: Assessment) -> None:
     now, known = _per_force(found)
     if found.responses is None:
         return
-    frequency = found.responses.frequency_hz
+    frequency, dead = found.responses.frequency_hz, _dead(found)
+    if found.responses.names[found.bench.index_of("force")] in dead:
+        for axis in (size, phase):
+            say_why_empty(axis, "the force channel is dead")
+        return
     moving = [i for i, c in enumerate(found.bench.channels) if c.role in ("drive", "response")]
     for colour, i in zip(COLOURS, moving, strict=False):
         name = found.responses.names[i]
+        if name in dead:
+            size.plot([], [], color=colour, label=f"{name}: dead")
+            continue
         size.semilogy(frequency, np.abs(now[i]), color=colour, label=name)
-        phase.plot(frequency, np.degrees(np.angle(now[i] / 1j)), color=colour, label=name)
+        phase.plot(frequency, np.degrees(np.angle(now[i] / 1j)), color=colour)
         if name in known:
             size.semilogy(frequency, np.abs(known[name]), "--", color=colour, lw=0.8)
             phase.plot(frequency, np.degrees(np.angle(known[name] / 1j)), "--", color=colour, lw=0.8)
@@ -70,8 +80,15 @@ def _draw_accelerances(size: "Axes", phase: "Axes", found: Assessment) -> None:
         ylim=(-190, 190),
         yticks=(-180, -90, 0, 90, 180),
     )
-    if moving:
-        size.legend(fontsize=8)
+    for axis in (size, phase):
+        axis.axvline(found.bench.specimen.linear_frequency_hz, color=REJECTED, ls=":", lw=1.0, zorder=0)
+    size.plot([], [], color=REJECTED, ls=":", label="expected frequency")
+    size.legend(fontsize=8)
+
+
+def _dead(found: Assessment) -> set[str]:
+    """Channels that do not follow the excitation."""
+    return {finding.channel for finding in found.findings if (finding.name, finding.verdict) == ("life", "fail")}
 
 
 def _per_force(found: Assessment) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -96,19 +113,29 @@ def _draw_force(axis: "Axes", found: Assessment) -> None:
     if found.reference is not None and name in found.reference.names:
         known = on_lines_of(frequency, found.reference)[found.reference.names.index(name)]
         axis.semilogy(frequency, np.abs(known), "--", color=MAIN, lw=0.8, label="reference")
+        axis.legend(fontsize=8)
     axis.set(xlabel="frequency, Hz", ylabel="force per volt, N/V")
-    axis.legend(fontsize=8)
 
 
 def _say_findings(axis: "Axes", found: Assessment) -> None:
-    lines = [f"{f.verdict}: {f.label}" for f in found.findings if f.verdict != "ok"]
-    more = [f"and {len(lines) - MOST_LINES} more"] if len(lines) > MOST_LINES else []
-    axis.text(
-        0.0,
-        1.0,
-        "\n".join([*(lines[:MOST_LINES] or ["all in order"]), *more]),
-        va="top",
-        transform=axis.transAxes,
-        fontsize=8,
-    )
+    """What is not in order, the worst first, with what to do about it."""
+    from matplotlib.transforms import ScaledTranslation
+
     axis.set_axis_off()
+    told = {
+        (f.verdict, f.label): f.text for f in reversed(found.findings) if f.verdict != "ok"
+    }  # the first of each counts
+    fine = sum(f.verdict == "ok" for f in found.findings)
+    lines = [(f"{fine} findings in order", MAIN)]
+    for verdict, colour in VERDICTS.items():
+        for (graded, label), text in reversed(told.items()):
+            if graded == verdict:
+                lines += [
+                    (line, colour) for line in wrap(f"{verdict}: {label}: {text}", WIDTH, subsequent_indent="    ")
+                ]
+    if len(lines) > MOST_LINES:
+        lines[MOST_LINES - 1 :] = [("… and more: rig show", REJECTED)]
+    page = axis.figure
+    for place, (line, colour) in enumerate(lines):
+        down = ScaledTranslation(0.0, -LINE_IN * place, page.dpi_scale_trans)
+        axis.text(-0.1, 1.0, line, va="top", transform=axis.transAxes + down, fontsize=7.5, color=colour)

@@ -11,6 +11,7 @@ from rig.errors import RecordingError
 from rig.figures.check import draw_check
 from rig.figures.continuous_backbone import draw_differences, draw_ways
 from rig.figures.force_surface import draw_force_surface
+from rig.figures.lateness import draw_lateness
 from rig.figures.nonlinear_mode import draw_properties
 from rig.figures.stepped_phase import draw_stepped_phase
 from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
@@ -28,8 +29,10 @@ if TYPE_CHECKING:
 __all__ = ["plot"]
 
 
-def plot(source: Path, figure: Path) -> None:
+def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
     """Draw what is in ``source`` into ``figure`` (png, pdf or svg by its ending).
+
+    With ``lateness`` it is how punctual the loop of a recording was.
 
     Raises `RecordingError` where the file cannot be read or the figure not be written.
     """
@@ -45,7 +48,10 @@ def plot(source: Path, figure: Path) -> None:
     kind = kind_of(source)
     with mpl.rc_context(STYLE):
         page = Figure(figsize=(9.0, 6.4), layout="constrained")
-        if kind in KINDS:
+        if lateness:
+            with Recording(source) as recording:
+                draw_lateness(page, recording)
+        elif kind in KINDS:
             page.set_size_inches(*KINDS[kind].figure_in)
             KINDS[kind].draw(page, load(source))
         else:

@@ -15,15 +15,17 @@ PACKAGES = ("vibrolock", "numpy", "scipy", "numba", "h5py", "pyserial", "python-
 
 
 class Results:
-    """Collects reports; ``subject`` are the facts of what is tested, empty while nothing was reached."""
+    """A plug-in that collects the reports of all processes; without facts of a bench where none was reached."""
 
-    def __init__(self) -> None:
-        self.subject: dict[str, Any] = {}
+    def __init__(self, path: str) -> None:
+        self._path = Path(path).absolute()
+        self._subject: dict[str, Any] = {}
         self._started = datetime.now(UTC).isoformat(timespec="seconds")
         self._tests: dict[str, dict[str, Any]] = {}
 
-    def add(self, report: pytest.TestReport) -> None:
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """One phase of a test: the worst outcome of the three counts."""
+        self._subject = getattr(report, "rig_facts", self._subject)
         entry = self._tests.setdefault(
             report.nodeid, {"test": report.nodeid, "outcome": "passed", "reason": "", "seconds": 0.0, "measured": {}}
         )
@@ -31,22 +33,29 @@ class Results:
         entry["measured"] = {str(name): value for name, value in report.user_properties}
         if report.outcome != "passed" and entry["outcome"] == "passed":
             entry["outcome"] = "error" if report.failed and report.when != "call" else report.outcome
-            why = report.longrepr
-            entry["reason"] = why[2] if isinstance(why, tuple) else str(why).strip().splitlines()[-1]
+            entry["reason"] = _reason(report.longrepr)
 
-    def write(self, path: str, status: int) -> None:
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Write everything as JSON."""
         document = {
             "started": self._started,
             "ended": datetime.now(UTC).isoformat(timespec="seconds"),
-            "exit_status": status,
-            **self.subject,
+            "exit_status": int(session.exitstatus),
+            **self._subject,
             "python": platform.python_version(),
             "system": f"{platform.system()} {platform.release()} {platform.machine()}",
             "versions": {name: _version(name) for name in PACKAGES},
             "tests": list(self._tests.values()),
         }
-        Path(path).write_text(json.dumps(document, indent=2, default=str) + "\n", encoding="utf-8")
+        self._path.write_text(json.dumps(document, indent=2, default=str) + "\n", encoding="utf-8")
+
+
+def _reason(why: Any) -> str:
+    """One line: what a skip says, what an exception says, or all there is."""
+    if isinstance(why, tuple):
+        return str(why[2])
+    crash = getattr(why, "reprcrash", None)
+    return str(why if crash is None else crash.message).strip().partition("\n")[0]
 
 
 def _version(package: str) -> str:

@@ -1,10 +1,13 @@
 """What hardware-in-the-loop tests are run on: a bench that was found, reached and, if it moves anything, armed."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 import rig
 from rig.bench import Bench, load_bench
@@ -15,7 +18,7 @@ from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, NotArmed
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["ArmedRig", "Subject", "subject"]
+__all__ = ["ArmedRig", "Subject", "refuse_sharing", "subject"]
 
 EMULATED_BLOCK_S = 0.004  # a wire carries blocks, no single samples at the rate of a virtual rig
 
@@ -68,6 +71,19 @@ class Subject:
         }
 
 
+def refuse_sharing(name: str | Path) -> None:
+    """Raise `pytest.UsageError` where several processes would test one device."""
+    try:
+        bench = load_bench(name)
+    except ConfigurationError:
+        return  # what is no bench is refused where it is asked for
+    if bench.driver.name != "virtual":
+        raise pytest.UsageError(
+            f"bench {bench.name}: there is one device behind driver {bench.driver.name!r}, and it is tested by one process; "
+            "leave out -n"
+        )
+
+
 @contextmanager
 def subject(name: str | Path, *, wire: str | None = None, arm: bool = False) -> Iterator[Subject]:
     """The bench of that name or file, reached once to see that it is there; over an emulated ``wire`` if asked for.
@@ -113,7 +129,8 @@ class ArmedRig:
 
     def notes(self, numbers: Mapping[str, object]) -> None:
         """Numbers of the present test for the result file."""
-        self.properties.extend(numbers.items())
+        plain = json.loads(json.dumps(dict(numbers), default=lambda array: array.tolist()))
+        self.properties.extend(plain.items())
 
     def close(self) -> None:
         """Let go of all recordings."""

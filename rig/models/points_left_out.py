@@ -17,16 +17,16 @@ def points_left_out(recording: Recording) -> tuple[str, ...]:
     targets = plan.targets()
     latest, numbers = recording.latest, recording.plans[-1].numbers
     found = zip(targets, range(len(targets)) if numbers is None else numbers, strict=True)
-    results = {target.number: latest.get(number, _NOT_REACHED) for target, number in found}
+    results = {t.number: latest.get(number, _NOT_REACHED) for t, number in found if not t.repeats_first}
     out = {number: point for number, point in results.items() if not point["accepted"]}
     if not out:
         return ()
-    planned = Counter(target.level for target in targets)
+    planned = Counter(targets[number].level for number in results)
     lost = Counter(targets[number].level for number in out)
     unit = plan.level_unit
     where = ", ".join(f"{lost[level]} of {planned[level]} at {level:g} {unit}" for level in sorted(lost))
     reason = next(iter(out.values()))["reason"]
     return (
-        f"{recording.path.name}: {len(out)} of {len(targets)} points of the plan were not accepted and are left out "
+        f"{recording.path.name}: {len(out)} of {len(results)} points of the plan were not accepted and are left out "
         f"({where}); the first: {reason}",
     )

@@ -1,9 +1,7 @@
 """The loop by the wall clock: one block after the other, on time or counted, and a safe end whatever happens."""
 
-import gc
 import os
 import struct
-import sys
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -16,8 +14,10 @@ from rig.loop import end_by_driver
 from rig.safety.layout import GuardMode
 from rig.tick.kernels import tick_block
 from rig.tick.tick import Tick
+from rig.worker.disturbances import disturbances, since
 from rig.worker.memory import STOP, SharedMemory, Slot
 from rig.worker.pace import pace_of
+from rig.worker.times import BlockTimes
 
 __all__ = ["CHUNK_DONE", "LONGEST_STALL_S", "WallClockLoop", "suspended_s"]
 
@@ -26,7 +26,6 @@ CHUNK_DONE = b"."
 NOTICE = struct.pack("!i", len(CHUNK_DONE)) + CHUNK_DONE  # as `Connection.send_bytes` has it, without its detours
 LONGEST_STALL_S = 1.0
 """A loop paced by the host that comes later than this, or ten blocks, ends with a ramp."""
-AHEAD_S = 1.0
 OFF = int(GuardMode.OFF)
 
 _now = time.monotonic_ns
@@ -38,20 +37,15 @@ def suspended_s() -> float:
     return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
-def _collections() -> int:
-    """Runs of the garbage collector so far."""
-    return sum(int(generation["collections"]) for generation in gc.get_stats())
-
-
 class WallClockLoop:
     """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
 
-    ``tick`` must have its state in ``state`` (`rig.worker.memory.packed`). ``asked`` returns the name of a signal that
-    has come, or an empty text.
+    ``tick`` must have its state in ``state`` (`rig.worker.memory.packed`). ``asked`` returns in a sentence who has asked the
+    process itself to end, or an empty text.
 
     Whatever asks for the end of it (the campaign, a signal, a full ring, a campaign that is gone, a computer that has
     slept) gets the tick's ramp to 0 V. ``cause`` says who, unless it was the campaign; ``failure`` is the driver's error.
-    ``imports`` and ``collections``: modules imported and runs of the garbage collector in it, both of which are stalls.
+    ``disturbances``: what may have held it up, counted.
     """
 
     def __init__(
@@ -69,17 +63,15 @@ class WallClockLoop:
         period_ns = 1e9 * daq.block / daq.sample_rate_hz
         queue = int((daq.latency_samples - daq.filter_delay_samples) // daq.block) if self._pace.by_device else 1
         self._deadline_ns = int(period_ns * max(1, queue))
+        self.times = BlockTimes(self._pace, memory, self._deadline_ns)
         self._stall_ns = int(max(1e9 * LONGEST_STALL_S, 10 * period_ns))
         self._voltages = np.zeros(daq.block)
         self._unsaid = False
         # Spread over the blocks of a chunk, for each costs as much as a block does; a chunk of one block does both in one.
         chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
         self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
-        self._began_ns = self._begun_ns = self._release_ns = 0
-        self._samples = self._overruns = self._busy_ns = 0
-        self.imports = self.collections = 0
-        histograms = memory.histograms
-        self._counts = histograms["wake_up"].add, histograms["execution"].add, histograms["response"].add
+        self._samples = 0
+        self.disturbances: dict[str, int] = {}
 
     @property
     def deadline_s(self) -> float:
@@ -88,8 +80,8 @@ class WallClockLoop:
 
     def run(self) -> None:
         """Until the output is off."""
-        modules, collections = len(sys.modules), _collections()
-        began = self._began_ns = _now()
+        before = disturbances()
+        began = _now()
         self._pace.begin()
         over = False
         while not over:
@@ -98,7 +90,7 @@ class WallClockLoop:
             over = self.failure is not None or self.tick.over
             self._hand_over(slot, rows, _now() - began)
         self._announce()
-        self.imports, self.collections = len(sys.modules) - modules, _collections() - collections
+        self.disturbances = since(before)
 
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; returns the rows that it holds."""
@@ -122,7 +114,7 @@ class WallClockLoop:
             begun = _now() if by_device else begun
             end = first + block
             tick_block(arrays, inputs, daq.flags, slot.readings[first:end], slot.rows[first:end], voltages)
-            self._begun_ns, self._release_ns = begun, pace.release(begun)
+            self.times.begun(begun)
             self._samples += block
             if guard[0] == OFF and tick.over:
                 self._account()
@@ -131,20 +123,9 @@ class WallClockLoop:
 
     def _account(self) -> None:
         """The block before is over, and its outputs are handed over now: count its times."""
-        begun = self._begun_ns
-        if not begun:
-            return
-        done, release = _now(), self._release_ns
-        self._begun_ns = 0
-        count_wake_up, count_execution, count_response = self._counts
-        count_wake_up(begun - release)
-        count_execution(done - begun)
-        count_response(done - release)
-        self._busy_ns += done - begun
-        if done - release > self._deadline_ns:
-            self._overruns += 1
-            if done - release > self._stall_ns and not self._pace.by_device:
-                self._end(f"the loop stood still for {1e-9 * (done - release):.1f} s")
+        response = self.times.done()
+        if response > self._stall_ns and not self._pace.by_device:
+            self._end(f"the loop stood still for {1e-9 * response:.1f} s")
 
     def _fail(self, error: DaqError) -> None:
         self.failure = error
@@ -152,10 +133,10 @@ class WallClockLoop:
 
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
         """Complete a chunk and announce it. Without anybody there the slot is filled again."""
+        self._announce()  # the chunk before, where this one ended before it came to it
         if self._alone:
             return
-        overruns = self._overruns + self._pace.skipped
-        slot.head[:] = rows, self._samples, overruns, self._busy_ns, wall_ns
+        slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns
         counts = list(self.daq.counters.values())[: slot.counters.size]
         slot.counters[: len(counts)] = counts
         slot.state[:] = self._state
@@ -186,18 +167,17 @@ class WallClockLoop:
             self._end("the campaign did not take its rows, and the output was brought down before any was lost")
             if self._memory.free < 1:  # it has had the time of a ramp and more
                 self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
-        signal_name = self._asked()
-        if signal_name:
-            self._end(f"the loop's process was asked to end ({signal_name})")
+        asked = self._asked()
+        if asked:
+            self._end(asked)
         slept = suspended_s()
         if slept - self._slept_s > 0.05:
             self._end(f"the computer was suspended for {slept - self._slept_s:.1f} s")
         self._slept_s = slept
 
     def _waited_for_room(self) -> bool:
-        """Wait for the campaign where there is no hurry: a device far ahead of its nominal rate has no clock that runs on."""
-        ahead_s = self._samples / self.daq.sample_rate_hz - 1e-9 * (_now() - self._began_ns)
-        if not self._pace.by_device or ahead_s < AHEAD_S:
+        """Wait for the campaign where nobody's clock runs on."""
+        if self._pace.has_clock:
             return False
         while self._memory.free <= self._memory.layout.reserve:
             if os.getppid() != self._parent or self._asked() or self._memory.words[STOP]:

@@ -1,12 +1,13 @@
-"""When a block of the loop is due: by the host's clock, or by the device's."""
+"""When a block of the loop is due: by the host's clock, by the device's, or whenever the other side has come."""
 
 import math
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 from rig.daq import DAQ
 
-__all__ = ["DevicePace", "HostPace", "Pace", "pace_of"]
+__all__ = ["DevicePace", "HostPace", "Lockstep", "Pace", "pace_of", "pacing_of"]
 
 DRIFT = 2e-4  # crystals of host and device differ by less
 WINDOW_S = 0.2  # of which no block was on time, before a device is thought to have stood still
@@ -20,7 +21,9 @@ class Pace(Protocol):
     """Waits for the blocks of a loop."""
 
     by_device: bool
-    """Whether the device's clock paces the loop."""
+    """Whether the device paces the loop."""
+    has_clock: bool
+    """Whether time goes on without the loop, so that it can be late."""
 
     def wait(self) -> None:
         """Until the next block is due; at once where `DAQ.exchange` waits."""
@@ -44,6 +47,7 @@ class HostPace:
     """
 
     by_device = False
+    has_clock = True
 
     def __init__(self, period_s: float) -> None:
         self._period_ns = 1e9 * period_s
@@ -86,6 +90,7 @@ class DevicePace:
     """
 
     by_device = True
+    has_clock = True
     skipped = 0
 
     def __init__(self, period_s: float) -> None:
@@ -116,7 +121,39 @@ class DevicePace:
         return min(begun_ns, int(due))
 
 
+class Lockstep:
+    """A device that waits for the host, block by block: nobody's clock runs, and no block is due at any time."""
+
+    by_device = True
+    has_clock = False
+    skipped = 0
+
+    def begin(self) -> None:
+        """Nothing."""
+
+    def wait(self) -> None:
+        """Nothing: the exchange waits."""
+
+    def release(self, begun_ns: int) -> int:
+        """When it came."""
+        return begun_ns
+
+
+def pacing_of(daq: DAQ) -> str:
+    """Who paces a device that is open: ``host``, ``device``, or nobody (``lockstep``).
+
+    One that paces and is repeatable must wait for the host: with a clock of its own, no two runs would be alike.
+    """
+    capabilities = daq.capabilities
+    return "host" if not capabilities.paced else "lockstep" if capabilities.repeatable else "device"
+
+
 def pace_of(daq: DAQ) -> Pace:
-    """How a started device is paced."""
+    """The pace of a started device."""
     period_s = daq.block / daq.sample_rate_hz
-    return DevicePace(period_s) if daq.capabilities.paced else HostPace(period_s)
+    paces: dict[str, Callable[[], Pace]] = {
+        "host": lambda: HostPace(period_s),
+        "device": lambda: DevicePace(period_s),
+        "lockstep": Lockstep,
+    }
+    return paces[pacing_of(daq)]()

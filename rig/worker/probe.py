@@ -10,7 +10,7 @@ from rig.bench import Bench
 from rig.drivers import make_daq
 from rig.errors import DaqError
 from rig.worker.histogram import Histogram
-from rig.worker.pace import HostPace
+from rig.worker.pace import HostPace, pacing_of
 from rig.worker.privileges import prepare
 
 __all__ = ["probe", "round_trips"]
@@ -46,10 +46,10 @@ def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
             "sample_rate_hz": bench.sample_rate_hz,
             "block": bench.block,
             "largest_block": capabilities.largest_block,
-            "paced_by": "device" if capabilities.paced else "host",
+            "paced_by": pacing_of(daq),
             "virtual": capabilities.virtual,
         }
-        prepare(privileged=capabilities.paced)  # what returns at once would never let go of the processor
+        prepare(privileged=out["paced_by"] == "device")  # what returns at once would never let go of the processor
         daq.start(bench.block)
         zeros = np.zeros(bench.block)
         for _ in range(SETTLE_BLOCKS):

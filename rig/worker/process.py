@@ -2,6 +2,7 @@
 
 import signal
 import sys
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
@@ -11,11 +12,12 @@ import numpy as np
 from rig.bench import Bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
-from rig.errors import DaqError, RigError
+from rig.errors import ConfigurationError, DaqError, RigError
 from rig.session import TickSettings
 from rig.tick.kernels import tick_block
 from rig.worker.loop import WallClockLoop
 from rig.worker.memory import Layout, SharedMemory, packed
+from rig.worker.pace import pacing_of
 from rig.worker.privileges import prepare
 from rig.worker.probe import probe, round_trips
 
@@ -30,7 +32,7 @@ def main() -> None:
     facts = Connection(int(sys.argv[2]), readable=False)
     memory = int(sys.argv[3])
     try:
-        name, *arguments = commands.recv()
+        name, *arguments = _told(commands)
         if name == "probe":
             facts.send(("probed", probe(*arguments)))
         elif name == "round trips":
@@ -46,6 +48,17 @@ def main() -> None:
         raise
 
 
+def _told(commands: Connection) -> Any:
+    """The next order; `ConfigurationError` where it holds an object of a class that only the campaign's process has."""
+    try:
+        return commands.recv()
+    except (AttributeError, ImportError) as error:
+        raise ConfigurationError(
+            f"the loop's process cannot import what it was sent ({error}): a law, plan or driver of one's own must be "
+            "defined in a module that can be imported, not in the script that is run"
+        ) from None
+
+
 def described(error: RigError) -> tuple[tuple[str, ...], str]:
     """An error for the other process: names of its classes, the closest first, and its message."""
     return tuple(kind.__name__ for kind in type(error).__mro__), str(error)
@@ -55,15 +68,15 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
     """Open the driver, and run one loop over it if the campaign says so."""
     with make_daq(bench, seed) as daq:
         facts.send(("opened", daq.capabilities, dict(daq.identity), daq.remarks, dict(daq.counters)))
-        _, settings, ring_s = commands.recv()
+        _, settings, ring_s = _told(commands)
         trial = settings.build(0.0)
         layout = Layout.of(bench, trial.arrays, len(daq.counters), ring_s)
         memory = SharedMemory(descriptor, layout, create=True)
         _load_kernels(daq, bench, settings)
-        asked = _listen()
-        said = prepare(privileged=privileged)
+        came = _listen()
+        said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")  # in no hurry, and never asleep
         daq.start(bench.block)
-        loop = _begin(daq, settings, memory, facts, asked)
+        loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
         try:
             loop.run()
@@ -79,11 +92,11 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
 
 
 def _begin(
-    daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: list[str]
+    daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
 ) -> WallClockLoop:
     tick = settings.build(daq.latency_samples)
     tick.arrays, state = packed(tick.arrays)
-    return WallClockLoop(daq, tick, state, memory, facts, lambda: asked[0] if asked else "")
+    return WallClockLoop(daq, tick, state, memory, facts, asked)
 
 
 def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
@@ -113,9 +126,15 @@ def _listen() -> list[str]:
     return came
 
 
+def _asked(came: list[str], commands: Connection) -> str:
+    """Who has asked this process to end, in a sentence: a signal, or a campaign that talks to it no more."""
+    if came:
+        return f"the loop's process was asked to end ({came[0]})"
+    return "the campaign has let go of the loop" if commands.poll() else ""  # nothing else comes once it runs
+
+
 def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
     """What the loop process alone knows, as plain data for the record."""
-    pacing = "device" if loop.daq.capabilities.paced else "host"
-    counted = {"imports": str(loop.imports), "collections": str(loop.collections)}
-    real_time = {**said, "pacing": pacing, **counted}
+    counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
+    real_time = {**said, **{name: str(value) for name, value in counted.items()}}
     return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}

@@ -20,6 +20,7 @@ __all__ = ["WorkerLoop", "WorkerSession"]
 
 RING_S = 10.0
 LONGEST_SILENCE_S = 10.0
+HUNG_S = 0.5
 PATIENCE_S = 5.0
 
 
@@ -58,8 +59,9 @@ class WorkerLoop:
                 if rows.size:
                     yield rows
 
-    def request_stop(self) -> None:
+    def request_stop(self, cause: str = "") -> None:
         """Ask for the ramp to 0 V; the loop looks at every block."""
+        self.cause = self.cause or cause
         self._memory.request_stop()
 
     @property
@@ -75,7 +77,8 @@ class WorkerLoop:
         facts = self._worker.facts
         try:
             if not facts.poll(self._silence_s):
-                self._fail(DaqError(f"the loop's process has been silent for {self._silence_s:g} s"))
+                self._worker.end(HUNG_S)
+                self._fail(DaqError(self._silent_text()))
                 return False
             said = facts.recv_bytes()
         except (EOFError, OSError):
@@ -85,6 +88,12 @@ class WorkerLoop:
             return True
         self._finish(said)
         return False
+
+    def _silent_text(self) -> str:
+        return (
+            f"the loop's process has been silent for {self._silence_s:g} s and was ended: its driver hangs; "
+            "the device's own watchdog brings its output to 0 V"
+        )
 
     def _take(self) -> np.ndarray:
         slot = self._memory.to_take()
@@ -101,7 +110,8 @@ class WorkerLoop:
     def _finish(self, said: bytes) -> None:
         name, *facts = pickle.loads(said)
         if name == "ended":
-            failure, self.cause, self.counters, self._said = facts
+            failure, cause, self.counters, self._said = facts
+            self.cause = self.cause or cause
             self.failure = None if failure is None else _daq_error(failure)
         else:
             self.failure = _daq_error(facts[0])

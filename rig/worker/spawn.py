@@ -79,17 +79,24 @@ class Worker:
         how = signal.Signals(-status).name if status < 0 else f"status {status}"
         return DaqError(f"the loop's process has ended ({how}); the device's own watchdog brings its output to 0 V")
 
-    def close(self, patience_s: float) -> None:
-        """Let it end by itself for a while, then make it."""
-        self._commands.close()
-        for action in (None, self._process.terminate, self._process.kill):
-            if action is not None:
-                action()
+    def end(self, patience_s: float) -> None:
+        """Ask it to end, then make it."""
+        for action in (self._process.terminate, self._process.kill):
+            action()
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(patience_s)
                 break
-        self.facts.close()
-        os.close(self.memory)
+
+    def close(self, patience_s: float) -> None:
+        """Let it end by itself for a while, then make it."""
+        self._commands.close()
+        try:
+            self._process.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            self.end(patience_s)
+        finally:
+            self.facts.close()
+            os.close(self.memory)
 
 
 def rebuilt(names: tuple[str, ...], message: str) -> RigError:

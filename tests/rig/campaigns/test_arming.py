@@ -125,10 +125,21 @@ def test_after_a_trip_an_automated_bench_waits_for_a_person(tmp_path):
 
 
 @pytest.mark.usefixtures("physical")
-def test_what_cannot_be_read_may_have_been_a_trip():
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "[]",
+        *(
+            json.dumps({"check": {"at": at, "failed": [], "recording": "", "fingerprint": ""}, "trip": None})
+            for at in ("yesterday", "2026-01-01T00:00:00", 5)
+        ),
+    ],
+)
+def test_what_cannot_be_read_may_have_been_a_trip(text):
     chosen = bench(automated=True, require_check=False)
     remember(chosen, trip=RememberedTrip("2026-01-01T00:00:00+00:00", "x", ""))
-    memory_path(chosen).write_text("{")
+    memory_path(chosen).write_text(text)
     with pytest.raises(NotArmed, match="cannot be read"):
         rig.run(PLAN, bench=chosen)
 

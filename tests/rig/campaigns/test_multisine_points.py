@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 
 from identification import Channel, PeriodicSpectra
-from rig.campaigns.multisine_points import _change
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine_points import _change, measure_multisine_point
+from tests.rig.rigs import bench_with
 
 FREQUENCY_HZ = np.arange(10.0, 110.0, 0.05)
 
@@ -26,3 +28,20 @@ def test_noise_alone_is_no_change(periods: int) -> None:
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_a_transient_is_a_change_whatever_the_noise(periods: int, noise: float) -> None:
     assert _change(spectra(periods, noise, 0.1), "force") == pytest.approx(0.1, rel=0.1)
+
+
+@pytest.mark.parametrize("constant", [0.0, 0.75])
+def test_a_channel_that_stands_still_for_a_whole_record_is_refused_by_name(constant: float) -> None:
+    bench = bench_with()
+    plan = MultisinePlan(
+        bench="magnet-beam", levels_rms_v=(0.1,), lowest_hz=10.0, highest_hz=50.0, resolution_hz=1.0, periods=2
+    )
+    played = np.tile(plan.design(bench.sample_rate_hz).realisation(0, 0), 2)
+    row = np.dtype([("inputs", "f4", (len(bench.channels),)), ("output_v", "f4"), ("flags", "u4")])
+    rows = np.zeros(played.size, row)
+    rows["output_v"] = played
+    rows["inputs"] = np.random.default_rng(1).normal(size=rows["inputs"].shape) + played[:, None]
+    rows["inputs"][:, bench.index_of("drive")] = constant
+    point = measure_multisine_point(bench, plan, plan.targets()[0], rows, np.zeros(1)[0])
+    assert not point["accepted"]
+    assert point["reason"].startswith("channel drive does not change at all")

@@ -1,6 +1,7 @@
 """Drivers that a loop process opens in tests: virtual rigs that write down their output, or fail."""
 
 import struct
+import threading
 import time
 from pathlib import Path
 from typing import ClassVar
@@ -9,7 +10,7 @@ from rig.daq import Capabilities
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqBusy, DaqDisconnected
 
-OURS = ("log", "fails_after", "fails_with", "busy", "paced")
+OURS = ("log", "fails_after", "fails_with", "busy", "paced", "lockstep", "hangs_after", "opens_in_s")
 
 
 class NotingDAQ(VirtualDAQ):
@@ -28,7 +29,7 @@ class NotingDAQ(VirtualDAQ):
     @property
     def capabilities(self):
         paced = bool(self.ours.get("paced"))
-        return Capabilities(largest_block=1000, paced=paced, virtual=True, repeatable=True)
+        return Capabilities(largest_block=1000, paced=paced, virtual=True, repeatable=bool(self.ours.get("lockstep")))
 
     @property
     def identity(self):
@@ -37,12 +38,15 @@ class NotingDAQ(VirtualDAQ):
     def _open(self):
         if self.ours.get("busy"):
             raise DaqBusy("port X is held by somebody else")
+        threading.Event().wait(self.ours.get("opens_in_s", 0.0))
 
     def _exchange(self, voltages, inputs):
         self.blocks += 1
         if self.blocks > self.ours.get("fails_after", self.blocks):
             raise {"TypeError": TypeError}.get(self.ours.get("fails_with"), DaqDisconnected)("port X is gone")
-        if self.ours.get("paced"):
+        if self.blocks > self.ours.get("hangs_after", self.blocks):
+            threading.Event().wait()
+        if self.ours.get("paced") and not self.ours.get("lockstep"):
             self.due = (self.due or time.monotonic()) + self.block / self.sample_rate_hz
             time.sleep(max(0.0, self.due - time.monotonic()))
         if "log" in self.ours:

@@ -5,14 +5,16 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rig
+from controller import PhaseLockedLoop, preset
 from rig.drivers import make_daq
-from rig.errors import DaqBusy, DaqDisconnected, DaqError
+from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqError
 from rig.loop import Loop
 from rig.safety.layout import EndReason, GuardMode
 from rig.session import LocalSession, open_session
@@ -200,9 +202,32 @@ def test_errors_of_the_driver_arrive_with_their_class_and_message(noting):
     assert loop.report["real_time"]["pacing"] == "device"
 
 
+@pytest.mark.parametrize("hold_s", [0.30, 0.31])
+def test_the_output_comes_down_in_the_rows_whichever_block_of_a_chunk_is_the_last(hold_s):
+    bench = slow_bench("virtual")  # chunks are of two blocks
+    with WorkerSession(bench) as session:
+        rows, loop = ran(session, tone(bench, hold_s))
+    assert rows.size == loop.report["samples"]
+    assert rows["output_v"][-1] == 0.0
+
+
 @pytest.mark.filterwarnings("default")
 def test_a_driver_with_a_fault_of_its_own_ends_the_run_as_a_failed_driver(noting):
     with open_session(slow_bench(fails_after=30, fails_with="TypeError")) as session:
         _, loop = ran(session, tone(slow_bench(), 60.0))
     assert type(loop.failure) is DaqError
     assert "TypeError: port X is gone" in str(loop.failure)
+
+
+def test_a_law_of_the_script_s_own_is_refused_in_a_line_that_says_where_to_put_it(noting, monkeypatch):
+    class OwnLaw(PhaseLockedLoop):
+        """As if it had been written in the script that is run."""
+
+    OwnLaw.__module__, OwnLaw.__qualname__ = "__main__", "OwnLaw"
+    monkeypatch.setattr(sys.modules["__main__"], "OwnLaw", OwnLaw, raising=False)
+    settings = replace(tone(slow_bench(), 1.0), law=OwnLaw.model_validate(preset("magnet-beam").model_dump()))
+    with (
+        open_session(slow_bench()) as session,
+        pytest.raises(ConfigurationError, match=r"OwnLaw.*must be defined in a module"),
+    ):
+        session.start(settings)

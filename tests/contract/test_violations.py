@@ -1,0 +1,138 @@
+"""A driver that breaks a rule is caught by the kit under the rule's name, in words and as JSON, and the command fails."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rig.cli import app
+from rig.daq import State
+from rig.drivers.virtual import VirtualDAQ
+from rig.errors import DaqRefused
+
+
+class OpensItself(VirtualDAQ):
+    def __init__(self, bench, seed=0):
+        super().__init__(bench, seed)
+        self.open()
+
+    def open(self):
+        if self.state is State.CLOSED:
+            super().open()
+
+
+class FailsWhereGone(VirtualDAQ):
+    def close(self):
+        if self.state is State.CLOSED:
+            raise RuntimeError("not open")
+        super().close()
+
+
+class TakesAnyBlock(VirtualDAQ):
+    def start(self, block=1):
+        super().start(max(1, min(block, self.capabilities.largest_block)))
+
+
+class MakesUpLostSamples(VirtualDAQ):
+    run_fused = None
+
+    def _exchange(self, voltages, inputs):
+        super()._exchange(voltages, inputs)
+        inputs[-1] = np.nan
+
+
+class ClipsInSilence(VirtualDAQ):
+    def exchange(self, voltages):
+        return super().exchange(np.clip(np.nan_to_num(voltages), -self.output_range_v, self.output_range_v))
+
+
+class KeepsItsOutput(VirtualDAQ):
+    left_v = 0.0
+
+    def _exchange(self, voltages, inputs):
+        self.left_v = float(np.abs(voltages).max()) or self.left_v
+        super()._exchange(voltages, inputs)
+        inputs += self.left_v * np.sin(np.arange(len(inputs)))[:, np.newaxis]
+
+
+class LendsItsInputs(VirtualDAQ):
+    lent = None
+
+    def exchange(self, voltages):
+        answer = super().exchange(voltages)
+        if self.lent is None or self.lent.shape != answer.shape:
+            self.lent = answer
+        self.lent[:] = answer
+        return self.lent
+
+
+class CountsDown(VirtualDAQ):
+    calls = 0
+
+    @property
+    def counters(self):
+        return {"crc_errors": 100 - self.calls}
+
+    def _exchange(self, voltages, inputs):
+        self.calls += 1
+        super()._exchange(voltages, inputs)
+
+
+class IdentifiesItselfByNumber(VirtualDAQ):
+    @property
+    def identity(self):
+        return {"serial_number": 42}
+
+
+class CannotStartAgain(VirtualDAQ):
+    opened = 0
+
+    def _open(self):
+        self.opened += 1
+        if self.opened > 1:
+            raise DaqRefused("once is enough")
+        super()._open()
+
+
+RULES = {
+    OpensItself: "nothing is opened by the constructor",
+    FailsWhereGone: "close may be called at any time and again",
+    TakesAnyBlock: "blocks beyond the device are refused with what is allowed",
+    MakesUpLostSamples: "lost samples are rows of nan with their flag and nothing else is",
+    ClipsInSilence: "voltages beyond the range or not a number are refused",
+    KeepsItsOutput: "stop leaves the output at zero",
+    LendsItsInputs: "the voltages handed over are not kept",
+    CountsDown: "counters are whole numbers that only grow",
+    IdentifiesItselfByNumber: "the device says who it is in words",
+    CannotStartAgain: "a driver may be opened again",
+}
+
+
+def conformance(monkeypatch, driver, *options):
+    monkeypatch.setattr("rig.conformance.run.make_daq", driver)
+    return CliRunner().invoke(app, ["conformance", "--bench", "magnet-beam", *options])
+
+
+@pytest.mark.parametrize("driver", RULES, ids=lambda driver: driver.__name__)
+def test_the_kit_names_the_rule_that_is_broken(driver, monkeypatch):
+    done = conformance(monkeypatch, driver, "--json")
+    assert done.exit_code == 1
+    failed = {test["test"]: test["detail"] for test in json.loads(done.stdout)["tests"] if test["outcome"] == "failed"}
+    assert RULES[driver] in failed
+    assert all(failed.values()), "a failure without a word"
+
+
+def test_a_driver_that_keeps_all_rules_passes_in_words_and_the_command_succeeds(monkeypatch):
+    done = conformance(monkeypatch, VirtualDAQ)
+    assert done.exit_code == 0, done.stdout
+    *lines, summary = done.stdout.splitlines()
+    assert "failed" not in [line.split()[0] for line in lines]
+    assert summary.startswith("driver virtual: ")
+    assert " 0 failed, 1 not applicable" in summary
+
+
+def test_what_is_broken_stands_in_words_too(monkeypatch):
+    done = conformance(monkeypatch, CountsDown)
+    assert done.exit_code == 1
+    assert f"failed         {RULES[CountsDown]}: " in done.stdout

@@ -1,0 +1,116 @@
+"""What else may happen to a loop in a process of its own, and what is said of it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import rig.worker.loop
+import rig.worker.session
+from rig.errors import DaqError
+from rig.safety.layout import GuardMode
+from rig.worker.loop import WallClockLoop
+from rig.worker.memory import Layout, SharedMemory, anonymous_file, packed
+from rig.worker.session import WorkerSession
+from tests.rig.worker.drivers import NotingDAQ
+from tests.rig.worker.rigs import slow_bench, tone
+from tests.rig.worker.test_worker import ROOT, is_there, ramped, ran
+
+
+def loop_here(bench, settings, asked=lambda: ""):
+    """A loop in this process, for what cannot be brought about in another."""
+    daq = NotingDAQ(bench)
+    daq.open()
+    daq.start(bench.block)
+    tick = settings.build(daq.latency_samples)
+    tick.arrays, state = packed(tick.arrays)
+    layout = Layout.of(bench, tick.arrays, len(daq.counters), 30.0)
+    descriptor = anonymous_file()
+    memory = SharedMemory(descriptor, layout, create=True)
+    return WallClockLoop(
+        daq, tick, state, memory, SimpleNamespace(fileno=lambda: os.open(os.devnull, os.O_WRONLY)), asked
+    )
+
+
+def test_a_computer_that_has_slept_brings_the_output_down_and_says_how_long(tmp_path, noting, monkeypatch):
+    loop = loop_here(slow_bench(paced=True, log=str(tmp_path / "outputs")), tone(slow_bench(), 60.0))
+    monkeypatch.setattr(rig.worker.loop, "suspended_s", lambda: 3600.0 if loop.daq.blocks > 60 else 0.0)
+    loop.run()
+    assert loop.cause == "the computer was suspended for 3600.0 s"
+    assert ramped(np.fromfile(tmp_path / "outputs", "<f8"))
+
+
+def test_a_driver_that_hangs_is_noticed_and_its_process_ended(noting, monkeypatch):
+    monkeypatch.setattr(rig.worker.session, "LONGEST_SILENCE_S", 1.0)
+    with WorkerSession(slow_bench(hangs_after=50)) as session:
+        _, loop = ran(session, tone(slow_bench(), 60.0))
+        assert not is_there(session.pid)
+    assert type(loop.failure) is DaqError
+    assert "silent for 1 s and was ended" in str(loop.failure)
+    assert loop.tick.guard["mode"][0] == GuardMode.OFF
+
+
+def test_a_device_that_waits_for_the_host_is_never_late(noting):
+    with WorkerSession(slow_bench(paced=True, lockstep=True)) as session:
+        rows, loop = ran(session, tone(slow_bench(), 0.5), lambda loop, number: time.sleep(0.3 if number == 5 else 0.0))
+    report = loop.report
+    assert report["real_time"]["pacing"] == "lockstep"
+    assert report["real_time"]["scheduling"] == "not asked for"
+    assert report["overruns"] == 0
+    assert report["real_time"]["stalls"] == "0"
+    assert sum(report["histograms"]["execution"]["count"]) == rows.size // 10
+    assert report["histograms"]["wake_up"] == report["histograms"]["response"] == {"upper_edge_us": [], "count": []}
+
+
+def test_a_loop_killed_before_it_is_started_or_before_its_rows_are_asked_for_is_reported(noting):
+    with WorkerSession(slow_bench()) as session:
+        os.kill(session.pid, signal.SIGKILL)
+        with pytest.raises(DaqError, match="has ended \\(SIGKILL\\)"):
+            session.start(tone(slow_bench(), 60.0))
+    with WorkerSession(slow_bench()) as session:
+        loop = session.start(tone(slow_bench(), 60.0))
+        os.kill(session.pid, signal.SIGKILL)
+        assert sum(rows.size for rows in loop.run()) == loop.tick.sample
+    assert "has ended (SIGKILL)" in str(loop.failure)
+
+
+def test_a_campaign_interrupted_while_the_loop_starts_leaves_nothing_driven(tmp_path, noting):
+    log = tmp_path / "outputs"
+    with WorkerSession(slow_bench(log=str(log))) as session:
+        session._worker.send("start", tone(slow_bench(), 60.0), 10.0)
+        assert session._worker.facts.poll(60.0)  # it runs, and the campaign was interrupted before it knew
+        while not log.exists() or log.stat().st_size < 8 * 800:
+            assert is_there(session.pid)
+            time.sleep(0.02)
+        began = time.monotonic()
+    assert time.monotonic() - began < 3.0  # not the patience after which it would have been told to
+    assert not is_there(session.pid)
+    assert ramped(np.fromfile(log, "<f8"))
+
+
+CAMPAIGN = """
+import sys
+import rig
+from tests.rig.worker.rigs import slow_bench
+print("imported", flush=True)
+rig.run("magnet-beam/backbone", bench=slow_bench(log=sys.argv[1]), output=sys.argv[2])
+"""
+
+
+def test_a_stop_by_a_signal_is_recorded_with_its_name(tmp_path, noting):
+    log, output = tmp_path / "outputs", tmp_path / "run.h5"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(noting), str(ROOT), *filter(None, sys.path)])}
+    command = [sys.executable, "-c", CAMPAIGN, str(log), str(output)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as campaign:
+        while not log.exists() or log.stat().st_size < 8 * 1000:
+            assert campaign.poll() is None
+            time.sleep(0.02)
+        campaign.send_signal(signal.SIGTERM)
+        assert campaign.wait(30.0) == 0
+    with rig.Recording(output) as recording:
+        assert recording.parts[-1].end["text"] == "stopped by request (SIGTERM)"
