@@ -28,8 +28,10 @@ __all__ = [
     "Samples",
     "Status",
     "Stream",
+    "as_double",
     "as_float",
     "as_text",
+    "double_words",
     "float_word",
     "text_words",
 ]
@@ -149,6 +151,8 @@ class Parameter(IntEnum):
     """Mean delay of the converters' filters at low frequency."""
     SKEW_NS = 39
     """Delay behind the first channel, by channel."""
+    FILTER_DELAY_S = 40
+    """`FILTER_DELAY_NS` to the last bit, for a device in software: a double, its low word in item 0, its high one in item 1."""
     RATE_MHZ = 48
     """Set: sample rate, millihertz."""
     BLOCK = 49
@@ -255,6 +259,17 @@ def float_word(value: float) -> int:
 def as_float(word: int) -> float:
     """The float32 in the four bytes of a parameter."""
     return float(struct.unpack("<f", word.to_bytes(4, "little"))[0])
+
+
+def double_words(value: float) -> tuple[int, int]:
+    """A float64 as the low and the high word of a parameter of two items."""
+    low, high = struct.unpack("<II", struct.pack("<d", value))
+    return int(low), int(high)
+
+
+def as_double(low: int, high: int) -> float:
+    """The float64 in two words."""
+    return float(struct.unpack("<d", struct.pack("<II", low, high))[0])
 
 
 def text_words(text: str) -> list[int]:

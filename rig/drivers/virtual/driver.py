@@ -128,8 +128,8 @@ class VirtualDAQ(DAQ):
 
     @property
     def filter_delay_samples(self) -> float:
-        """Delay of the converter's filters at low frequency, in whole nanoseconds as every device tells it."""
-        return 1e-9 * round(1e9 * self.rig.filter_delay_samples / self.sample_rate_hz) * self.sample_rate_hz
+        """Delay of the converter's filters at low frequency."""
+        return self.rig.filter_delay_samples
 
     @property
     def counters(self) -> dict[str, int]:

@@ -7,7 +7,7 @@ import numpy as np
 from rig.bench import Bench
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqMismatch, DaqProtocol
-from rig.wire.messages import VERSION, Command, Parameter
+from rig.wire.messages import VERSION, Command, Parameter, as_double
 
 __all__ = ["DeviceFacts", "compare", "negotiate", "read_facts", "remarks_on"]
 
@@ -91,11 +91,19 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
         largest_block=get(Parameter.LARGEST_BLOCK),
         largest_queue=get(Parameter.LARGEST_QUEUE),
         watchdog_s=(1e-6 * get(Parameter.SHORTEST_WATCHDOG_US), 1e-6 * get(Parameter.LONGEST_WATCHDOG_US)),
-        filter_delay_s=1e-9 * get(Parameter.FILTER_DELAY_NS, default=0),
+        filter_delay_s=_filter_delay_s(dialogue),
         layout_crc=get(Parameter.LAYOUT_CRC, default=0),
     )
     _check_scales(dialogue.link.name, facts)
     return facts
+
+
+def _filter_delay_s(dialogue: Dialogue) -> float:
+    """In whole nanoseconds, or to the last bit where the device tells it so, and both agree."""
+    delay_s = 1e-9 * dialogue.get(Parameter.FILTER_DELAY_NS, default=0)
+    low, high = (dialogue.get(Parameter.FILTER_DELAY_S, item, default=0) for item in (0, 1))
+    exact_s = as_double(low, high)
+    return exact_s if abs(exact_s - delay_s) <= 1e-9 else delay_s
 
 
 def _check_scales(name: str, facts: DeviceFacts) -> None:

@@ -1,7 +1,7 @@
 """What a device says of itself: its parameters as words of four bytes."""
 
 from rig.wire.device.plant import Plant
-from rig.wire.messages import NAME_WORDS, VERSION, Parameter, float_word, text_words
+from rig.wire.messages import NAME_WORDS, VERSION, Parameter, double_words, float_word, text_words
 
 __all__ = ["SETTINGS", "Words", "described"]
 
@@ -67,6 +67,8 @@ def described(
     put(Parameter.SHORTEST_WATCHDOG_US, SHORTEST_WATCHDOG_US)
     put(Parameter.LONGEST_WATCHDOG_US, LONGEST_WATCHDOG_US)
     put(Parameter.FILTER_DELAY_NS, round(1e9 * plant.filter_delay_s))
+    for item, word in enumerate(double_words(plant.filter_delay_s)):
+        put(Parameter.FILTER_DELAY_S, word, item)
     for parameter, word in {Parameter.BLOCK: 1, Parameter.QUEUE: 1, Parameter.WATCHDOG_US: 100_000}.items():
         put(parameter, word)
     put(Parameter.RAMP_US, 50_000)

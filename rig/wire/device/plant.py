@@ -90,8 +90,7 @@ class VirtualPlant:
             key: value for key, value in bench.driver.options.items() if key not in ("queue_blocks", "delay_samples")
         }
         driver = bench.driver.model_copy(update={"options": dict(options)})
-        daq = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed)
-        self._rig, self._seed = daq.rig, seed
+        self._rig, self._seed = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed).rig, seed
         converter = self._rig.converter
         self.names = tuple(self._rig.channel_names)
         self.bits = 16 if 1 <= converter.adc_bits <= 16 and 1 <= converter.dac_bits <= 16 else 32
@@ -102,7 +101,7 @@ class VirtualPlant:
         self.output_range_v = converter.dac_range_v
         self.output_v_per_count = converter.dac_step_v or converter.dac_range_v / WHOLE_RANGE
         self.rate_hz = bench.sample_rate_hz
-        self.filter_delay_s = daq.filter_delay_samples / bench.sample_rate_hz
+        self.filter_delay_s = self._rig.filter_delay_samples / bench.sample_rate_hz
         self._wiring = wiring if wiring is not None and not wiring.as_it_should_be else None
         self._raised_count = np.zeros(len(Flag), np.int64)
         self._dtype = np.dtype(f"<i{self.bits // 8}")
