@@ -19,7 +19,7 @@ from rig.bench import Bench
 from rig.campaigns.plans import bench_of, load_plan
 from rig.wire.device.emulator import emulated
 
-BLOCKS = {"serial": 10, "can": 7}
+BLOCKS = {"serial": 10, "can": 14}
 WIRES = {"virtual": None, "serial": "serial", "can": "can"}
 
 
