@@ -7,8 +7,8 @@ import numpy as np
 
 from controller import LockState
 from rig.bench import Bench
+from rig.campaigns.device_remarks import with_device_remarks
 from rig.campaigns.evaluate import failed_point
-from rig.campaigns.gaps import lost_rows, lost_warnings
 from rig.campaigns.kept_rows import KeptRows
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
@@ -21,7 +21,6 @@ from rig.recording.journal import JournalWriter
 from rig.safety.layout import EndReason, GuardMode
 from rig.safety.limits import describe_end
 from rig.sequencer.layout import Outcome, SegmentKind
-from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.tick import Tick
 
 __all__ = ["Execution", "Progress", "Silent", "nothing_left"]
@@ -175,20 +174,10 @@ class Execution:
                     settling = outcomes[self.next_segment - 1]
                     rows = self.kept.take(first, end)
                     point = self.measure(self.bench, self.plan, self.targets[number], rows, settling)
-                    self._report({**point, **self._remarks(point, rows), "first_sample": first, "end_sample": end})
+                    told = with_device_remarks(point, rows, self.loop.counters)
+                    self._report({**told, "first_sample": first, "end_sample": end})
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
-
-    def _remarks(self, point: Mapping[str, Any], rows: np.ndarray) -> dict[str, Any]:
-        """How many samples of a point were lost, and its warnings with those of the device."""
-        warnings = [*point.get("warnings", []), *lost_warnings(rows), *self._device_warnings(rows)]
-        return {"lost_samples": int(np.count_nonzero(lost_rows(rows))), "warnings": warnings}
-
-    def _device_warnings(self, rows: np.ndarray) -> list[str]:
-        """A line for each flag that the device had up while the point was recorded."""
-        flags = rows["flags"] >> DEVICE_SHIFT
-        counted = ((name, int(np.count_nonzero(flags & (1 << bit)))) for bit, name in enumerate(self.loop.counters))
-        return [f"{name.replace('_', ' ')} in {count} of {rows.size} samples" for name, count in counted if count]
 
     def _begin(self, segment: int) -> int:
         """First sample of the rows that a segment is evaluated with."""
@@ -224,9 +213,8 @@ class Execution:
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
         for point in self.measure(self.bench, self.plan, targets, rows, passages, ended):
-            self._report(
-                {**point, **self._remarks(point, rows), "first_sample": first, "end_sample": first + rows.size}
-            )
+            told = with_device_remarks(point, rows, self.loop.counters)
+            self._report({**told, "first_sample": first, "end_sample": first + rows.size})
         self.next_segment = found.end_segment
         return True
 
