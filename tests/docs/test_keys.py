@@ -11,6 +11,7 @@ from pydantic_core import PydanticUndefined
 from controller import OpenLoop
 from controller.lock.rule import LockRule
 from controller.pll import PhaseLockedLoop
+from rig import errors as rig_errors
 from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
 from rig.campaigns.backbone import BackbonePlan
 from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
@@ -22,9 +23,13 @@ from rig.campaigns.stepped_phase import SteppedPhasePlan
 from rig.campaigns.stepped_sine import SteppedSinePlan
 from rig.campaigns.sweep import SweepPlan
 from rig.daq import Channel
+from rig.drivers.can import CanOptions
+from rig.drivers.serial import SerialOptions
 from rig.drivers.virtual.driver import Queue
 from rig.sequencer.segments import SettleRule
 from rig.tick.layout import DEVICE_SHIFT
+from rig.wire.can.link import CanLink
+from rig.wire.can.slcan import SlcanBus
 from simulators.layout import Flag
 from simulators.virtual_rig import VirtualRig
 from tests.docs.pages import ROOT
@@ -51,6 +56,8 @@ MODELS = {
     "Keys of `[emergency_stop]`": EmergencyStop,
     "Keys of `[[channels]]`": Channel,
     "Keys of `[driver.options]` of the virtual driver": Queue,
+    "Keys of `[driver.options]` of the serial driver": SerialOptions,
+    "Keys of `[driver.options]` of the CAN driver": CanOptions,
 }
 
 
@@ -58,7 +65,14 @@ def keys_under(heading: str) -> dict[str, tuple[str, str]]:
     """Default and allowed column of every key in the table below a heading of the pages that have keys of plans and benches."""
     pages = [
         (ROOT / "docs" / name).read_text(encoding="utf-8")
-        for name in ("user-guide.md", "controller.md", "campaigns.md", "tuning.md")
+        for name in (
+            "user-guide.md",
+            "controller.md",
+            "campaigns.md",
+            "tuning.md",
+            "wire-protocol.md",
+            "wire-protocol-can.md",
+        )
     ]
     rows = re.findall(
         r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table_under(heading, "\n".join(pages))["table"], re.MULTILINE
@@ -133,3 +147,11 @@ def test_every_flag_is_on_the_page_with_its_bit():
     assert [(name, 1 << (int(bit) - DEVICE_SHIFT)) for name, bit in shown] == [
         (str(flag.name).lower(), int(flag)) for flag in Flag
     ]
+
+
+def test_what_goes_wrong_on_a_bus_names_every_counter_of_it_and_errors_that_there_are():
+    page = (ROOT / "docs" / "wire-protocol-can.md").read_text(encoding="utf-8")
+    words = set(re.findall(r"`(\w+)`", table_under("What goes wrong on the bus", page)["table"]))
+    errors = {word for word in words if word.startswith("Daq")}
+    assert errors <= set(rig_errors.__all__)
+    assert words - errors == {*CanLink(SlcanBus("a port"), 4).counters, "lost_samples", "retries"}

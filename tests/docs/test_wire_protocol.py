@@ -61,7 +61,7 @@ def test_what_goes_wrong_names_errors_and_counters_that_there_are():
     assert named == {name for name in errors.__all__ if name.startswith("Daq")} - {"DaqError", "DaqOverrun"}
     daq = SerialDAQ(bench_on_a_port())
     daq._connection = Connection(daq._make_link(), daq.clock)
-    assert words - named == set(daq.counters) - {"overload", "output_clipped", "unsent_frames"}
+    assert words - named == set(daq.counters) - {"overload", "output_clipped"}
 
 
 def bench_on_a_port():
