@@ -30,7 +30,7 @@ def print_loop(loop: Mapping[str, Any], counters: Mapping[str, int]) -> None:
     counted = {name: loop[f"{key}_us"] for key, name in TIMES.items() if f"{key}_us" in loop}
     rows = [(f"  {name}", *(number(found[key], ".1f") for key in SHARES)) for name, found in counted.items()]
     print_table(("  of a block, us", *SHARES.values()), rows)
-    blocks = sum(loop["histograms"]["response"]["count"]) if "histograms" in loop else 0
+    blocks = sum(loop["histograms"]["execution"]["count"]) if "histograms" in loop else 0
     print(
         f"  {loop['overruns']} overruns in {blocks} blocks (response beyond {loop['deadline_us']:g} us, or left out), "
         f"{counters.get('lost_samples', 0)} lost samples"

@@ -7,7 +7,7 @@ import numpy as np
 
 from controller import LockState
 from rig.bench import Bench
-from rig.campaigns.device_remarks import with_device_remarks
+from rig.campaigns.device_remarks import flag_names, with_device_remarks
 from rig.campaigns.evaluate import failed_point
 from rig.campaigns.kept_rows import KeptRows
 from rig.campaigns.kinds import KINDS
@@ -100,7 +100,7 @@ class Execution:
 
         ``information`` is what is said of the part before its first row.
         """
-        flags = {"points_done": self.finished, "device_flags": [*self.loop.counters]}
+        flags = {"points_done": self.finished, "device_flags": flag_names(self.loop.counters)}
         self._write(self.journal.part, {**information, **flags})
         for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})

@@ -62,7 +62,7 @@ def exceedance(counts: np.ndarray) -> np.ndarray:
 
 
 def _blocks(loop: Mapping[str, Any]) -> int:
-    return int(sum(loop["histograms"]["response"]["count"]))
+    return int(sum(loop["histograms"]["execution"]["count"]))
 
 
 def _pacing(loops: Sequence[Mapping[str, Any]]) -> str:

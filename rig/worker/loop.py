@@ -111,6 +111,9 @@ class WallClockLoop:
             except DaqError as error:
                 self._fail(error)
                 return first
+            except Exception as error:  # a driver that fails in its own way: the rows so far are kept all the same
+                self._fail(DaqError(f"the driver has failed: {type(error).__name__}: {error}"))
+                return first
             begun = _now() if by_device else begun
             end = first + block
             tick_block(arrays, inputs, daq.flags, slot.readings[first:end], slot.rows[first:end], voltages)

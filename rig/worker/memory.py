@@ -149,6 +149,11 @@ class SharedMemory:
         return self.words[PUBLISHED]
 
     @property
+    def taken(self) -> int:
+        """Chunks that the campaign has taken."""
+        return self.words[TAKEN]
+
+    @property
     def free(self) -> int:
         """Slots that the loop may still fill."""
         return self.layout.slots - (self.words[PUBLISHED] - self.words[TAKEN])

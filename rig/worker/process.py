@@ -78,10 +78,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         daq.start(bench.block)
         loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
-        try:
-            loop.run()
-        except Exception as error:  # a driver that fails in its own way: 0 V first, then said
-            loop.failure = DaqError(f"the driver has failed: {type(error).__name__}: {error}")
+        loop.run()
         statistics = _statistics(loop, said)
         try:
             daq.stop()

@@ -1,7 +1,8 @@
 """A bench whose driver and loop live in a process of their own, as a campaign sees it."""
 
 import pickle
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from types import TracebackType
 from typing import Any, Self
 
@@ -54,10 +55,13 @@ class WorkerLoop:
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks of about 20 ms, until the output is off or the loop's process is gone."""
         while not self.ended:
-            if self._chunk_has_come():
+            end = self._wait()
+            while self._memory.published > self._memory.taken:  # one that was not announced any more counts as well
                 rows = self._take()
                 if rows.size:
                     yield rows
+            if end is not None:
+                end()
 
     def request_stop(self, cause: str = "") -> None:
         """Ask for the ramp to 0 V; the loop looks at every block."""
@@ -73,21 +77,17 @@ class WorkerLoop:
         out |= {f"{name}_us": histograms[name].report() for name in TIMES}
         return out | {"histograms": {name: histograms[name].bins() for name in TIMES}}
 
-    def _chunk_has_come(self) -> bool:
+    def _wait(self) -> Callable[[], None] | None:
+        """Until a chunk has come; returns what is to be done at the end of the loop once nothing more will come."""
         facts = self._worker.facts
         try:
             if not facts.poll(self._silence_s):
                 self._worker.end(HUNG_S)
-                self._fail(DaqError(self._silent_text()))
-                return False
+                return partial(self._fail, DaqError(self._silent_text()))
             said = facts.recv_bytes()
         except (EOFError, OSError):
-            self._fail(self._worker.ended())
-            return False
-        if said == CHUNK_DONE:
-            return True
-        self._finish(said)
-        return False
+            return partial(self._fail, self._worker.ended())
+        return None if said == CHUNK_DONE else partial(self._finish, said)
 
     def _silent_text(self) -> str:
         return (

@@ -6,7 +6,7 @@ import pytest
 from rig.campaigns.device_remarks import with_device_remarks
 from rig.tick.layout import DEVICE_SHIFT, SAMPLE_LOST, recorded_row
 
-COUNTERS = ("overload", "output_clipped", "output_held", "lost_samples")
+COUNTERS = ("overload", "output_clipped", "output_held", *(f"counter_{n}" for n in range(3, 22)))
 
 
 def rows_with(flag: int, count: int, size: int = 1000) -> np.ndarray:
@@ -36,4 +36,6 @@ def test_overloads_warn_and_lost_samples_are_counted() -> None:
     point = with_device_remarks({"accepted": True}, rows_with(1 << DEVICE_SHIFT, 3), COUNTERS)
     assert point["accepted"]
     assert point["warnings"] == ["overload in 3 of 1000 samples"]
-    assert with_device_remarks({"accepted": True}, rows_with(SAMPLE_LOST, 7), COUNTERS)["lost_samples"] == 7
+    point = with_device_remarks({"accepted": True}, rows_with(SAMPLE_LOST, 7), COUNTERS)
+    assert point["lost_samples"] == 7
+    assert point["warnings"] == ["7 of 1000 samples were lost on their way"]
