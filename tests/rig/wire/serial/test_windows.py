@@ -7,7 +7,7 @@ import pytest
 
 WITHOUT = """
 import signal, sys
-import serial, serial.tools.list_ports  # pyserial has a backend of its own there
+import can, serial, serial.tools.list_ports  # which have code of their own for such a system
 import rig.bench, rig.drivers, rig.realtime
 from tests.rig.rigs import bench_with
 for name in ("SIGHUP", "SIGUSR1", "SIGQUIT"):
