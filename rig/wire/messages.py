@@ -33,7 +33,7 @@ VERSION = 1
 """Version of the protocol that this product speaks."""
 
 HEARTBEATS_HZ = 10
-"""Heartbeats a second of a device of which nothing else is to be said."""
+"""Heartbeats a second, besides those at every change of state."""
 
 
 class Command(IntEnum):
