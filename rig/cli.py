@@ -187,7 +187,7 @@ def doctor(
     else:
         for name, value in facts.items():
             text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
-            text = "; ".join(value) if isinstance(value, list) else text
+            text = "; ".join(value) or "none" if isinstance(value, list) else text
             print(f"{name.replace('_', ' '):22} {text}")
     if facts.get("failure"):
         raise typer.Exit(1)

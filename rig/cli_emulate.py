@@ -1,17 +1,23 @@
 """``rig emulate``: a virtual rig behind the wire protocol of a real device."""
 
 import json as jsonlib
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli_options import Json
+from rig.wire.can.frames import DATA_BIT_RATE_HZ
 
 if TYPE_CHECKING:
+    from rig.bench import Bench
     from rig.wire.device.process import Ready
 
 __all__ = ["emulate"]
+
+SHORTEST_BLOCK_S = 0.002
+"""Of the bench that is written: what a host of ordinary scheduling keeps up with by the clock."""
 
 
 def emulate(
@@ -30,7 +36,7 @@ def emulate(
     fd: Annotated[bool, typer.Option("--fd/--classic", help="CAN: frames of up to 64 or 8 bytes.")] = True,
     node: Annotated[int, typer.Option(help="CAN: number of the device on its bus.", min=0, max=15)] = 1,
     bitrate: Annotated[int, typer.Option(help="CAN: bit/s.")] = 1_000_000,
-    data_bitrate: Annotated[int, typer.Option(help="CAN FD: bit/s within the data.")] = 8_000_000,
+    data_bitrate: Annotated[int, typer.Option(help="CAN FD: bit/s within the data.")] = DATA_BIT_RATE_HZ,
     log_output: Annotated[Path | None, typer.Option(help="File for the device's output, a line a block.")] = None,
     json: Json = False,
 ) -> None:
@@ -40,9 +46,10 @@ def emulate(
     from rig.wire.device.process import run_emulator
     from rig.wire.device.settings import EmulatorSettings
 
+    behind = load_bench(bench)
     table = {
         "wire": wire,
-        "bench": load_bench(bench).model_dump(),
+        "bench": behind.model_dump(),
         "seed": seed,
         "lockstep": lockstep,
         "as_hardware": as_hardware,
@@ -62,12 +69,14 @@ def emulate(
     _check_bench_file(bench_file)
 
     def when_ready(ready: "Ready") -> None:
+        block = _block(behind, ready)
         if bench_file is not None:
-            _write_bench(bench_file, _bench_text(bench, ready))
+            _write_bench(bench_file, _bench_text(bench, block, ready))
         if json:
-            print(jsonlib.dumps({"wire": wire, **ready.options, "process": ready.process}), flush=True)
+            facts = {"wire": wire, **ready.options, "block": block, "process": ready.process}
+            print(jsonlib.dumps(facts), flush=True)
         else:
-            where = ", ".join(f"{key} {value}" for key, value in ready.options.items())
+            where = ", ".join(f"{key} {value}" for key, value in {**ready.options, "block": block}.items())
             print(f"{bench} behind {wire}: {where} ({ready.scheduling}); Ctrl-C ends it", flush=True)
 
     counted = run_emulator(settings, when_ready)
@@ -103,8 +112,16 @@ def _write_bench(path: Path, text: str) -> None:
         raise ConfigurationError(f"--bench-file {path}: cannot be written: {error.strerror}") from error
 
 
-def _bench_text(bench: str, ready: "Ready") -> str:
-    """A bench that starts from the emulated one and names the driver that reaches it."""
+def _block(bench: "Bench", ready: "Ready") -> int:
+    """Samples of a block: the bench's where nobody is in a hurry, else at least 2 ms, as far as the wire's frames go."""
+    if ready.lockstep:
+        return bench.block
+    wanted = math.ceil(round(SHORTEST_BLOCK_S * bench.sample_rate_hz, 6))
+    return max(bench.block, min(wanted, ready.largest_block))
+
+
+def _bench_text(bench: str, block: int, ready: "Ready") -> str:
+    """A bench that starts from the emulated one, with its block, and names the driver that reaches it."""
     from rig.wire.device.emulator import driver_options
 
     base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
@@ -112,6 +129,7 @@ def _bench_text(bench: str, ready: "Ready") -> str:
     lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
     head = [
         f"base = {jsonlib.dumps(base)}",
+        f"block = {block}",
         "",
         "[driver]",
         f"name = {jsonlib.dumps(ready.wire)}",

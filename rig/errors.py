@@ -44,7 +44,7 @@ class DaqDisconnected(DaqError):  # noqa: N818
 
 
 class DaqOverrun(DaqError):  # noqa: N818
-    """Samples were lost because the host came too late."""
+    """Samples were lost, and the driver cannot go on: it does not know where, or the device has stopped over it."""
 
 
 class DaqRefused(DaqError):  # noqa: N818

@@ -17,7 +17,7 @@ SECONDS = 1.0
 
 
 def examine(folder: Path) -> dict[str, Any]:
-    """Facts on processor, clock, privileges, kernels, disk and drivers; ``folder`` is where recordings would go.
+    """Facts on processor, clock, privileges, kernels, disk, drivers and serial ports; ``folder`` is where recordings would go.
 
     The lateness is that of a process like the one a wall-clock loop gets, woken a thousand times in a second, with and
     without its privileges.
@@ -25,6 +25,7 @@ def examine(folder: Path) -> dict[str, Any]:
     import vibrolock
     from rig.bench import shipped_benches
     from rig.drivers import driver_names
+    from rig.wire.serial.port import port_names
     from vibrolock.compiled import kernel_cache_folder
 
     with_it, without_it = _probed(privileged=True), _probed(privileged=False)
@@ -42,6 +43,7 @@ def examine(folder: Path) -> dict[str, Any]:
         "free_disk_gb": round(shutil.disk_usage(folder).free / 1e9, 1),
         "drivers": driver_names(),
         "benches": shipped_benches(),
+        "serial_ports": port_names(),
         "wall_clock_rigs": _promise(with_it),
     }
 

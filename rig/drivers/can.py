@@ -8,6 +8,7 @@ from rig.bench import Bench
 from rig.configuration import validated
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.wire.can.bus import FrameBus, PythonCanBus
+from rig.wire.can.frames import DATA_BIT_RATE_HZ
 from rig.wire.can.link import CanLink
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.link import Link
@@ -26,7 +27,7 @@ class CanOptions(WireOptions):
     """CAN FD, or classical CAN."""
     bitrate: int = Field(1_000_000, ge=10_000, le=1_000_000)
     """Bit rate of the bus, bit/s."""
-    data_bitrate: int = Field(2_000_000, ge=1_000_000, le=8_000_000)
+    data_bitrate: int = Field(DATA_BIT_RATE_HZ, ge=1_000_000, le=8_000_000)
     """CAN FD: bit rate within the data, bit/s."""
     node: int = Field(1, ge=0, le=15)
     """Node of the device."""

@@ -56,10 +56,6 @@ class Histogram:
                 return min(upper_edge_us(index), self.largest_us)
         return 0.0
 
-    def above(self, microseconds: float) -> int:
-        """How many were in bins that begin at a time or beyond, us."""
-        return sum(self._words[index] for index in range(1, BINS) if upper_edge_us(index - 1) >= microseconds)
-
     def report(self) -> dict[str, float]:
         """p50, p99, p99.9 and the largest, us."""
         shares = {"p50": 0.5, "p99": 0.99, "p99_9": 0.999}

@@ -198,12 +198,13 @@ def test_list_states_types_ranges_and_units(command):
     assert len(err.strip().splitlines()) == 1
 
 
-def test_doctor_says_what_the_machine_can_promise(command):
+def test_doctor_says_what_the_machine_can_promise_and_which_ports_there_are(command, monkeypatch):
+    monkeypatch.setattr("rig.wire.serial.port.port_names", lambda: ["/dev/ttyACM0"])
     status, out, _ = command("doctor --json")
     assert status == 0
-    assert {"processors", "realtime_scheduling", "wake_up_lateness_us", "free_disk_gb", "drivers"} <= set(
-        json.loads(out)
-    )
+    facts = json.loads(out)
+    assert {"processors", "realtime_scheduling", "wake_up_lateness_us", "free_disk_gb", "drivers"} <= set(facts)
+    assert facts["serial_ports"] == ["/dev/ttyACM0"]
 
 
 def test_doctor_looks_at_the_device_of_a_bench(command):

@@ -33,6 +33,8 @@ class Connection:
         self.round_trips = RoundTrips()
         self.load_share = 0.0
         """Of what the wire carries, taken by the stream that was checked last."""
+        self.needed_bit_s = 0.0
+        """What that stream asks of it, bit/s; known also where the wire carries any."""
         self.sustainable_hz = math.inf
         """Sample rate that wire and device would carry with such blocks."""
         self.found_running = self.cleared = False
@@ -76,7 +78,7 @@ class Connection:
         """`DaqRefused`, with the sum, where the wire cannot carry a stream."""
         assert self.facts is not None
         load = self.link.load(stream)
-        self.load_share = load.share
+        self.load_share, self.needed_bit_s = load.share, load.needed_bit_s
         highest_hz = self.facts.rate_hz[1]
         self.sustainable_hz = min(highest_hz, MOST_LOAD * stream.rate_hz / load.share if load.share else math.inf)
         if load.share >= MOST_LOAD:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from rig.errors import DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
 from rig.wire.messages import (
-    NAME_WORDS,
     Answer,
     Command,
     DeviceState,
@@ -16,9 +15,8 @@ from rig.wire.messages import (
     Request,
     Samples,
     Status,
-    as_float,
-    as_text,
 )
+from rig.wire.words import NAME_WORDS, as_float, as_text
 
 __all__ = ["ANSWER_S", "Dialogue"]
 

@@ -102,12 +102,13 @@ class WireDAQ(DAQ):
 
     @property
     def statistics(self) -> dict[str, float]:
-        """Round trips of pings in between the blocks, share of the wire in use, and what rate it would carry."""
+        """Round trips of pings in between the blocks, what the stream asks of the wire, and what rate it would carry."""
         connection = self._connection
         if connection is None:
             return {}
         out = connection.round_trips.report()
-        out |= {"wire_load_share": connection.load_share, "sustainable_rate_hz": connection.sustainable_hz}
+        out |= {"wire_load_share": connection.load_share, "wire_needed_bit_s": connection.needed_bit_s}
+        out["sustainable_rate_hz"] = connection.sustainable_hz
         return {name: value for name, value in out.items() if math.isfinite(value)}
 
     @property

@@ -7,7 +7,8 @@ import numpy as np
 from rig.bench import Bench
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqMismatch, DaqProtocol
-from rig.wire.messages import VERSION, Command, Parameter, as_double
+from rig.wire.messages import VERSION, Command, Parameter
+from rig.wire.words import as_double
 
 __all__ = ["DeviceFacts", "compare", "negotiate", "read_facts", "remarks_on"]
 

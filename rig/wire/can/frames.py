@@ -2,7 +2,10 @@
 
 from typing import NamedTuple
 
-__all__ = ["FD_LENGTHS", "Frame", "frame_seconds", "padded_length"]
+__all__ = ["DATA_BIT_RATE_HZ", "FD_LENGTHS", "Frame", "frame_seconds", "padded_length"]
+
+DATA_BIT_RATE_HZ = 5_000_000
+"""CAN FD's bit rate within the data where none is given: common adapters have it, and it carries 5 kHz sample by sample."""
 
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 """Bytes of a CAN FD frame by its length code; a classical frame has 0 to 8."""

@@ -43,11 +43,6 @@ class Blocks:
         """The group after the newest one."""
         self._mark: int | None = None
 
-    @property
-    def bytes_held(self) -> int:
-        """Memory of the blocks under way."""
-        return sum(block.counts.nbytes + len(block.seen) for block in self._open.values())
-
     def begin(self, block: int) -> None:
         """The first block to come, where it is not block 0."""
         self._oldest, self._next = block, block * self._per_block

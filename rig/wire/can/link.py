@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
+from rig.wire.can.frames import DATA_BIT_RATE_HZ
 from rig.wire.can.load import bus_load
 from rig.wire.can.protocol import protocol
 from rig.wire.can.streams import check_stream
@@ -33,7 +34,7 @@ class CanLink(Link):
         fd: bool = False,
         node: int = 1,
         bit_rate_hz: float = 1e6,
-        data_bit_rate_hz: float = 2e6,
+        data_bit_rate_hz: float = DATA_BIT_RATE_HZ,
         dbc: str | Path | None = None,
         device: bool = False,
     ) -> None:

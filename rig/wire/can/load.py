@@ -5,11 +5,9 @@ from typing import NamedTuple
 from rig.wire.can.definition import Shape
 from rig.wire.can.frames import frame_seconds, padded_length
 from rig.wire.link import Load
-from rig.wire.messages import Stream
+from rig.wire.messages import HEARTBEATS_HZ, Stream
 
 __all__ = ["Traffic", "bus_load", "frame_lengths", "traffic"]
-
-HEARTBEATS_HZ = 10.0
 
 
 class Traffic(NamedTuple):
@@ -17,8 +15,8 @@ class Traffic(NamedTuple):
 
     name: str
     frames_hz: float
-    seconds: float
-    """Time on the bus of one second of them, i.e. their share of the bus."""
+    share: float
+    """Of the bus's time."""
 
 
 def frame_lengths(shape: Shape, block: int, outputs: bool) -> list[int]:
@@ -58,9 +56,9 @@ def _marks_hz(blocks_hz: float, groups: int, wrap: int) -> float:
 def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float) -> Load:
     """The sum, in bits of the bit rate; CAN FD's faster bits are counted by the time they take."""
     parts = traffic(shape, stream, bit_rate_hz, data_bit_rate_hz)
-    share = sum(part.seconds for part in parts)
+    share = sum(part.share for part in parts)
     terms = " + ".join(
-        f"{part.name} {part.frames_hz:.0f}/s x {part.seconds / part.frames_hz * 1e6:.0f} us" for part in parts
+        f"{part.name} {part.frames_hz:.0f}/s x {part.share / part.frames_hz * 1e6:.0f} us" for part in parts
     )
     rate = f"{bit_rate_hz / 1e6:g}" + (f"/{data_bit_rate_hz / 1e6:g}" if shape.fd else "") + " Mbit/s"
     text = f"{terms} = {share * 1e3:.0f} ms of every second on a bus of {rate}: {share:.0%}"

@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.errors import DaqDisconnected
 from rig.wire.can.bus import FrameBus
-from rig.wire.can.frames import Frame
+from rig.wire.can.frames import DATA_BIT_RATE_HZ, Frame
 from rig.wire.can.slcan_lines import SlcanLines, encode_line, opening
 from rig.wire.can.slcan_port import TextPort
 
@@ -28,7 +28,7 @@ class SlcanBus(FrameBus):
         port: str | int,
         fd: bool = False,
         bit_rate_hz: int = 1_000_000,
-        data_bit_rate_hz: int = 2_000_000,
+        data_bit_rate_hz: int = DATA_BIT_RATE_HZ,
         baud: int = 3_000_000,
         adapter: bool = False,
     ) -> None:

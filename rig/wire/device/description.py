@@ -1,7 +1,8 @@
 """What a device says of itself: its parameters as words of four bytes."""
 
 from rig.wire.device.plant import Plant
-from rig.wire.messages import NAME_WORDS, VERSION, Parameter, double_words, float_word, text_words
+from rig.wire.messages import VERSION, Parameter
+from rig.wire.words import NAME_WORDS, double_words, float_word, text_words
 
 __all__ = ["SETTINGS", "Words", "described"]
 

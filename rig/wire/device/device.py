@@ -14,6 +14,7 @@ from rig.wire.device.sampling import Sampling
 from rig.wire.device.sending import FaultySender
 from rig.wire.link import Link
 from rig.wire.messages import (
+    HEARTBEATS_HZ,
     Answer,
     Command,
     DeviceFlag,
@@ -31,7 +32,7 @@ from rig.wire.messages import (
 
 __all__ = ["Device"]
 
-BEAT_S = 0.1
+BEAT_S = 1.0 / HEARTBEATS_HZ
 
 
 class Device:

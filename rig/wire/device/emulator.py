@@ -79,7 +79,11 @@ class Emulator:
         return said
 
     def press_emergency_stop(self) -> None:
-        """Press the device's own emergency stop."""
+        """Press the device's own emergency stop. `DaqRefused` on a system without SIGUSR1 (Windows)."""
+        if not hasattr(signal, "SIGUSR1"):
+            raise errors.DaqRefused(
+                "the emulator's emergency stop is pressed by a signal that this system does not have"
+            )
         if self.process is not None:
             os.kill(self.process.pid, signal.SIGUSR1)
 

@@ -3,6 +3,7 @@
 import os
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +29,6 @@ class LoggedPlant:
             raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
         self._is_full = False
         self._first = 0
-        for name in ("names", "range_v", "v_per_count", "skew_s", "output_range_v", "output_v_per_count"):
-            setattr(self, name, getattr(plant, name))
-        self.bits, self.rate_hz, self.filter_delay_s = plant.bits, plant.rate_hz, plant.filter_delay_s
 
     names: tuple[str, ...]
     range_v: np.ndarray
@@ -38,6 +36,13 @@ class LoggedPlant:
     skew_s: np.ndarray
     output_range_v: float
     output_v_per_count: float
+    bits: int
+    rate_hz: float
+    filter_delay_s: float
+
+    def __getattr__(self, name: str) -> Any:
+        """Everything else is the plant's."""
+        return getattr(self._plant, name)
 
     def reset(self) -> None:
         """Sample 0."""

@@ -17,8 +17,6 @@ class OutputQueue:
         self._there = np.zeros(self._size, bool)
         self.held = 0.0
         """Count that the converter holds."""
-        self.late_samples = 0
-        self.early_blocks = 0
 
     def put(self, first: int, counts: np.ndarray, present: int) -> bool:
         """Keep the outputs of a block; those before sample ``present`` are too late. False where it makes no sense."""
@@ -26,10 +24,8 @@ class OutputQueue:
         if counts.shape != (block,) or first < 0 or first % block:
             return False
         if first + block > present - present % block + self._size:
-            self.early_blocks += 1
             return False
         late = min(max(0, present - first), block)
-        self.late_samples += late
         slot = first % self._size
         self._values[slot + late : slot + block] = counts[late:]
         self._there[slot + late : slot + block] = True

@@ -2,7 +2,8 @@
 
 from rig.wire.device.description import SETTINGS, Words
 from rig.wire.device.faults import Faults
-from rig.wire.messages import NAME_WORDS, Parameter, Status, text_words
+from rig.wire.messages import Parameter, Status
+from rig.wire.words import NAME_WORDS, text_words
 
 __all__ = ["Parameters"]
 

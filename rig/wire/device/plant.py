@@ -22,20 +22,29 @@ class Plant(Protocol):
     """What stands behind a device's converters."""
 
     names: tuple[str, ...]
+    """Of the channels."""
     range_v: np.ndarray
+    """Largest reading [n_channels], V."""
     v_per_count: np.ndarray
+    """Volts of one count [n_channels]."""
     skew_s: np.ndarray
+    """Delay behind the first channel [n_channels], s."""
     output_range_v: float
+    """Largest output, V."""
     output_v_per_count: float
+    """Volts of one count of the output."""
     bits: int
+    """16 or 32: size of the counts."""
     rate_hz: float
+    """Sample rate, Hz: the only one it has."""
     filter_delay_s: float
+    """Mean delay of the converters' filters at low frequency, s."""
 
     def reset(self) -> None:
         """Back to rest, at sample 0."""
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
-        """Hold one voltage a sample [n]; returns the counts [n, n_channels] and `DeviceFlag` bits."""
+        """Hold one voltage a sample [n], V; returns the counts (int16 or int32 [n, n_channels]) and `DeviceFlag` bits."""
 
 
 class Wiring:
@@ -125,7 +134,7 @@ class VirtualPlant:
         self._raised = np.zeros(n, np.uint16)
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
-        """Advance the virtual rig by one sample a voltage."""
+        """Advance the virtual rig by one sample a voltage [n], V; returns counts [n, n_channels] and `DeviceFlag` bits."""
         n = voltages.size
         if self._raised.size != n:
             self._buffers_for(n)

@@ -30,6 +30,8 @@ class Ready:
     """Driver options of a bench that reaches it."""
     lockstep: bool
     scheduling: str
+    largest_block: int
+    """Samples that a block may have on this wire."""
     process: int = field(default_factory=os.getpid)
 
 
@@ -39,8 +41,9 @@ class _End:
     def __init__(self, parent: int | None) -> None:
         self._parent = parent
         self._told = False
-        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-            signal.signal(number, self._tell)
+        for name in ("SIGTERM", "SIGINT", "SIGHUP"):
+            if hasattr(signal, name):  # the last not on every system
+                signal.signal(getattr(signal, name), self._tell)
 
     def _tell(self, _number: int, _frame: object) -> None:
         self._told = True
@@ -61,9 +64,10 @@ def run_emulator(
     plant = _plant(settings)
     with device_end(settings) as (link, options):
         device = _device(settings, plant, link)
-        signal.signal(signal.SIGUSR1, lambda *_: device.press_emergency_stop())
+        if hasattr(signal, "SIGUSR1"):
+            signal.signal(signal.SIGUSR1, lambda *_: device.press_emergency_stop())
         scheduling = "ordinary scheduling" if settings.lockstep else ask_for_priority()
-        when_ready(Ready(settings.wire, options, settings.lockstep, scheduling))
+        when_ready(Ready(settings.wire, options, settings.lockstep, scheduling, link.largest_block))
         keep_serving(device, should_end)
     return {**device.counts, **{name: count for name, count in link.counters.items() if count}}
 

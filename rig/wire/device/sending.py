@@ -12,12 +12,11 @@ __all__ = ["FaultySender"]
 
 
 class FaultySender:
-    """Sends over a link. What the link does not take, for nobody listens, is dropped and counted."""
+    """Sends over a link. What the link does not take, for nobody listens, is dropped; samples so lost are counted."""
 
     def __init__(self, link: Link, faults: Faults) -> None:
         self._link, self._faults = link, faults
         self.dropped_samples = 0
-        self.unsent = 0
         self._kept: Samples | None = None
         self._late: deque[tuple[float, Message]] = deque()
         self._silent_s = math.inf
@@ -48,7 +47,6 @@ class FaultySender:
         try:
             self._link.send(message)
         except DaqError:
-            self.unsent += 1
             if isinstance(message, Samples):
                 self.dropped_samples += message.counts.shape[0]
             return False

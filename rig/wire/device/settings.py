@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from rig.bench import Bench
 from rig.configuration import Configured
+from rig.wire.can.frames import DATA_BIT_RATE_HZ
 from rig.wire.device.faults import Faults
 
 __all__ = ["EmulatorSettings"]
@@ -46,7 +47,7 @@ class EmulatorSettings(Configured):
     """CAN: frames of up to 64 bytes."""
     bitrate: int = Field(1_000_000, ge=10_000, le=1_000_000)
     """CAN: bit rate of the bus, bit/s."""
-    data_bitrate: int = Field(8_000_000, ge=1_000_000, le=8_000_000)
+    data_bitrate: int = Field(DATA_BIT_RATE_HZ, ge=1_000_000, le=8_000_000)
     """CAN FD: bit rate within the data, bit/s."""
     node: int = Field(1, ge=0, le=15)
     """CAN: number of the device on its bus."""

@@ -1,7 +1,6 @@
 """`SerialLink`: messages over a serial port or any other descriptor that carries bytes."""
 
 import os
-import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -9,7 +8,7 @@ from contextlib import ExitStack, suppress
 from select import select
 from typing import Self
 
-from rig.errors import DaqDisconnected, DaqRefused, DaqTimeout
+from rig.errors import DaqDisconnected, DaqTimeout
 from rig.wire.link import Link, Load
 from rig.wire.messages import Message, Output, Samples, Stream
 from rig.wire.serial.codec import Codec
@@ -55,10 +54,6 @@ class SerialLink(Link):
         """The host's end: a serial port by its name, or the far end of a pseudo-terminal."""
 
         def opened(held: ExitStack) -> tuple[int, Input]:
-            if sys.platform == "win32":
-                raise DaqRefused(
-                    f"port {path!r}: serial devices are driven on Linux and macOS only; on Windows use CAN"
-                )
             from rig.wire.serial.port import open_port, second_descriptor
 
             port = open_port(path, baud)

@@ -3,14 +3,13 @@
 import math
 
 from rig.wire.link import Load
-from rig.wire.messages import Stream
+from rig.wire.messages import HEARTBEATS_HZ, Stream
 from rig.wire.serial.codec import HEARTBEAT_BODY, Codec
 from rig.wire.serial.frames import largest_frame
 
 __all__ = ["line_load"]
 
 BITS_A_BYTE = 10  # 8N1: start, eight bits, stop
-HEARTBEATS_HZ = 10
 
 
 def line_load(stream: Stream, baud: int | None) -> Load:

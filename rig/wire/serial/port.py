@@ -2,7 +2,7 @@
 
 import errno
 import os
-import termios
+import sys
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
@@ -12,13 +12,16 @@ import serial
 from serial.tools import list_ports
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqError, DaqRefused
+from rig.wire.serial.reading import wait_of_a_read
+
+if sys.platform != "win32":
+    import termios
 
 __all__ = ["open_port", "port_names", "second_descriptor"]
 
 BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: somebody holds its lock
 LASTING_NAMES = "/dev/serial/by-id"
 ALIKE = 0.8  # of two names: a character or two that differ
-CONTROL_CHARACTERS = 6  # in the list that termios returns
 
 
 def port_names() -> list[str]:
@@ -32,6 +35,10 @@ def open_port(path: str, baud: int) -> Any:
 
     Raises `DaqBusy`, `DaqDisconnected` or `DaqRefused` with what is there and what to do.
     """
+    if sys.platform == "win32":
+        raise DaqRefused(
+            f"port {path!r}: serial ports are driven on Linux and macOS only; on Windows use an interface of python-can"
+        )
     try:
         port = serial.Serial(path, baud, timeout=0, exclusive=True)
     except (OSError, ValueError, OverflowError, termios.error) as error:
@@ -58,10 +65,7 @@ def second_descriptor(path: str) -> int:
 def _no_bytes_means_gone(descriptor: int) -> None:
     """VMIN = 1: a read without input says so (EAGAIN), and one of 0 bytes can only mean that the port is gone."""
     os.set_blocking(descriptor, False)
-    attributes = termios.tcgetattr(descriptor)
-    characters = attributes[CONTROL_CHARACTERS]
-    characters[termios.VMIN], characters[termios.VTIME] = 1, 0
-    termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+    wait_of_a_read(descriptor, 1, 0)
 
 
 def _refusal(path: str, baud: int, error: Exception) -> DaqError:

@@ -7,10 +7,9 @@ over; and raises `OSError` once nothing can come any more.
 import errno
 import os
 import select
-import termios
 from typing import Any, Protocol
 
-__all__ = ["CHUNK", "Input", "NoInput", "PolledInput", "TimedInput"]
+__all__ = ["CHUNK", "Input", "NoInput", "PolledInput", "TimedInput", "wait_of_a_read"]
 
 CHUNK = 4096  # bytes a read; a pseudo-terminal holds no more
 CONTROL_CHARACTERS = 6  # in the list that termios returns
@@ -18,6 +17,16 @@ COARSE_S = 0.01  # a wait from which on the milliseconds that epoll counts in ar
 MILLISECOND_S = 0.001
 SYSTEM_WAIT_S = 0.1  # VTIME = 1
 SYSTEM_SLACK_S = 0.02  # by which the system's own time-out may come late: ticks of its clock
+
+
+def wait_of_a_read(descriptor: int, least_bytes: int, tenths_s: int) -> None:
+    """VMIN and VTIME of a terminal: how many bytes a read waits for, and for how long, in tenths of a second."""
+    import termios  # not on Windows, where this module is imported all the same
+
+    attributes = termios.tcgetattr(descriptor)
+    characters = attributes[CONTROL_CHARACTERS]
+    characters[termios.VMIN], characters[termios.VTIME] = least_bytes, tenths_s
+    termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
 
 
 class Input(Protocol):
@@ -82,10 +91,7 @@ class TimedInput:
     """
 
     def __init__(self, descriptor: int) -> None:
-        attributes = termios.tcgetattr(descriptor)
-        characters = attributes[CONTROL_CHARACTERS]
-        characters[termios.VMIN], characters[termios.VTIME] = 0, 1
-        termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+        wait_of_a_read(descriptor, 0, 1)
         os.set_blocking(descriptor, True)
         self._descriptor = descriptor
         self._watched = (descriptor,)

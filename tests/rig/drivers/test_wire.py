@@ -36,8 +36,8 @@ from rig.wire.messages import (
     Parameter,
     Request,
     Samples,
-    float_word,
 )
+from rig.wire.words import float_word
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink
 

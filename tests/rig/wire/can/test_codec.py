@@ -180,7 +180,8 @@ def test_whatever_comes_nothing_breaks_and_memory_stays_bounded(
         if isinstance(message, Samples | Output):
             assert message.counts.shape == ((n, n_channels) if samples else (n,))
             assert message.first % n == 0
-        assert end._incoming.bytes_held <= 4 * (2 * n * n_channels + 256)
+        held = sum(block.counts.nbytes + len(block.seen) for block in end._incoming._open.values())
+        assert held <= 4 * (2 * n * n_channels + 256)
 
 
 @settings(deadline=None, max_examples=60)

@@ -13,14 +13,17 @@ import numpy as np
 import pytest
 
 from rig.bench import Bench, DriverChoice, load_bench
-from rig.cli_emulate import _write_bench
+from rig.cli_emulate import _bench_text, _block, _write_bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
+from rig.drivers.can import CanOptions
 from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqEmergencyStop, DaqTimeout
+from rig.wire.can.slcan_lines import opening
 from rig.wire.device import VirtualPlant, Wiring
 from rig.wire.device.emulator import Emulator, emulated
 from rig.wire.device.ends import device_end
 from rig.wire.device.output_log import LoggedPlant
+from rig.wire.device.process import Ready
 from rig.wire.device.settings import EmulatorSettings
 from tests.rig.drivers.test_wire import answers, virtual, voltages
 from tests.rig.rigs import bench_with
@@ -130,6 +133,7 @@ def test_the_command_says_where_it_is_and_writes_a_bench_that_reaches_it(tmp_pat
         ready = json.loads(process.stdout.readline())
         assert ready["port"] == str(link)
         bench = load_bench(file)
+        assert bench.block == ready["block"] == load_bench("magnet-beam").block
         assert bench.driver.name == "serial"
         assert bench.driver.options["port"] == str(link)
         assert link.is_symlink()
@@ -139,6 +143,32 @@ def test_the_command_says_where_it_is_and_writes_a_bench_that_reaches_it(tmp_pat
         assert json.loads(process.stdout.readline()) == {}
         assert process.wait(10.0) == 0
     assert not link.exists()
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "block", "lockstep", "largest", "written"),
+    [
+        (5000.0, 1, False, 65536, 10),
+        (1100.0, 1, False, 65536, 3),  # 2.2 samples
+        (5000.0, 25, False, 65536, 25),
+        (20_000.0, 1, False, 32, 32),  # all that classical frames can number
+        (5000.0, 1, True, 65536, 1),
+    ],
+)
+def test_the_bench_it_writes_has_blocks_of_2_ms_where_the_clock_does_not_wait(
+    tmp_path: Path, rate_hz: float, block: int, lockstep: bool, largest: int, written: int
+) -> None:
+    ready = Ready("serial", {"port": "/dev/ttyACM0"}, lockstep, "ordinary scheduling", largest)
+    bench = load_bench("magnet-beam").model_copy(update={"sample_rate_hz": rate_hz, "block": block})
+    file = tmp_path / "emulated.toml"
+    file.write_text(_bench_text("magnet-beam", _block(bench, ready), ready), encoding="utf-8")
+    assert load_bench(file).block == written
+
+
+def test_driver_and_emulator_agree_on_a_data_bit_rate_that_adapters_have() -> None:
+    default = CanOptions(channel="can0").data_bitrate
+    assert EmulatorSettings(wire="can", bench=bench_with()).data_bitrate == default
+    assert b"Y5" in opening(True, 1_000_000, default)
 
 
 def test_what_cannot_be_emulated_is_refused_in_one_line() -> None:

@@ -47,7 +47,13 @@ def test_a_rate_that_the_line_does_not_carry_is_refused_with_the_sum(bench, monk
     assert "115200 baud carry 115.2 kbit/s" in str(refusal.value)
     assert f"{bench.sample_rate_hz / bench.block:g}/s x " in str(refusal.value)
     with make_daq(told(bench, baud=3_000_000)) as daq:
-        assert 0.1 < daq.statistics["wire_load_share"] < 0.9
+        share = daq.statistics["wire_load_share"]
+        assert 0.1 < share < 0.9
+        assert daq.statistics["wire_needed_bit_s"] == pytest.approx(share * 3_000_000)
+    monkeypatch.undo()
+    with make_daq(told(bench, baud=3_000_000)) as daq:  # a pseudo-terminal carries any rate, and is asked the same
+        assert daq.statistics["wire_load_share"] == 0.0
+        assert daq.statistics["wire_needed_bit_s"] == pytest.approx(share * 3_000_000)
 
 
 @pytest.mark.parametrize(
