@@ -4,6 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from rig.drivers.wire.latch import stopped
 from rig.errors import DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
 from rig.wire.messages import (
@@ -32,7 +33,7 @@ class Dialogue:
     """Requests and answers over a link, and the stream messages that came in between.
 
     Errors: `DaqTimeout` for a device that has fallen silent, `DaqProtocol` where two devices answer, `DaqRefused` for what
-    the device will not do.
+    the device will not do, `DaqEmergencyStop` and `DaqWatchdog` for what it will not do because they have latched.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
@@ -88,6 +89,17 @@ class Dialogue:
                 break
         self.early.clear()
 
+    def beat_with(self, wanted: int, longest_s: float) -> int:
+        """Those of the flags ``wanted`` that the next heartbeat with any of them has; 0 where none comes in time."""
+        until = self.clock() + longest_s
+        while (left := until - self.clock()) > 0.0:
+            message = self.link.receive(left)
+            if isinstance(message, Answer):
+                self.note_stray(message)
+            elif isinstance(message, Heartbeat) and message.flags & wanted:
+                return message.flags & wanted
+        return 0
+
     def note_stray(self, answer: Answer) -> None:
         """Count an answer that nobody waits for; `DaqProtocol` once it is plain that two devices answer."""
         self.stray_answers += 1
@@ -109,6 +121,8 @@ class Dialogue:
     def do(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0) -> int:
         """Have a request carried out; returns the answer's value. `DaqRefused` where the device will not."""
         answer = self.ask(command, parameter, item, value)
+        if answer.status == Status.LATCHED:
+            raise stopped(self.link.name, answer.value, f"{_said(command, parameter, value)}: {_why(answer)}")
         if answer.status != Status.DONE:
             raise DaqRefused(f"{self.link.name}: {_said(command, parameter, value)}: {_why(answer)}")
         return answer.value

@@ -33,7 +33,7 @@ class Streaming:
         assert facts is not None
         connection.check_capacity(stream)
         watchdog_s = _watchdog_s(stream, options, facts)
-        connection.clear()
+        connection.check_latch()
         self._set_up(stream, watchdog_s, options.ramp_s)
         block_s = stream.block / stream.rate_hz
         timeout_s = options.timeout_s or max(0.25, 10.0 * block_s)

@@ -22,6 +22,7 @@ from rig.errors import (
     DaqTimeout,
     DaqWatchdog,
 )
+from rig.session import LocalSession
 from rig.wire.device import Device, Faults, VirtualPlant
 from rig.wire.device.description import described
 from rig.wire.messages import (
@@ -38,10 +39,13 @@ from rig.wire.messages import (
     Samples,
     float_word,
 )
+from rig.worker.probe import round_trips
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink
+from tests.rig.worker.rigs import tone
 
 BLOCKS = 60
+LATCHES = [(False, DaqWatchdog, "watchdog"), (True, DaqEmergencyStop, "emergency stop")]
 
 
 def drive(daq: MemoryDAQ, blocks: int, block: int = 5, volts: float = 0.1) -> None:
@@ -248,19 +252,91 @@ def test_a_device_that_still_runs_for_a_dead_host_is_stopped_first() -> None:
         np.testing.assert_array_equal(daq.exchange(np.zeros(5)).shape, (5, 4))
 
 
-def test_a_watchdog_that_has_latched_is_cleared_by_the_next_start_and_remarked() -> None:
+def latched_by(*, emergency: bool) -> MemoryDAQ:
+    """A driver, closed, whose device has latched its watchdog, or an emergency stop."""
     daq = MemoryDAQ(bench_with(), 3, lockstep=False)
     with daq:
         daq.start(5)
         daq.exchange(np.zeros(5))
-        daq.wire.pass_time(1.0)
-        with pytest.raises(DaqWatchdog, match="watchdog"):
+        if emergency:
+            daq.emergency_stop()
+        else:
+            daq.wire.pass_time(1.0)
+        with pytest.raises(DaqEmergencyStop if emergency else DaqWatchdog):
             drive(daq, 1000)
-        daq.stop()
-        assert daq.device.state is DeviceState.LATCHED
+    assert daq.device.state is DeviceState.LATCHED
+    return daq
+
+
+@pytest.mark.parametrize(("emergency", "kind", "word"), LATCHES)
+def test_what_has_latched_is_told_when_it_is_opened_and_not_cleared_by_a_start(
+    emergency: bool, kind: type[DaqError], word: str
+) -> None:
+    daq = latched_by(emergency=emergency)
+    for _ in range(2):
+        with daq:
+            assert daq.latched == f"the device's {word} had latched"
+            with pytest.raises(kind, match=f"{word} had latched: a run that is armed clears"):
+                daq.start(5)
+    assert daq.device.state is DeviceState.LATCHED
+
+
+@pytest.mark.parametrize(("emergency", "kind", "word"), LATCHES)
+def test_what_had_latched_can_be_cleared_and_is_remarked(emergency: bool, kind: type[DaqError], word: str) -> None:
+    daq = latched_by(emergency=emergency)
+    with daq:
+        daq.clear()
+        assert daq.latched == ""
         daq.start(5)
         assert np.isfinite(daq.exchange(np.zeros(5))).all()
-        assert any("latched" in remark for remark in daq.remarks)
+        assert any(f"{word} had latched in an earlier run" in remark for remark in daq.remarks)
+        daq.clear()
+        assert daq.device.state is DeviceState.ARMED
+
+
+def test_an_emergency_stop_after_the_opening_is_not_cleared_with_the_watchdog_that_was_found() -> None:
+    daq = latched_by(emergency=False)
+    with daq:
+        daq.emergency_stop()
+        with pytest.raises(DaqEmergencyStop, match="emergency stop and watchdog had latched"):
+            daq.clear()
+    assert daq.device.state is DeviceState.LATCHED
+
+
+def test_an_emergency_stop_between_opening_and_start_is_not_cleared() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        assert daq.latched == ""
+        daq.emergency_stop()
+        daq.clear()
+        with pytest.raises(DaqEmergencyStop):
+            daq.start(5)
+
+
+def test_an_emergency_stop_between_start_and_the_first_block_is_not_cleared() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        daq.emergency_stop()
+        with pytest.raises(DaqEmergencyStop):
+            daq.exchange(np.zeros(5))
+    assert daq.device.state is DeviceState.LATCHED
+
+
+def test_a_session_clears_what_its_device_had_latched_and_a_probe_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    daq = latched_by(emergency=True)
+    bench = bench_with()
+    monkeypatch.setattr("rig.worker.probe.make_daq", lambda *_: daq)
+    facts = round_trips(bench, 0, 0.1)
+    assert facts["latched"] == "the device's emergency stop had latched"
+    assert "block_us" not in facts
+    assert daq.device.state is DeviceState.LATCHED
+    with daq:
+        session = LocalSession(daq, realtime=False)
+        assert session.latched == "the device's emergency stop had latched"
+        assert daq.device.state is DeviceState.LATCHED
+        session.start(tone(bench, 1.0))
+        assert daq.device.state is DeviceState.IDLE
 
 
 def test_start_itself_starts_no_clock() -> None:
