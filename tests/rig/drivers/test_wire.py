@@ -170,6 +170,8 @@ def test_a_device_that_calls_its_channels_otherwise_is_refused() -> None:
         ({"LAYOUT_CRC": 7}, DaqMismatch, ("00000007",)),
         ({"N_CHANNELS": 0}, DaqProtocol, ("0 channels",)),
         ({"BITS": 12}, DaqProtocol, ("12 bits",)),
+        ({"SIMULATED": 3}, DaqProtocol, ("SIMULATED = 3", "0, 1 or 2")),
+        ({"SIMULATED": 2**32 - 1}, DaqProtocol, ("SIMULATED = 4294967295",)),
         ({"CHANNEL_V_PER_COUNT__0": float_word(math.nan)}, DaqProtocol, ("not positive",)),
         ({"LOWEST_VERSION": 2, "HIGHEST_VERSION": 3}, DaqProtocol, ("versions 2 to 3", "speaks 1")),
     ],
