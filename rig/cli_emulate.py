@@ -63,7 +63,7 @@ def emulate(
 
     def when_ready(ready: "Ready") -> None:
         if bench_file is not None:
-            _write_bench(bench_file, _bench_text(bench, ready))
+            _write_bench(bench_file, _bench_text(bench, ready, as_hardware))
         if json:
             print(jsonlib.dumps({"wire": wire, **ready.options, "process": ready.process}), flush=True)
         else:
@@ -103,12 +103,12 @@ def _write_bench(path: Path, text: str) -> None:
         raise ConfigurationError(f"--bench-file {path}: cannot be written: {error.strerror}") from error
 
 
-def _bench_text(bench: str, ready: "Ready") -> str:
+def _bench_text(bench: str, ready: "Ready", as_hardware: bool) -> str:
     """A bench that starts from the emulated one and names the driver that reaches it."""
     from rig.wire.device.emulator import driver_options
 
     base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
-    options = driver_options(ready.options, lockstep=ready.lockstep)
+    options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware)
     lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
     head = [
         f"base = {jsonlib.dumps(base)}",

@@ -14,6 +14,7 @@ from rig.drivers.wire.facts import DeviceFacts, remarks_on
 from rig.drivers.wire.latch import latched_text
 from rig.drivers.wire.options import WireOptions
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
+from rig.drivers.wire.watchdog import raised_remark
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
 
@@ -95,6 +96,8 @@ class WireDAQ(DAQ):
         if connection is None or connection.facts is None:
             return ()
         out = remarks_on(connection.facts, self._bench)
+        raised = raised_remark(self._options, connection.facts, self._bench.block / self._bench.sample_rate_hz)
+        out += [raised] if raised else []
         if connection.found_running:
             out.append("the device was still running from an earlier run and was stopped first")
         if connection.cleared:

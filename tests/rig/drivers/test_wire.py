@@ -430,6 +430,42 @@ def test_a_watchdog_shorter_than_two_blocks_is_refused() -> None:
         daq.start(50)
 
 
+@pytest.mark.parametrize(("wanted_s", "block"), [(1.0001, 5), (4000.0, 5), (1.61, 800)])
+def test_a_watchdog_that_would_hold_an_output_for_long_is_refused_where_something_moves(
+    wanted_s: float, block: int
+) -> None:
+    longest = "1" if block == 5 else r"1\.6"  # 10 blocks of 0.16 s
+    options = WireOptions(watchdog_s=wanted_s)
+    with (
+        MemoryDAQ(bench_with(), 0, options, simulated=0) as daq,
+        pytest.raises(DaqRefused, match=rf"driver\.options\.watchdog_s = {wanted_s:g}: allowed is up to {longest} s"),
+    ):
+        daq.start(block)
+    with MemoryDAQ(bench_with(), 0, options) as daq:
+        daq.start(block)
+    with MemoryDAQ(bench_with(), 0, WireOptions(watchdog_s=1.0), simulated=0) as daq:
+        daq.start(block)
+
+
+@pytest.mark.parametrize(("shortest_s", "starts"), [(0.5, True), (30.0, False)])
+def test_a_device_that_cannot_wait_as_short_as_usual_is_remarked_and_refused_where_it_is_too_long(
+    shortest_s: float, starts: bool
+) -> None:
+    daq = MemoryDAQ(bench_with(), 0, simulated=0)
+    daq.device.words[Parameter.SHORTEST_WATCHDOG_US, 0] = round(1e6 * shortest_s)
+    with daq:
+        assert any(f"waits {shortest_s:g} s" in remark and "usual 0.1 s" in remark for remark in daq.remarks)
+        if starts:
+            daq.start(5)
+        else:
+            with pytest.raises(
+                DaqRefused, match=r"watchdog_s = 30, the shortest that the device can do: allowed .* 1 s"
+            ):
+                daq.start(5)
+    with MemoryDAQ(bench_with(), 0, simulated=0) as daq:
+        assert not any("watchdog" in remark for remark in daq.remarks)
+
+
 def test_round_trips_are_measured_before_and_during_the_run() -> None:
     daq = MemoryDAQ(bench_with(), 3, lockstep=False)
     with daq:
