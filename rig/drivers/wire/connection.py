@@ -5,13 +5,13 @@ import math
 from collections.abc import Callable
 
 from rig.bench import Bench
-from rig.drivers.wire.dialogue import ANSWER_S, Dialogue
+from rig.drivers.wire.dialogue import ANSWER_S, Dialogue, why_not
 from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
 from rig.drivers.wire.latch import STOPPED, latched_text, stopped
 from rig.drivers.wire.round_trips import RoundTrips
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
-from rig.wire.messages import Command, DeviceFlag, DeviceState, Parameter, Stream
+from rig.wire.messages import Command, DeviceFlag, DeviceState, Parameter, Status, Stream
 
 __all__ = ["Connection"]
 
@@ -117,11 +117,14 @@ class Connection:
     def set(self, parameter: Parameter, value: int, key: str, scale: float, unit: str) -> None:
         """Set a parameter; ``key``, ``scale`` and ``unit`` are those of the bench, for the message that it cannot be."""
         answer = self.dialogue.ask(Command.SET, parameter, value=value)
-        if answer.status != 0 or answer.value != value:
-            raise DaqMismatch(
-                f"{self.link.name}: {key} = {value * scale:g} {unit}: not what the device can do, "
-                f"the nearest is {answer.value * scale:g} {unit}"
-            )
+        if answer.status == Status.DONE and answer.value == value:
+            return
+        why = f"not what the device can do, the nearest is {answer.value * scale:g} {unit}"
+        if answer.status == Status.DONE:
+            why = f"the device has set {answer.value * scale:g} {unit} instead"
+        elif answer.status != Status.NOT_ALLOWED:
+            why = f"not set: {why_not(answer)}"
+        raise DaqMismatch(f"{self.link.name}: {key} = {value * scale:g} {unit}: {why}")
 
     def close(self) -> None:
         """Tell the device to stop, if there still is one, and let go of the port."""

@@ -21,7 +21,7 @@ from rig.wire.messages import (
     as_text,
 )
 
-__all__ = ["ANSWER_S", "Dialogue"]
+__all__ = ["ANSWER_S", "Dialogue", "why_not"]
 
 TRIES = 5
 ANSWER_S = 0.1
@@ -48,18 +48,26 @@ class Dialogue:
         self._last: Answer | None = None
         self._number = time.monotonic_ns() // 1000 % 255  # another one than the last host's, most likely
 
-    def ask(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0, tries: int = TRIES) -> Answer:
-        """The device's answer to a request, whatever its status."""
+    def ask(
+        self,
+        command: Command,
+        parameter: int = 0,
+        item: int = 0,
+        value: int = 0,
+        tries: int = TRIES,
+        answer_s: float = ANSWER_S,
+    ) -> Answer:
+        """The device's answer to a request, whatever its status; it is repeated after ``answer_s`` without one."""
         request = self.next_request(command, parameter, item, value)
         for self._sent in range(1, tries + 1):
             self.link.send(request)
-            answer = self._answer_to(request)
+            answer = self._answer_to(request, answer_s)
             if answer is not None:
                 self._last = answer
                 return answer
             self.retries += 1
         raise DaqTimeout(
-            f"{self.link.name}: no answer to {_said(command, parameter)} in {tries * ANSWER_S:g} s"
+            f"{self.link.name}: no answer to {_said(command, parameter)} in {tries * answer_s:g} s"
             f"{self.damage()}; is the device switched on, and its cable in place?"
         )
 
@@ -68,8 +76,8 @@ class Dialogue:
         self._number = self._number % 255 + 1
         return Request(self._number, command, parameter, item, value)
 
-    def _answer_to(self, request: Request) -> Answer | None:
-        until = self.clock() + ANSWER_S
+    def _answer_to(self, request: Request, answer_s: float) -> Answer | None:
+        until = self.clock() + answer_s
         while (left := until - self.clock()) > 0.0:
             message = self.link.receive(left)
             if message is None:
@@ -81,6 +89,12 @@ class Dialogue:
             elif isinstance(message, Samples | Heartbeat):
                 self.early.append(message)
         return None
+
+    def forget_beats(self) -> None:
+        """Drop the heartbeats that have come so far, and keep the blocks."""
+        kept = [message for message in self.early if isinstance(message, Samples)]
+        self.early.clear()
+        self.early.extend(kept)
 
     def forget(self) -> None:
         """Drop what has come so far: heartbeats of an idle device, blocks for a host that is no more."""
@@ -118,13 +132,15 @@ class Dialogue:
         seen = [f"{count} {name.replace('_', ' ')}" for name, count in self.link.counters.items() if count]
         return f" ({', '.join(seen)})" if seen else ""
 
-    def do(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0) -> int:
+    def do(
+        self, command: Command, parameter: int = 0, item: int = 0, value: int = 0, answer_s: float = ANSWER_S
+    ) -> int:
         """Have a request carried out; returns the answer's value. `DaqRefused` where the device will not."""
-        answer = self.ask(command, parameter, item, value)
+        answer = self.ask(command, parameter, item, value, answer_s=answer_s)
         if answer.status == Status.LATCHED:
-            raise stopped(self.link.name, answer.value, f"{_said(command, parameter, value)}: {_why(answer)}")
+            raise stopped(self.link.name, answer.value, f"{_said(command, parameter, value)}: {why_not(answer)}")
         if answer.status != Status.DONE:
-            raise DaqRefused(f"{self.link.name}: {_said(command, parameter, value)}: {_why(answer)}")
+            raise DaqRefused(f"{self.link.name}: {_said(command, parameter, value)}: {why_not(answer)}")
         return answer.value
 
     def get(self, parameter: Parameter, item: int = 0, default: int | None = None) -> int:
@@ -134,7 +150,7 @@ class Dialogue:
             return default
         if answer.status != Status.DONE:
             raise DaqProtocol(
-                f"{self.link.name}: the device does not tell its {parameter.name} (item {item}): {_why(answer)}"
+                f"{self.link.name}: the device does not tell its {parameter.name} (item {item}): {why_not(answer)}"
             )
         return answer.value
 
@@ -158,7 +174,8 @@ def _said(command: Command, parameter: int, value: int | None = None) -> str:
     return " ".join(filter(None, (command.name, known.get(parameter, "") if parameter else ""))) + to
 
 
-def _why(answer: Answer) -> str:
+def why_not(answer: Answer) -> str:
+    """What a status that is not DONE says, in words."""
     if answer.status == Status.NOT_ALLOWED:
         return f"not allowed, the nearest value is {answer.value}"
     if answer.status == Status.WRONG_STATE:
@@ -166,4 +183,4 @@ def _why(answer: Answer) -> str:
         return f"the device is {names.get(answer.value, answer.value)}"
     if answer.status == Status.LATCHED:
         return "the device's watchdog or emergency stop has latched; release it first"
-    return "the device does not know it"
+    return "the device does not know it" if answer.status == Status.UNKNOWN else f"status {answer.status}"

@@ -6,6 +6,7 @@ import numpy as np
 
 from rig.daq import LOST
 from rig.drivers.wire.connection import Connection
+from rig.drivers.wire.dialogue import ANSWER_S
 from rig.drivers.wire.incoming import Incoming
 from rig.drivers.wire.options import WireOptions
 from rig.drivers.wire.scaling import Scaling
@@ -33,6 +34,7 @@ class Streaming:
         block_s = stream.block / stream.rate_hz
         wait_s = watchdog_s(options, facts, block_s)
         connection.check_latch()
+        self._watchdog_s = wait_s
         self._set_up(stream, wait_s, options.ramp_s)
         timeout_s = options.timeout_s or max(0.25, 10.0 * block_s)
         self._dialogue.early.clear()
@@ -60,7 +62,9 @@ class Streaming:
     def _begin(self) -> None:
         self._dialogue.forget()
         self._dialogue.do(Command.START)
-        self._dialogue.do(Command.ARM, value=ARM_KEY)
+        # The watchdog runs from the first ARM on: where its answer gets lost, there must be time for another and an output.
+        self._dialogue.do(Command.ARM, value=ARM_KEY, answer_s=min(ANSWER_S, 0.5 * self._watchdog_s))
+        self._dialogue.forget_beats()  # of before
         self._began = True
 
     def exchange(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:

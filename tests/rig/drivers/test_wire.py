@@ -37,6 +37,7 @@ from rig.wire.messages import (
     Parameter,
     Request,
     Samples,
+    Status,
     float_word,
 )
 from rig.worker.probe import round_trips
@@ -423,6 +424,92 @@ def test_another_who_starts_the_device_is_noticed() -> None:
             daq.device.handle(Request(240 + number, command), daq.wire.now_s)
         with pytest.raises(DaqReset):
             drive(daq, 50)
+
+
+def test_another_who_disarms_the_device_is_noticed() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        drive(daq, 50)
+        daq.device.handle(Request(240, Command.DISARM), daq.wire.now_s)
+        with pytest.raises(DaqReset, match="was disarmed by another; its output is 0 V"):
+            drive(daq, 500)  # half a second
+    assert not daq.device.output_v.any()
+
+
+def test_heartbeats_of_before_the_arming_and_a_single_stale_one_end_nothing() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    boot = daq.device.words[Parameter.BOOT, 0] & 0xFF
+    stale = Heartbeat(DeviceState.RUNNING, 0, boot, 0)
+    heard = daq.device.handle
+
+    def beating(message: Message, now_s: float) -> None:
+        if isinstance(message, Request) and message.command == Command.ARM:
+            daq.wire.to_host.extend([stale] * 3)
+        heard(message, now_s)
+
+    daq.device.handle = beating  # type: ignore[method-assign]
+    with daq:
+        daq.start(5)
+        drive(daq, 10)
+        daq.wire.to_host.append(stale)
+        drive(daq, 500)
+        assert daq.device.state is DeviceState.ARMED
+
+
+@pytest.mark.parametrize("watchdog_s", [None, 0.02])
+def test_an_answer_to_the_arming_that_gets_lost_is_asked_for_before_the_watchdog_bites(
+    watchdog_s: float | None,
+) -> None:
+    daq = MemoryDAQ(bench_with(), 3, WireOptions(watchdog_s=watchdog_s), lockstep=False)
+    heard, lost = daq.device.handle, [1]
+
+    def losing(message: Message, now_s: float) -> None:
+        heard(message, now_s)
+        if isinstance(message, Request) and message.command == Command.ARM and lost[0]:
+            lost[0] -= 1
+            kept = [told for told in daq.wire.to_host if not isinstance(told, Answer)]
+            daq.wire.to_host.clear()
+            daq.wire.to_host.extend(kept)
+
+    daq.device.handle = losing  # type: ignore[method-assign]
+    with daq:
+        daq.start(5)
+        drive(daq, 200)
+        assert not lost[0]
+        assert daq.counters["retries"] == 1
+        assert daq.device.state is DeviceState.ARMED
+
+
+@pytest.mark.parametrize(
+    ("status", "value", "words"),
+    [
+        (Status.NOT_ALLOWED, 20_000, "the nearest is 0.02 s"),
+        (Status.WRONG_STATE, DeviceState.RUNNING, "the device is running"),
+        (Status.UNKNOWN, 0, "the device does not know it"),
+        (Status.DONE, 20_000, "the device has set 0.02 s instead"),
+        (9, 20_000, "status 9"),
+    ],
+)
+def test_a_setting_that_is_refused_is_told_with_the_devices_reason_and_a_nearest_only_where_there_is_one(
+    status: int, value: int, words: str
+) -> None:
+    daq = MemoryDAQ(bench_with(), 3)
+    heard = daq.device.handle
+
+    def refusing(message: Message, now_s: float) -> None:
+        if isinstance(message, Request) and message[1:3] == (Command.SET, Parameter.RAMP_US):
+            daq.wire.to_host.append(Answer(message.number, status, message.parameter, message.item, value))
+        else:
+            heard(message, now_s)
+
+    daq.device.handle = refusing  # type: ignore[method-assign]
+    with daq, pytest.raises(DaqMismatch) as caught:
+        daq.start(5)
+    said = str(caught.value)
+    assert said.startswith("memory: driver.options.ramp_s = 0.05 s: ")
+    assert words in said
+    assert ("nearest" in said) == (status == Status.NOT_ALLOWED)
 
 
 def test_a_watchdog_shorter_than_two_blocks_is_refused() -> None:
