@@ -10,7 +10,7 @@ __all__ = ["Incoming"]
 
 OLD_BLOCKS_IN_A_ROW = 3  # so many old blocks, each after the other, are a device that counts anew
 UNARMED_BEATS = 2  # one may have been under way when the device was armed
-UNARMED = {DeviceState.IDLE: "was stopped by another", DeviceState.RUNNING: "was disarmed by another"}
+UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}
 STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
 
 
