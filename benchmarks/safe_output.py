@@ -148,6 +148,7 @@ def started_again(bench: Bench) -> str:
     again = bench.model_copy(update={"driver": DriverChoice(name="serial", options=options)})
     try:
         with make_daq(again, 0) as daq:
+            daq.clear()
             daq.start(again.block)
             for _ in range(50):
                 daq.exchange(np.zeros(again.block))

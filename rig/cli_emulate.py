@@ -71,7 +71,7 @@ def emulate(
     def when_ready(ready: "Ready") -> None:
         block = _block(behind, ready)
         if bench_file is not None:
-            _write_bench(bench_file, _bench_text(bench, block, ready))
+            _write_bench(bench_file, _bench_text(bench, block, ready, as_hardware))
         if json:
             facts = {"wire": wire, **ready.options, "block": block, "process": ready.process}
             print(jsonlib.dumps(facts), flush=True)
@@ -120,12 +120,12 @@ def _block(bench: "Bench", ready: "Ready") -> int:
     return max(bench.block, min(wanted, ready.largest_block))
 
 
-def _bench_text(bench: str, block: int, ready: "Ready") -> str:
+def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> str:
     """A bench that starts from the emulated one, with its block, and names the driver that reaches it."""
     from rig.wire.device.emulator import driver_options
 
     base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
-    options = driver_options(ready.options, lockstep=ready.lockstep)
+    options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware)
     lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
     head = [
         f"base = {jsonlib.dumps(base)}",

@@ -140,7 +140,7 @@ class DAQ(ABC):
     ``flags`` (uint16[n]) are the device's own remarks on each sample of the last block, as bits: a driver that has any fills it
     in `_exchange` and names the bits, lowest first, by its `counters`. Samples that were lost on their way are rows of NaN with
     the bit `LOST`, in their place: the count of rows is the device's count of instants. `start` arms the device; whether it may
-    be started at all is decided above, by a person.
+    be started at all is decided above, by a person. What the device has `latched` it keeps until `clear`, which a run calls.
 
     Errors: `DaqRefused` for what the device or the present state cannot do, `DaqTimeout`, `DaqDisconnected`,
     `DaqOverrun` and the others of `rig.errors` for what happens on the way.
@@ -181,6 +181,14 @@ class DAQ(ABC):
     def remarks(self) -> tuple[str, ...]:
         """What looks odd about the bench to the driver, one line each; a run prints and records them."""
         return ()
+
+    @property
+    def latched(self) -> str:
+        """What the device had latched when it was opened, in words: its watchdog, an emergency stop; empty for nothing."""
+        return ""
+
+    def clear(self) -> None:  # noqa: B027 (most devices latch nothing)
+        """Have the device forget what is `latched`, and nothing that latched later; only for a run that is armed."""
 
     @property
     def identity(self) -> dict[str, str]:

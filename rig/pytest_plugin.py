@@ -105,6 +105,8 @@ def rig_daq(rig_subject: "Subject") -> Iterator["DAQ"]:
         rig_subject.require_arming()
         daq.open()
     try:
+        with _said_in_one_line():
+            daq.clear()
         yield daq
     finally:
         daq.close()

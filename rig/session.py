@@ -57,9 +57,14 @@ class Session(Protocol):
     """What its driver can do."""
     identity: dict[str, str]
     """What stands behind the driver, for the record."""
+    latched: str
+    """What the device had latched when it was opened, in words; empty for nothing."""
 
     def start(self, settings: TickSettings) -> RunningLoop:
-        """Start the device and a loop over it; the loop runs when its rows are asked for. Once in a session."""
+        """Start the device and a loop over it; the loop runs when its rows are asked for. Once in a session.
+
+        The device forgets what it had latched when it was opened: whoever calls this has been armed.
+        """
 
 
 class LocalSession:
@@ -69,9 +74,11 @@ class LocalSession:
         self._daq, self._realtime = daq, realtime
         self.capabilities = daq.capabilities
         self.identity = daq.identity
+        self.latched = daq.latched
 
     def start(self, settings: TickSettings) -> RunningLoop:
         """Start the device; the loop runs while its rows are taken."""
+        self._daq.clear()
         self._daq.start(settings.bench.block)
         loop = Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
         if self._realtime or self._daq.wall_clock:

@@ -38,13 +38,17 @@ class _OnBench(DriverContract):
 
 
 def require_arming(bench: Bench, arm: bool) -> None:
-    """Raise `NotArmed` where something physical would move and nobody has said that it may; opens the device to ask it."""
+    """Raise `NotArmed` where something physical would move and nobody has said that it may; opens the device to ask it.
+
+    What it has latched until then is cleared; what latches from then on stays so.
+    """
     with make_daq(bench) as daq:
         if not daq.capabilities.virtual and not arm:
             raise NotArmed(
                 f"bench {bench.name}: something physical would move by up to {DriverContract.amplitude_v:g} V; "
                 "look, then give --arm"
             )
+        daq.clear()
 
 
 def check_driver(bench: Bench) -> Iterator[Finding]:

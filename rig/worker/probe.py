@@ -36,7 +36,9 @@ def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
     """Open a bench's device and swap blocks of 0 V with it for a while.
 
     ``block_us``: time between two blocks; ``rate_hz``: samples a second that came; what the driver measured itself, in
-    ``statistics``. Raises `rig.errors.DaqError`, `rig.errors.ConfigurationError`.
+    ``statistics``. A device that has something ``latched`` is left as it is, without any blocks.
+
+    Raises `rig.errors.DaqError`, `rig.errors.ConfigurationError`.
     """
     with make_daq(bench, seed) as daq:
         capabilities = daq.capabilities
@@ -49,6 +51,8 @@ def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
             "paced_by": pacing_of(daq),
             "virtual": capabilities.virtual,
         }
+        if daq.latched:  # nobody has armed anything here, and so nobody may clear it
+            return out | {"latched": daq.latched, "remarks": [*daq.remarks]}
         prepare(privileged=out["paced_by"] == "device")  # what returns at once would never let go of the processor
         daq.start(bench.block)
         zeros = np.zeros(bench.block)

@@ -67,7 +67,7 @@ def described(error: RigError) -> tuple[tuple[str, ...], str]:
 def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Bench, seed: int, privileged: bool) -> None:
     """Open the driver, and run one loop over it if the campaign says so."""
     with make_daq(bench, seed) as daq:
-        facts.send(("opened", daq.capabilities, dict(daq.identity), daq.remarks, dict(daq.counters)))
+        facts.send(("opened", daq.capabilities, dict(daq.identity), daq.latched, daq.remarks, dict(daq.counters)))
         _, settings, ring_s = _told(commands)
         trial = settings.build(0.0)
         layout = Layout.of(bench, trial.arrays, len(daq.counters), ring_s)
@@ -75,6 +75,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         _load_kernels(daq, bench, settings)
         came = _listen()
         said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")  # in no hurry, and never asleep
+        daq.clear()
         daq.start(bench.block)
         loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))

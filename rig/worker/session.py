@@ -141,6 +141,7 @@ class WorkerSession:
 
     capabilities: Capabilities
     identity: dict[str, str]
+    latched: str
 
     def __init__(self, bench: Bench, seed: int = 0, *, privileged: bool = True, ring_s: float = RING_S) -> None:
         self._bench, self._ring_s = bench, ring_s
@@ -148,7 +149,8 @@ class WorkerSession:
         self._worker = Worker()
         try:
             self._worker.send("open", bench, seed, privileged)
-            self.capabilities, self.identity, self.remarks, self._counters = self._worker.receive("opened")
+            opened = self._worker.receive("opened")
+            self.capabilities, self.identity, self.latched, self.remarks, self._counters = opened
         except BaseException:
             self._worker.close(0.5)
             raise

@@ -5,18 +5,21 @@ import math
 from collections.abc import Callable
 
 from rig.bench import Bench
-from rig.drivers.wire.dialogue import ANSWER_S, Dialogue
+from rig.drivers.wire.dialogue import ANSWER_S, Dialogue, why_not
 from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
+from rig.drivers.wire.latch import STOPPED, latched_text, stopped
 from rig.drivers.wire.round_trips import RoundTrips
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
-from rig.wire.messages import Command, DeviceState, Parameter, Stream
+from rig.wire.messages import Command, DeviceFlag, DeviceState, Parameter, Status, Stream
 
 __all__ = ["Connection"]
 
 MOST_LOAD = 0.9  # of what the wire carries
 FIND_TRIES = 20
 OPENING_PINGS = 50
+NOTHING = DeviceFlag(0)
+HEARTBEAT_S = 0.25  # two of them, and some more
 
 
 class Connection:
@@ -37,8 +40,10 @@ class Connection:
         """What that stream asks of it, bit/s; known also where the wire carries any."""
         self.sustainable_hz = math.inf
         """Sample rate that wire and device would carry with such blocks."""
-        self.found_running = self.cleared = False
-        """In what state it was found."""
+        self.found_running = False
+        """Whether it was sampling when it was found."""
+        self.latched = self.cleared = NOTHING
+        """What had latched when it was met, as long as it has not been cleared, and from then on."""
 
     def meet(self, bench: Bench, queue: int) -> None:
         """Find the device, and refuse it where it is not the bench's or the wire cannot carry its stream."""
@@ -52,6 +57,7 @@ class Connection:
             began = self.clock()
             self.dialogue.ask(Command.GET, Parameter.PING, number)
             self.round_trips.add(self.clock() - began)
+        self.latched = self._what_has_latched()
 
     def _find(self) -> None:
         """Ask until something answers, and bring what a dead host has left running to rest."""
@@ -87,20 +93,40 @@ class Connection:
                 f"{100.0 * load.share:.0f} % of the wire, allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
             )
 
+    def check_latch(self, forgiven: DeviceFlag = NOTHING) -> None:
+        """`DaqEmergencyStop` or `DaqWatchdog` where something beside the ``forgiven`` has latched."""
+        latched = self._what_has_latched()
+        if latched & ~forgiven:
+            raise stopped(
+                self.link.name,
+                latched,
+                f"{latched_text(latched)}: a run that is armed clears what it finds latched when it opens the device",
+            )
+
     def clear(self) -> None:
-        """Release a watchdog or emergency stop that has latched in an earlier run."""
-        if self.dialogue.get(Parameter.STATE) == DeviceState.LATCHED:
+        """Release what had latched when the device was met; what has latched since is an error."""
+        if self.latched:
+            self.check_latch(self.latched)
             self.dialogue.do(Command.CLEAR)
-            self.cleared = True
+            self.latched, self.cleared = NOTHING, self.latched
+
+    def _what_has_latched(self) -> DeviceFlag:
+        """Nothing, or what the next heartbeat of a device that is LATCHED says; all of it where none comes."""
+        if self.dialogue.get(Parameter.STATE) != DeviceState.LATCHED:
+            return NOTHING
+        return DeviceFlag(self.dialogue.beat_with(STOPPED, HEARTBEAT_S)) or STOPPED
 
     def set(self, parameter: Parameter, value: int, key: str, scale: float, unit: str) -> None:
         """Set a parameter; ``key``, ``scale`` and ``unit`` are those of the bench, for the message that it cannot be."""
         answer = self.dialogue.ask(Command.SET, parameter, value=value)
-        if answer.status != 0 or answer.value != value:
-            raise DaqMismatch(
-                f"{self.link.name}: {key} = {value * scale:g} {unit}: not what the device can do, "
-                f"the nearest is {answer.value * scale:g} {unit}"
-            )
+        if answer.status == Status.DONE and answer.value == value:
+            return
+        why = f"not what the device can do, the nearest is {answer.value * scale:g} {unit}"
+        if answer.status == Status.DONE:
+            why = f"the device has set {answer.value * scale:g} {unit} instead"
+        elif answer.status != Status.NOT_ALLOWED:
+            why = f"not set: {why_not(answer)}"
+        raise DaqMismatch(f"{self.link.name}: {key} = {value * scale:g} {unit}: {why}")
 
     def close(self) -> None:
         """Tell the device to stop, if there still is one, and let go of the port."""

@@ -4,6 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from rig.drivers.wire.latch import stopped
 from rig.errors import DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
 from rig.wire.messages import (
@@ -18,7 +19,7 @@ from rig.wire.messages import (
 )
 from rig.wire.words import NAME_WORDS, as_float, as_text
 
-__all__ = ["ANSWER_S", "Dialogue"]
+__all__ = ["ANSWER_S", "Dialogue", "why_not"]
 
 TRIES = 5
 ANSWER_S = 0.1
@@ -30,7 +31,7 @@ class Dialogue:
     """Requests and answers over a link, and the stream messages that came in between.
 
     Errors: `DaqTimeout` for a device that has fallen silent, `DaqProtocol` where two devices answer, `DaqRefused` for what
-    the device will not do.
+    the device will not do, `DaqEmergencyStop` and `DaqWatchdog` for what it will not do because they have latched.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
@@ -45,18 +46,26 @@ class Dialogue:
         self._last: Answer | None = None
         self._number = time.monotonic_ns() // 1000 % 255  # another one than the last host's, most likely
 
-    def ask(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0, tries: int = TRIES) -> Answer:
-        """The device's answer to a request, whatever its status."""
+    def ask(
+        self,
+        command: Command,
+        parameter: int = 0,
+        item: int = 0,
+        value: int = 0,
+        tries: int = TRIES,
+        answer_s: float = ANSWER_S,
+    ) -> Answer:
+        """The device's answer to a request, whatever its status; it is repeated after ``answer_s`` without one."""
         request = self.next_request(command, parameter, item, value)
         for self._sent in range(1, tries + 1):
             self.link.send(request)
-            answer = self._answer_to(request)
+            answer = self._answer_to(request, answer_s)
             if answer is not None:
                 self._last = answer
                 return answer
             self.retries += 1
         raise DaqTimeout(
-            f"{self.link.name}: no answer to {_said(command, parameter)} in {tries * ANSWER_S:g} s"
+            f"{self.link.name}: no answer to {_said(command, parameter)} in {tries * answer_s:g} s"
             f"{self.damage()}; is the device switched on, and its cable in place?"
         )
 
@@ -65,8 +74,8 @@ class Dialogue:
         self._number = self._number % 255 + 1
         return Request(self._number, command, parameter, item, value)
 
-    def _answer_to(self, request: Request) -> Answer | None:
-        until = self.clock() + ANSWER_S
+    def _answer_to(self, request: Request, answer_s: float) -> Answer | None:
+        until = self.clock() + answer_s
         while (left := until - self.clock()) > 0.0:
             message = self.link.receive(left)
             if message is None:
@@ -79,12 +88,29 @@ class Dialogue:
                 self.early.append(message)
         return None
 
+    def forget_beats(self) -> None:
+        """Drop the heartbeats that have come so far, and keep the blocks."""
+        kept = [message for message in self.early if isinstance(message, Samples)]
+        self.early.clear()
+        self.early.extend(kept)
+
     def forget(self) -> None:
         """Drop what has come so far: heartbeats of an idle device, blocks for a host that is no more."""
         for _ in range(WAITING_BLOCKS):
             if self.link.receive(0.0) is None:
                 break
         self.early.clear()
+
+    def beat_with(self, wanted: int, longest_s: float) -> int:
+        """Those of the flags ``wanted`` that the next heartbeat with any of them has; 0 where none comes in time."""
+        until = self.clock() + longest_s
+        while (left := until - self.clock()) > 0.0:
+            message = self.link.receive(left)
+            if isinstance(message, Answer):
+                self.note_stray(message)
+            elif isinstance(message, Heartbeat) and message.flags & wanted:
+                return message.flags & wanted
+        return 0
 
     def note_stray(self, answer: Answer) -> None:
         """Count an answer that nobody waits for; `DaqProtocol` once it is plain that two devices answer."""
@@ -104,11 +130,15 @@ class Dialogue:
         seen = [f"{count} {name.replace('_', ' ')}" for name, count in self.link.counters.items() if count]
         return f" ({', '.join(seen)})" if seen else ""
 
-    def do(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0) -> int:
+    def do(
+        self, command: Command, parameter: int = 0, item: int = 0, value: int = 0, answer_s: float = ANSWER_S
+    ) -> int:
         """Have a request carried out; returns the answer's value. `DaqRefused` where the device will not."""
-        answer = self.ask(command, parameter, item, value)
+        answer = self.ask(command, parameter, item, value, answer_s=answer_s)
+        if answer.status == Status.LATCHED:
+            raise stopped(self.link.name, answer.value, f"{_said(command, parameter, value)}: {why_not(answer)}")
         if answer.status != Status.DONE:
-            raise DaqRefused(f"{self.link.name}: {_said(command, parameter, value)}: {_why(answer)}")
+            raise DaqRefused(f"{self.link.name}: {_said(command, parameter, value)}: {why_not(answer)}")
         return answer.value
 
     def get(self, parameter: Parameter, item: int = 0, default: int | None = None) -> int:
@@ -118,7 +148,7 @@ class Dialogue:
             return default
         if answer.status != Status.DONE:
             raise DaqProtocol(
-                f"{self.link.name}: the device does not tell its {parameter.name} (item {item}): {_why(answer)}"
+                f"{self.link.name}: the device does not tell its {parameter.name} (item {item}): {why_not(answer)}"
             )
         return answer.value
 
@@ -142,7 +172,8 @@ def _said(command: Command, parameter: int, value: int | None = None) -> str:
     return " ".join(filter(None, (command.name, known.get(parameter, "") if parameter else ""))) + to
 
 
-def _why(answer: Answer) -> str:
+def why_not(answer: Answer) -> str:
+    """What a status that is not DONE says, in words."""
     if answer.status == Status.NOT_ALLOWED:
         return f"not allowed, the nearest value is {answer.value}"
     if answer.status == Status.WRONG_STATE:
@@ -150,4 +181,4 @@ def _why(answer: Answer) -> str:
         return f"the device is {names.get(answer.value, answer.value)}"
     if answer.status == Status.LATCHED:
         return "the device's watchdog or emergency stop has latched; release it first"
-    return "the device does not know it"
+    return "the device does not know it" if answer.status == Status.UNKNOWN else f"status {answer.status}"

@@ -11,8 +11,10 @@ from rig.bench import Bench
 from rig.daq import DAQ, Capabilities
 from rig.drivers.wire.connection import Connection
 from rig.drivers.wire.facts import DeviceFacts, remarks_on
+from rig.drivers.wire.latch import latched_text
 from rig.drivers.wire.options import WireOptions
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
+from rig.drivers.wire.watchdog import raised_remark
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
 
@@ -94,11 +96,23 @@ class WireDAQ(DAQ):
         if connection is None or connection.facts is None:
             return ()
         out = remarks_on(connection.facts, self._bench)
+        raised = raised_remark(self._options, connection.facts, self._bench.block / self._bench.sample_rate_hz)
+        out += [raised] if raised else []
         if connection.found_running:
             out.append("the device was still running from an earlier run and was stopped first")
         if connection.cleared:
-            out.append("the device's watchdog or emergency stop had latched in an earlier run and was cleared")
+            out.append(f"{latched_text(connection.cleared)} in an earlier run and was cleared")
         return tuple(out)
+
+    @property
+    def latched(self) -> str:
+        """Watchdog or emergency stop, as found when the device was opened; they stay latched until `clear`."""
+        return latched_text(self._connection.latched) if self._connection else ""
+
+    def clear(self) -> None:
+        """Clear what was latched when the device was opened; what has latched since is an error."""
+        if self._connection is not None:
+            self._connection.clear()
 
     @property
     def statistics(self) -> dict[str, float]:

@@ -72,14 +72,17 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
     bits = get(Parameter.BITS)
     if bits not in (16, 32):
         raise DaqProtocol(f"{dialogue.link.name}: the device counts in {bits} bits: allowed is 16 or 32")
+    simulated = get(Parameter.SIMULATED, default=0)
+    if simulated not in (0, 1, 2):
+        raise DaqProtocol(f"{dialogue.link.name}: the device says SIMULATED = {simulated}: allowed is 0, 1 or 2")
     channels = range(count)
     facts = DeviceFacts(
         model=dialogue.get_text(Parameter.MODEL),
         firmware=dialogue.get_text(Parameter.FIRMWARE),
         serial_number=dialogue.get_text(Parameter.SERIAL_NUMBER),
         boot=get(Parameter.BOOT),
-        simulated=get(Parameter.SIMULATED, default=0) >= 1,
-        repeatable=get(Parameter.SIMULATED, default=0) == 2,
+        simulated=simulated != 0,
+        repeatable=simulated == 2,
         names=tuple(dialogue.get_text(Parameter.CHANNEL_NAME, channel) for channel in channels),
         units=tuple(dialogue.get_text(Parameter.CHANNEL_UNIT, channel) for channel in channels),
         range_v=np.array([get_float(Parameter.CHANNEL_RANGE_V, channel) for channel in channels]),

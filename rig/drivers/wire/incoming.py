@@ -9,7 +9,8 @@ from rig.wire.messages import Answer, DeviceFlag, DeviceState, Heartbeat, Messag
 __all__ = ["Incoming"]
 
 OLD_BLOCKS_IN_A_ROW = 3  # so many old blocks, each after the other, are a device that counts anew
-IDLE_BEATS = 2  # one may have been under way when the device was started
+UNARMED_BEATS = 2  # one may have been under way when the device was armed
+UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}
 STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
 
 
@@ -39,7 +40,7 @@ class Incoming:
         self._newer: Samples | None = None
         self._old_in_a_row = 0
         self._last_old = 0
-        self._idle_beats = 0
+        self._unarmed_beats = 0
 
     def take(self) -> Samples | None:
         """The next block; None where it was lost, which is known as soon as a newer one has come."""
@@ -113,9 +114,10 @@ class Incoming:
                 )
             if message.flags & STOPPED:
                 self._raise_stopped(message.flags)
-            self._idle_beats = self._idle_beats + 1 if message.state == DeviceState.IDLE else 0
-            if self._idle_beats >= IDLE_BEATS:
-                raise DaqReset(f"{self._link.name}: the device was stopped by another; its output is 0 V")
+            self._unarmed_beats = self._unarmed_beats + 1 if message.state != DeviceState.ARMED else 0
+            if self._unarmed_beats >= UNARMED_BEATS:
+                how = UNARMED.get(message.state, f"is in state {message.state} and not armed")
+                raise DaqReset(f"{self._link.name}: the device {how}; its output is 0 V")
 
     def _raise_stopped(self, flags: int) -> None:
         if flags & DeviceFlag.EMERGENCY_STOP:

@@ -6,17 +6,16 @@ import numpy as np
 
 from rig.daq import LOST
 from rig.drivers.wire.connection import Connection
-from rig.drivers.wire.facts import DeviceFacts
+from rig.drivers.wire.dialogue import ANSWER_S
 from rig.drivers.wire.incoming import Incoming
 from rig.drivers.wire.options import WireOptions
 from rig.drivers.wire.scaling import Scaling
-from rig.errors import DaqRefused
+from rig.drivers.wire.watchdog import watchdog_s
 from rig.wire.messages import ARM_KEY, Answer, Command, DeviceFlag, Output, Parameter, Stream
 
 __all__ = ["FLAG_NAMES", "Streaming"]
 
 PINGS_PER_S = 20.0
-SHORTEST_WATCHDOG_BLOCKS = 2
 FLAG_NAMES = tuple(str(flag.name).lower() for flag in DeviceFlag)
 
 
@@ -32,13 +31,14 @@ class Streaming:
         facts = connection.facts
         assert facts is not None
         connection.check_capacity(stream)
-        watchdog_s = _watchdog_s(stream, options, facts)
-        connection.clear()
-        self._set_up(stream, watchdog_s, options.ramp_s)
         block_s = stream.block / stream.rate_hz
+        wait_s = watchdog_s(options, facts, block_s)
+        connection.check_latch()
+        self._watchdog_s = wait_s
+        self._set_up(stream, wait_s, options.ramp_s)
         timeout_s = options.timeout_s or max(0.25, 10.0 * block_s)
         self._dialogue.early.clear()
-        longest_gap = math.ceil((watchdog_s + timeout_s) * stream.rate_hz) + stream.block
+        longest_gap = math.ceil((wait_s + timeout_s) * stream.rate_hz) + stream.block
         shape = stream.block, stream.n_channels
         self.incoming = Incoming(self._dialogue, shape, longest_gap, timeout_s, facts.boot)
         self.incoming.on_answer = self._take_answer
@@ -50,19 +50,21 @@ class Streaming:
         self._blocks_between_pings = max(1, round(1.0 / block_s / PINGS_PER_S))
         self._ping: tuple[int, float] | None = None
 
-    def _set_up(self, stream: Stream, watchdog_s: float, ramp_s: float) -> None:
+    def _set_up(self, stream: Stream, wait_s: float, ramp_s: float) -> None:
         put = self._connection.set
         put(Parameter.RATE_MHZ, round(1e3 * stream.rate_hz), "sample_rate_hz", 1e-3, "Hz")
         put(Parameter.BLOCK, stream.block, "block", 1, "samples")
         put(Parameter.QUEUE, stream.queue, "driver.options.queue_blocks", 1, "blocks")
-        put(Parameter.WATCHDOG_US, round(1e6 * watchdog_s), "driver.options.watchdog_s", 1e-6, "s")
+        put(Parameter.WATCHDOG_US, round(1e6 * wait_s), "driver.options.watchdog_s", 1e-6, "s")
         put(Parameter.RAMP_US, round(1e6 * ramp_s), "driver.options.ramp_s", 1e-6, "s")
         self._link.configure(stream)
 
     def _begin(self) -> None:
         self._dialogue.forget()
         self._dialogue.do(Command.START)
-        self._dialogue.do(Command.ARM, value=ARM_KEY)
+        # The watchdog runs from the first ARM on: where its answer gets lost, there must be time for another and an output.
+        self._dialogue.do(Command.ARM, value=ARM_KEY, answer_s=min(ANSWER_S, 0.5 * self._watchdog_s))
+        self._dialogue.forget_beats()  # of before
         self._began = True
 
     def exchange(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
@@ -100,14 +102,3 @@ class Streaming:
         """0 V, no more samples."""
         self._dialogue.do(Command.STOP)
         self._dialogue.early.clear()
-
-
-def _watchdog_s(stream: Stream, options: WireOptions, facts: DeviceFacts) -> float:
-    block_s = stream.block / stream.rate_hz
-    watchdog_s = options.watchdog_s or max(0.1, 4.0 * block_s, facts.watchdog_s[0])
-    if watchdog_s < SHORTEST_WATCHDOG_BLOCKS * block_s:
-        raise DaqRefused(
-            f"driver.options.watchdog_s = {watchdog_s:g}: allowed is from {SHORTEST_WATCHDOG_BLOCKS * block_s:g} s on, "
-            f"{SHORTEST_WATCHDOG_BLOCKS} blocks of {stream.block} samples"
-        )
-    return watchdog_s

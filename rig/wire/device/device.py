@@ -102,10 +102,12 @@ class Device:
     def _take_output(self, output: Output, now_s: float) -> None:
         if not self._sampling.on:
             self.counts["outputs_while_idle"] += 1
-        elif self._sampling.take(output, now_s):
-            self._life.feed(now_s)
-        else:
+            return
+        in_time = self._sampling.take(output, now_s)
+        if in_time is None:
             self.counts["bad_outputs"] += 1
+        else:
+            self._life.feed(now_s, in_time=in_time > 0)
 
     def _answer(self, request: Request, now_s: float) -> None:
         if self._last is not None and request == self._last[0]:

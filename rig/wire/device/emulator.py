@@ -21,10 +21,14 @@ ENDING_S = 10.0
 LOCKSTEP_S = 60.0
 """Watchdog and time-out of a bench whose device waits for the host: nothing is in a hurry, and nothing waits for ever."""
 
+HARDWARE_S = 1.0
+"""Watchdog of one that does not say that nothing moves: drivers take no longer one."""
 
-def driver_options(options: dict[str, Any], *, lockstep: bool) -> dict[str, Any]:
+
+def driver_options(options: dict[str, Any], *, lockstep: bool, as_hardware: bool = False) -> dict[str, Any]:
     """Options of a driver that reaches an emulator: patient ones where the device waits for the host."""
-    patience = {"watchdog_s": LOCKSTEP_S, "timeout_s": LOCKSTEP_S} if lockstep else {}
+    watchdog_s = HARDWARE_S if as_hardware else LOCKSTEP_S
+    patience = {"watchdog_s": watchdog_s, "timeout_s": LOCKSTEP_S} if lockstep else {}
     return {**patience, **options}
 
 
@@ -58,9 +62,10 @@ class Emulator:
         self.process.stdin.write(self._settings.model_dump_json() + "\n")
         self.process.stdin.flush()
         ready = self._heard()["ready"]
-        lockstep = self._settings.lockstep
+        lockstep, as_hardware = self._settings.lockstep, self._settings.as_hardware
         options = {**ready["options"], **self._options}
-        driver = DriverChoice(name=self._settings.wire, options=driver_options(options, lockstep=lockstep))
+        options = driver_options(options, lockstep=lockstep, as_hardware=as_hardware)
+        driver = DriverChoice(name=self._settings.wire, options=options)
         self.bench = self._settings.bench.model_copy(update={"driver": driver})
         return self
 

@@ -32,10 +32,10 @@ class Life:
         """When the watchdog will bite unless it is fed."""
         return self._fed_s + self._watchdog_s
 
-    def feed(self, now_s: float) -> None:
-        """A valid output has come."""
+    def feed(self, now_s: float, *, in_time: bool) -> None:
+        """A valid output has come; one that is late altogether moves nothing, and so does not quieten the watchdog."""
         if self.state is DeviceState.ARMED:
-            self._fed_s = now_s
+            self._fed_s = now_s if in_time else self._fed_s
             self._sampling.has_output = True
 
     def stand_still(self, late_s: float) -> None:

@@ -18,18 +18,21 @@ class OutputQueue:
         self.held = 0.0
         """Count that the converter holds."""
 
-    def put(self, first: int, counts: np.ndarray, present: int) -> bool:
-        """Keep the outputs of a block; those before sample ``present`` are too late. False where it makes no sense."""
+    def put(self, first: int, counts: np.ndarray, present: int) -> int | None:
+        """Keep the outputs of a block; those before sample ``present`` are too late.
+
+        Returns how many came in time; None where the block makes no sense.
+        """
         block = self.block
         if counts.shape != (block,) or first < 0 or first % block:
-            return False
+            return None
         if first + block > present - present % block + self._size:
-            return False
+            return None
         late = min(max(0, present - first), block)
         slot = first % self._size
         self._values[slot + late : slot + block] = counts[late:]
         self._there[slot + late : slot + block] = True
-        return True
+        return block - late
 
     def is_there(self, first: int) -> bool:
         """Whether a whole block has come."""

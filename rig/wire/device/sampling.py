@@ -80,8 +80,8 @@ class Sampling:
             return math.inf
         return self._origin_s + (self.measured + self._block) / self._rate_hz
 
-    def take(self, output: Output, now_s: float) -> bool:
-        """Keep outputs until they are due; False where they make no sense."""
+    def take(self, output: Output, now_s: float) -> int | None:
+        """Keep outputs until they are due; how many came in time, None where they make no sense."""
         return self._outputs.put(output.first, output.counts, self._present(now_s))
 
     def _present(self, now_s: float) -> int:

@@ -22,6 +22,7 @@ from rig.errors import (
     DaqTimeout,
     DaqWatchdog,
 )
+from rig.session import LocalSession
 from rig.wire.device import Device, Faults, VirtualPlant
 from rig.wire.device.description import described
 from rig.wire.messages import (
@@ -36,12 +37,16 @@ from rig.wire.messages import (
     Parameter,
     Request,
     Samples,
+    Status,
 )
 from rig.wire.words import float_word
+from rig.worker.probe import round_trips
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink
+from tests.rig.worker.rigs import tone
 
 BLOCKS = 60
+LATCHES = [(False, DaqWatchdog, "watchdog"), (True, DaqEmergencyStop, "emergency stop")]
 
 
 def drive(daq: MemoryDAQ, blocks: int, block: int = 5, volts: float = 0.1) -> None:
@@ -166,6 +171,8 @@ def test_a_device_that_calls_its_channels_otherwise_is_refused() -> None:
         ({"LAYOUT_CRC": 7}, DaqMismatch, ("00000007",)),
         ({"N_CHANNELS": 0}, DaqProtocol, ("0 channels",)),
         ({"BITS": 12}, DaqProtocol, ("12 bits",)),
+        ({"SIMULATED": 3}, DaqProtocol, ("SIMULATED = 3", "0, 1 or 2")),
+        ({"SIMULATED": 2**32 - 1}, DaqProtocol, ("SIMULATED = 4294967295",)),
         ({"CHANNEL_V_PER_COUNT__0": float_word(math.nan)}, DaqProtocol, ("not positive",)),
         ({"LOWEST_VERSION": 2, "HIGHEST_VERSION": 3}, DaqProtocol, ("versions 2 to 3", "speaks 1")),
     ],
@@ -248,19 +255,91 @@ def test_a_device_that_still_runs_for_a_dead_host_is_stopped_first() -> None:
         np.testing.assert_array_equal(daq.exchange(np.zeros(5)).shape, (5, 4))
 
 
-def test_a_watchdog_that_has_latched_is_cleared_by_the_next_start_and_remarked() -> None:
+def latched_by(*, emergency: bool) -> MemoryDAQ:
+    """A driver, closed, whose device has latched its watchdog, or an emergency stop."""
     daq = MemoryDAQ(bench_with(), 3, lockstep=False)
     with daq:
         daq.start(5)
         daq.exchange(np.zeros(5))
-        daq.wire.pass_time(1.0)
-        with pytest.raises(DaqWatchdog, match="watchdog"):
+        if emergency:
+            daq.emergency_stop()
+        else:
+            daq.wire.pass_time(1.0)
+        with pytest.raises(DaqEmergencyStop if emergency else DaqWatchdog):
             drive(daq, 1000)
-        daq.stop()
-        assert daq.device.state is DeviceState.LATCHED
+    assert daq.device.state is DeviceState.LATCHED
+    return daq
+
+
+@pytest.mark.parametrize(("emergency", "kind", "word"), LATCHES)
+def test_what_has_latched_is_told_when_it_is_opened_and_not_cleared_by_a_start(
+    emergency: bool, kind: type[DaqError], word: str
+) -> None:
+    daq = latched_by(emergency=emergency)
+    for _ in range(2):
+        with daq:
+            assert daq.latched == f"the device's {word} had latched"
+            with pytest.raises(kind, match=f"{word} had latched: a run that is armed clears"):
+                daq.start(5)
+    assert daq.device.state is DeviceState.LATCHED
+
+
+@pytest.mark.parametrize(("emergency", "kind", "word"), LATCHES)
+def test_what_had_latched_can_be_cleared_and_is_remarked(emergency: bool, kind: type[DaqError], word: str) -> None:
+    daq = latched_by(emergency=emergency)
+    with daq:
+        daq.clear()
+        assert daq.latched == ""
         daq.start(5)
         assert np.isfinite(daq.exchange(np.zeros(5))).all()
-        assert any("latched" in remark for remark in daq.remarks)
+        assert any(f"{word} had latched in an earlier run" in remark for remark in daq.remarks)
+        daq.clear()
+        assert daq.device.state is DeviceState.ARMED
+
+
+def test_an_emergency_stop_after_the_opening_is_not_cleared_with_the_watchdog_that_was_found() -> None:
+    daq = latched_by(emergency=False)
+    with daq:
+        daq.emergency_stop()
+        with pytest.raises(DaqEmergencyStop, match="emergency stop and watchdog had latched"):
+            daq.clear()
+    assert daq.device.state is DeviceState.LATCHED
+
+
+def test_an_emergency_stop_between_opening_and_start_is_not_cleared() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        assert daq.latched == ""
+        daq.emergency_stop()
+        daq.clear()
+        with pytest.raises(DaqEmergencyStop):
+            daq.start(5)
+
+
+def test_an_emergency_stop_between_start_and_the_first_block_is_not_cleared() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        daq.emergency_stop()
+        with pytest.raises(DaqEmergencyStop):
+            daq.exchange(np.zeros(5))
+    assert daq.device.state is DeviceState.LATCHED
+
+
+def test_a_session_clears_what_its_device_had_latched_and_a_probe_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    daq = latched_by(emergency=True)
+    bench = bench_with()
+    monkeypatch.setattr("rig.worker.probe.make_daq", lambda *_: daq)
+    facts = round_trips(bench, 0, 0.1)
+    assert facts["latched"] == "the device's emergency stop had latched"
+    assert "block_us" not in facts
+    assert daq.device.state is DeviceState.LATCHED
+    with daq:
+        session = LocalSession(daq, realtime=False)
+        assert session.latched == "the device's emergency stop had latched"
+        assert daq.device.state is DeviceState.LATCHED
+        session.start(tone(bench, 1.0))
+        assert daq.device.state is DeviceState.IDLE
 
 
 def test_start_itself_starts_no_clock() -> None:
@@ -347,9 +426,131 @@ def test_another_who_starts_the_device_is_noticed() -> None:
             drive(daq, 50)
 
 
+def test_another_who_disarms_the_device_is_noticed() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    with daq:
+        daq.start(5)
+        drive(daq, 50)
+        daq.device.handle(Request(240, Command.DISARM), daq.wire.now_s)
+        with pytest.raises(DaqReset, match="was disarmed by another; its output is 0 V"):
+            drive(daq, 500)  # half a second
+    assert not daq.device.output_v.any()
+
+
+def test_heartbeats_of_before_the_arming_and_a_single_stale_one_end_nothing() -> None:
+    daq = MemoryDAQ(bench_with(), 3, lockstep=False)
+    boot = daq.device.words[Parameter.BOOT, 0] & 0xFF
+    stale = Heartbeat(DeviceState.RUNNING, 0, boot, 0)
+    heard = daq.device.handle
+
+    def beating(message: Message, now_s: float) -> None:
+        if isinstance(message, Request) and message.command == Command.ARM:
+            daq.wire.to_host.extend([stale] * 3)
+        heard(message, now_s)
+
+    daq.device.handle = beating  # type: ignore[method-assign]
+    with daq:
+        daq.start(5)
+        drive(daq, 10)
+        daq.wire.to_host.append(stale)
+        drive(daq, 500)
+        assert daq.device.state is DeviceState.ARMED
+
+
+@pytest.mark.parametrize("watchdog_s", [None, 0.02])
+def test_an_answer_to_the_arming_that_gets_lost_is_asked_for_before_the_watchdog_bites(
+    watchdog_s: float | None,
+) -> None:
+    daq = MemoryDAQ(bench_with(), 3, WireOptions(watchdog_s=watchdog_s), lockstep=False)
+    heard, lost = daq.device.handle, [1]
+
+    def losing(message: Message, now_s: float) -> None:
+        heard(message, now_s)
+        if isinstance(message, Request) and message.command == Command.ARM and lost[0]:
+            lost[0] -= 1
+            kept = [told for told in daq.wire.to_host if not isinstance(told, Answer)]
+            daq.wire.to_host.clear()
+            daq.wire.to_host.extend(kept)
+
+    daq.device.handle = losing  # type: ignore[method-assign]
+    with daq:
+        daq.start(5)
+        drive(daq, 200)
+        assert not lost[0]
+        assert daq.counters["retries"] == 1
+        assert daq.device.state is DeviceState.ARMED
+
+
+@pytest.mark.parametrize(
+    ("status", "value", "words"),
+    [
+        (Status.NOT_ALLOWED, 20_000, "the nearest is 0.02 s"),
+        (Status.WRONG_STATE, DeviceState.RUNNING, "the device is running"),
+        (Status.UNKNOWN, 0, "the device does not know it"),
+        (Status.DONE, 20_000, "the device has set 0.02 s instead"),
+        (9, 20_000, "status 9"),
+    ],
+)
+def test_a_setting_that_is_refused_is_told_with_the_devices_reason_and_a_nearest_only_where_there_is_one(
+    status: int, value: int, words: str
+) -> None:
+    daq = MemoryDAQ(bench_with(), 3)
+    heard = daq.device.handle
+
+    def refusing(message: Message, now_s: float) -> None:
+        if isinstance(message, Request) and message[1:3] == (Command.SET, Parameter.RAMP_US):
+            daq.wire.to_host.append(Answer(message.number, status, message.parameter, message.item, value))
+        else:
+            heard(message, now_s)
+
+    daq.device.handle = refusing  # type: ignore[method-assign]
+    with daq, pytest.raises(DaqMismatch) as caught:
+        daq.start(5)
+    said = str(caught.value)
+    assert said.startswith("memory: driver.options.ramp_s = 0.05 s: ")
+    assert words in said
+    assert ("nearest" in said) == (status == Status.NOT_ALLOWED)
+
+
 def test_a_watchdog_shorter_than_two_blocks_is_refused() -> None:
     with MemoryDAQ(bench_with(), 0, WireOptions(watchdog_s=0.01)) as daq, pytest.raises(DaqRefused, match=r"0\.02 s"):
         daq.start(50)
+
+
+@pytest.mark.parametrize(("wanted_s", "block"), [(1.0001, 5), (4000.0, 5), (1.61, 800)])
+def test_a_watchdog_that_would_hold_an_output_for_long_is_refused_where_something_moves(
+    wanted_s: float, block: int
+) -> None:
+    longest = "1" if block == 5 else r"1\.6"  # 10 blocks of 0.16 s
+    options = WireOptions(watchdog_s=wanted_s)
+    with (
+        MemoryDAQ(bench_with(), 0, options, simulated=0) as daq,
+        pytest.raises(DaqRefused, match=rf"driver\.options\.watchdog_s = {wanted_s:g}: allowed is up to {longest} s"),
+    ):
+        daq.start(block)
+    with MemoryDAQ(bench_with(), 0, options) as daq:
+        daq.start(block)
+    with MemoryDAQ(bench_with(), 0, WireOptions(watchdog_s=1.0), simulated=0) as daq:
+        daq.start(block)
+
+
+@pytest.mark.parametrize(("shortest_s", "starts"), [(0.5, True), (30.0, False)])
+def test_a_device_that_cannot_wait_as_short_as_usual_is_remarked_and_refused_where_it_is_too_long(
+    shortest_s: float, starts: bool
+) -> None:
+    daq = MemoryDAQ(bench_with(), 0, simulated=0)
+    daq.device.words[Parameter.SHORTEST_WATCHDOG_US, 0] = round(1e6 * shortest_s)
+    with daq:
+        assert any(f"waits {shortest_s:g} s" in remark and "usual 0.1 s" in remark for remark in daq.remarks)
+        if starts:
+            daq.start(5)
+        else:
+            with pytest.raises(
+                DaqRefused, match=r"watchdog_s = 30, the shortest that the device can do: allowed .* 1 s"
+            ):
+                daq.start(5)
+    with MemoryDAQ(bench_with(), 0, simulated=0) as daq:
+        assert not any("watchdog" in remark for remark in daq.remarks)
 
 
 def test_round_trips_are_measured_before_and_during_the_run() -> None:

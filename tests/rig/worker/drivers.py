@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from rig.daq import Capabilities
 from rig.drivers.virtual import VirtualDAQ
-from rig.errors import DaqBusy, DaqDisconnected
+from rig.errors import DaqBusy, DaqDisconnected, DaqWatchdog
 
-OURS = ("log", "fails_after", "fails_with", "busy", "paced", "lockstep", "hangs_after", "opens_in_s")
+OURS = ("log", "fails_after", "fails_with", "busy", "paced", "lockstep", "hangs_after", "opens_in_s", "latched")
 
 
 class NotingDAQ(VirtualDAQ):
@@ -34,6 +34,18 @@ class NotingDAQ(VirtualDAQ):
     @property
     def identity(self):
         return {"model": "virtual rig with a log"}
+
+    @property
+    def latched(self):
+        return self.ours.get("latched", "")
+
+    def clear(self):
+        self.ours["latched"] = ""
+
+    def _start(self):
+        if self.latched:
+            raise DaqWatchdog(self.latched)
+        super()._start()
 
     def _open(self):
         if self.ours.get("busy"):

@@ -231,3 +231,11 @@ def test_a_law_of_the_script_s_own_is_refused_in_a_line_that_says_where_to_put_i
         pytest.raises(ConfigurationError, match=r"OwnLaw.*must be defined in a module"),
     ):
         session.start(settings)
+
+
+def test_what_the_device_had_latched_is_told_by_the_session_and_cleared_by_its_start(noting):
+    with WorkerSession(slow_bench(latched="the watchdog had latched"), privileged=False) as session:
+        assert session.latched == "the watchdog had latched"
+        rows, loop = ran(session, tone(slow_bench(), 0.1))
+    assert loop.failure is None
+    assert rows.size > 0

@@ -211,6 +211,21 @@ def test_of_a_late_output_the_rest_is_used_and_the_last_value_held_before() -> N
     assert [samples.flags for samples in bench.link.of(Samples)] == [0, 0, 0, DeviceFlag.OUTPUT_HELD]
 
 
+@pytest.mark.parametrize(("late_samples", "state"), [(10, DeviceState.LATCHED), (9, DeviceState.ARMED)])
+def test_a_host_that_is_late_with_every_sample_for_ever_ends_by_the_watchdog(
+    late_samples: int, state: DeviceState
+) -> None:
+    bench = Bench()
+    bench.armed()
+    bench.pass_time((late_samples - 0.5) / RATE_HZ)  # so many instants have passed
+    for block in range(20):
+        bench.put(block * BLOCK, 1.0)
+        bench.pass_time(BLOCK / RATE_HZ)
+    assert bench.device.state is state
+    late = sum(samples.flags & DeviceFlag.OUTPUT_HELD > 0 for samples in bench.link.of(Samples))
+    assert late > 5
+
+
 @pytest.mark.parametrize("ramp_s", [0.0, 0.0333, 0.05])
 def test_the_watchdog_ramps_the_output_down_from_its_very_instant_and_latches(ramp_s: float) -> None:
     bench = Bench()

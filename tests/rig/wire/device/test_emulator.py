@@ -82,6 +82,8 @@ def test_its_emergency_stop_reaches_the_host_and_its_end_is_an_unplugged_cable()
             with pytest.raises(DaqEmergencyStop):
                 exchange_for(daq, 10.0)
         with make_daq(emulator.bench) as daq:
+            assert daq.latched == "the device's emergency stop had latched"
+            daq.clear()
             daq.start(5)
             daq.exchange(np.zeros(5))
             emulator.stop()

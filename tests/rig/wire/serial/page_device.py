@@ -118,7 +118,8 @@ class Device:
             first, *counts = struct.unpack(f"<4xQ{self.block}h", payload)
             if first % self.block == 0 and first <= self.index + (self.queue + 2) * self.block:
                 self.outputs |= {first + i: count for i, count in enumerate(counts) if first + i >= self.index}
-                self.fed, self.asked = time.monotonic(), True
+                self.fed = time.monotonic() if first + self.block > self.index else self.fed
+                self.asked = True
         elif kind == 6 and len(payload) == 5:
             self.latch(EMERGENCY_FLAG)
 

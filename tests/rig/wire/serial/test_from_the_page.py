@@ -96,14 +96,18 @@ def test_it_says_who_it_is(port):
         assert daq.capabilities.largest_block == page_device.LIMITS[page_device.BLOCK][1]
 
 
-def test_its_watchdog_is_told_with_its_error_and_cleared_by_the_next_start(port):
+def test_its_watchdog_is_told_with_its_error_and_cleared_when_it_is_asked_to(port):
     with make_daq(bench_at(port, watchdog_s=0.3)) as daq:
         daq.start(10)
         daq.exchange(np.full(10, 1.0))
         time.sleep(0.5)  # a host that does nothing is the subject
         with pytest.raises(DaqWatchdog):
             any(daq.exchange(np.full(10, 1.0)) is None for _ in range(400))
-        daq.stop()
+    with daq:
+        assert daq.latched == "the device's watchdog had latched"
+        with pytest.raises(DaqWatchdog, match="had latched"):
+            daq.start(10)
+        daq.clear()
         daq.start(10)
         assert np.isfinite(daq.exchange(np.zeros(10))).all()
 
