@@ -37,6 +37,10 @@ def suspended_s() -> float:
     return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
+def _own(error: Exception) -> DaqError:
+    return DaqError(f"the driver has failed: {type(error).__name__}: {error}")
+
+
 class WallClockLoop:
     """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
 
@@ -88,9 +92,20 @@ class WallClockLoop:
             slot = self._memory.to_fill()
             rows = self._fill(slot)
             over = self.failure is not None or self.tick.over
+            if over:
+                self.stop()  # before anything else: the rows can wait
             self._hand_over(slot, rows, _now() - began)
         self._announce()
         self.disturbances = since(before)
+
+    def stop(self) -> None:
+        """Stop the device, with which its output is at 0 V; an error of it is the loop's failure unless there is one."""
+        try:
+            self.daq.stop()
+        except DaqError as error:
+            self.failure = self.failure or error
+        except Exception as error:
+            self.failure = self.failure or _own(error)
 
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; returns the rows that it holds."""
@@ -112,7 +127,7 @@ class WallClockLoop:
                 self._fail(error)
                 return first
             except Exception as error:  # a driver that fails in its own way: the rows so far are kept all the same
-                self._fail(DaqError(f"the driver has failed: {type(error).__name__}: {error}"))
+                self._fail(_own(error))
                 return first
             begun = _now() if by_device else begun
             end = first + block

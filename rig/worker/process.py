@@ -78,12 +78,11 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         daq.start(bench.block)
         loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
-        loop.run()
-        statistics = _statistics(loop, said)
         try:
-            daq.stop()
-        except DaqError as error:
-            loop.failure = loop.failure or error
+            loop.run()
+        finally:
+            loop.stop()
+        statistics = _statistics(loop, said)
     failure = None if loop.failure is None else described(loop.failure)
     facts.send(("ended", failure, loop.cause, dict(daq.counters), statistics))
 

@@ -114,3 +114,24 @@ def test_a_stop_by_a_signal_is_recorded_with_its_name(tmp_path, noting):
         assert campaign.wait(30.0) == 0
     with rig.Recording(output) as recording:
         assert recording.parts[-1].end["text"] == "stopped by request (SIGTERM)"
+
+
+def test_after_a_drop_the_device_is_told_before_the_campaign(noting, monkeypatch):
+    loop = loop_here(slow_bench(fails_after=30), tone(slow_bench(), 60.0))
+    order = []
+    monkeypatch.setattr(loop._memory, "publish", lambda: order.append("rows"))
+    monkeypatch.setattr(loop.daq, "_stop", lambda: order.append("stop"))
+    loop.run()
+    assert order[-2:] == ["stop", "rows"]
+    assert order.count("stop") == 1
+
+
+def test_an_error_of_the_last_stop_is_the_failure_of_a_loop_without_another():
+    loop = loop_here(slow_bench(), tone(slow_bench(), 0.1))
+
+    def stop():
+        raise DaqError("no answer to STOP")
+
+    loop.daq._stop = stop
+    loop.run()
+    assert str(loop.failure) == "no answer to STOP"
