@@ -118,6 +118,8 @@ class WallClockLoop:
                 tick.request_stop()
             if first in chores:
                 chores[first]()
+                if self.failure is not None:  # there may be no room for anything
+                    return first
             self._account()
             pace.wait()
             begun = 0 if by_device else _now()
@@ -150,9 +152,12 @@ class WallClockLoop:
         end_by_driver(self.tick, error)
 
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
-        """Complete a chunk and announce it. Without anybody there the slot is filled again."""
+        """Complete a chunk and announce it.
+
+        Without anybody there the slot is filled again; without room it is one that the campaign may be reading.
+        """
         self._announce()  # the chunk before, where this one ended before it came to it
-        if self._alone:
+        if self._alone or self._memory.free < 1:
             return
         slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns
         counts = list(self.daq.counters.values())[: slot.counters.size]
@@ -183,8 +188,8 @@ class WallClockLoop:
             self._end("the campaign's process is gone")
         elif self._memory.free <= self._memory.layout.reserve and not self._waited_for_room():
             self._end("the campaign did not take its rows, and the output was brought down before any was lost")
-            if self._memory.free < 1:  # it has had the time of a ramp and more
-                self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
+        if not self._alone and self._memory.free < 1:  # it has had the time of a ramp and more
+            self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
         asked = self._asked()
         if asked:
             self._end(asked)
