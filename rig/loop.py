@@ -130,6 +130,8 @@ class Loop:
             done = self._advance(readings, rows)
             self.statistics.busy_s += time.perf_counter() - start
             self.statistics.samples += done
+            if self.daq.wall_clock and self._over():
+                self._stop_device()  # before its rows are taken, which may last
             if self.paced:
                 self._wait_for_the_clock(began)
             self.statistics.wall_s = time.perf_counter() - began
@@ -193,6 +195,12 @@ class Loop:
     def _fail(self, error: DaqError) -> None:
         self.failure = error
         end_by_driver(self.tick, error)
+
+    def _stop_device(self) -> None:
+        try:
+            self.daq.stop()
+        except DaqError as error:
+            self.failure = self.failure or error
 
     def _wait_for_the_clock(self, began: float) -> None:
         early = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()

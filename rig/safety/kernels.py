@@ -7,7 +7,7 @@ from rig.safety.layout import ARMED, DISARMED, OFF, RAMPING, EndReason
 from vibrolock.compiled import Record, kernel
 
 FORCE = 0  # `rig.daq.Role.FORCE`
-OVERTRAVEL_FACTOR = 1.25  # beyond this multiple of the displacement limit a ramp would take too long: drop to 0 V
+OVERTRAVEL_FACTOR = 1.25  # beyond this multiple of a limit a ramp would take too long: drop to 0 V
 
 FORCE_LIMIT = int(EndReason.FORCE_LIMIT)
 RESPONSE_LIMIT = int(EndReason.RESPONSE_LIMIT)
@@ -71,10 +71,19 @@ def watch_input(
     watch.alert = 1 if watch.same_samples > 0 or watch.overload_samples > 0 else 0
     if watch.same_samples >= limits.stuck_samples:
         shut_down(guard, SENSOR_STUCK, index, volts * channel.unit_per_volt, sample, False)
-    if guard.mode == ARMED and abs(volts * channel.unit_per_volt) > channel.limit:
-        reason = FORCE_LIMIT if channel.role == FORCE else RESPONSE_LIMIT
-        shut_down(guard, reason, index, volts * channel.unit_per_volt, sample, False)
+    watch_limit(guard, channel, index, volts * channel.unit_per_volt, sample)
     return True
+
+
+@kernel
+def watch_limit(guard: Record, channel: Record, index: int, value: float, sample: int) -> None:
+    """Check a force or acceleration: beyond its limit it trips, and once a trip's ramp does not help the output drops."""
+    if abs(value) > channel.limit:
+        reason = FORCE_LIMIT if channel.role == FORCE else RESPONSE_LIMIT
+        if guard.mode == ARMED:
+            shut_down(guard, reason, index, value, sample, False)
+        elif guard.mode == RAMPING and guard.reason >= FORCE_LIMIT and abs(value) > OVERTRAVEL_FACTOR * channel.limit:
+            shut_down(guard, reason, index, value, sample, True)
 
 
 @kernel
@@ -110,7 +119,7 @@ def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float
 
 @kernel
 def watch_gap(guard: Record, limits: Record, lost: int, sample: int, dt_s: float) -> None:
-    """Check for how many samples in a row nothing has been seen of the rig."""
+    """Check for how many samples, but for those seen since, nothing has been seen of the rig."""
     if lost >= limits.lost_samples:
         shut_down(guard, SAMPLES_LOST, -1, lost * dt_s, sample, False)
 

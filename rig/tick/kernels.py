@@ -71,8 +71,9 @@ def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
     armed = guard.mode == ARMED
     driven = armed and loop.held == 1
-    # At first the mean of all samples so far: noise or ambient vibration in a single one would be integrated as travel.
-    mean_gain = max(law.mean_gain, 1.0 / (loop.sample + 1.0))
+    # At first the mean of all samples seen so far: noise or ambient vibration in a single one would be integrated as travel.
+    mean_gain = max(law.mean_gain, 1.0 / (loop.seen + 1.0))
+    loop.seen += 1
     flags = 0
     force = 0.0
     drive = 0.0
@@ -203,7 +204,7 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
     if lost:
         flags = pass_over(t, readings, cos_theta, sin_theta)
     else:
-        loop.lost = 0
+        loop.lost = max(loop.lost - 1, 0)  # losses with single good samples in between are a gap as well
         flags = take_in(t, volts, readings)
     if not lost or law.detector != ADAPTIVE:
         demodulate_inputs(t, cos_theta, sin_theta)

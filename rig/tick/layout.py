@@ -68,13 +68,15 @@ LOOP = np.dtype(
         ("waveform", "i8"),
         ("play", "i8"),
         ("lost", "i8"),
+        ("seen", "i8"),
     ]
 )
 """State of oscillator and laws (one record). ``turn``: angle of the complex command U that is put out, ``demanded_turn`` by
 its law, ``turn_behind``: 1 while it cannot rise there as fast as it should, -1 fall; ``displacement``: amplitude of the
 drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at;
 ``late_`` amplitudes that passed one more low-pass, ``rest_`` sizes and phase error as they will be once the response keeps
-still (`rig.tick.laws.frequency.kernels.see_rest`); ``lost``: samples in a row that have not come."""
+still (`rig.tick.laws.frequency.kernels.see_rest`); ``lost``: samples
+that have not come, less those that have since, never below 0; ``seen``: all that have come."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """What the tick has sent out and the inputs have not yet seen; a ring."""

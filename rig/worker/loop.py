@@ -37,6 +37,10 @@ def suspended_s() -> float:
     return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
+def _own(error: Exception) -> DaqError:
+    return DaqError(f"the driver has failed: {type(error).__name__}: {error}")
+
+
 class WallClockLoop:
     """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
 
@@ -88,9 +92,20 @@ class WallClockLoop:
             slot = self._memory.to_fill()
             rows = self._fill(slot)
             over = self.failure is not None or self.tick.over
+            if over:
+                self.stop()  # before anything else: the rows can wait
             self._hand_over(slot, rows, _now() - began)
         self._announce()
         self.disturbances = since(before)
+
+    def stop(self) -> None:
+        """Stop the device, with which its output is at 0 V; an error of it is the loop's failure unless there is one."""
+        try:
+            self.daq.stop()
+        except DaqError as error:
+            self.failure = self.failure or error
+        except Exception as error:
+            self.failure = self.failure or _own(error)
 
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; returns the rows that it holds."""
@@ -103,6 +118,8 @@ class WallClockLoop:
                 tick.request_stop()
             if first in chores:
                 chores[first]()
+                if self.failure is not None:  # there may be no room for anything
+                    return first
             self._account()
             pace.wait()
             begun = 0 if by_device else _now()
@@ -112,7 +129,7 @@ class WallClockLoop:
                 self._fail(error)
                 return first
             except Exception as error:  # a driver that fails in its own way: the rows so far are kept all the same
-                self._fail(DaqError(f"the driver has failed: {type(error).__name__}: {error}"))
+                self._fail(_own(error))
                 return first
             begun = _now() if by_device else begun
             end = first + block
@@ -135,9 +152,12 @@ class WallClockLoop:
         end_by_driver(self.tick, error)
 
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
-        """Complete a chunk and announce it. Without anybody there the slot is filled again."""
+        """Complete a chunk and announce it.
+
+        Without anybody there the slot is filled again; without room it is one that the campaign may be reading.
+        """
         self._announce()  # the chunk before, where this one ended before it came to it
-        if self._alone:
+        if self._alone or self._memory.free < 1:
             return
         slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns
         counts = list(self.daq.counters.values())[: slot.counters.size]
@@ -168,8 +188,8 @@ class WallClockLoop:
             self._end("the campaign's process is gone")
         elif self._memory.free <= self._memory.layout.reserve and not self._waited_for_room():
             self._end("the campaign did not take its rows, and the output was brought down before any was lost")
-            if self._memory.free < 1:  # it has had the time of a ramp and more
-                self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
+        if not self._alone and self._memory.free < 1:  # it has had the time of a ramp and more
+            self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
         asked = self._asked()
         if asked:
             self._end(asked)

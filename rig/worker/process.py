@@ -69,24 +69,40 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
     with make_daq(bench, seed) as daq:
         facts.send(("opened", daq.capabilities, dict(daq.identity), daq.latched, daq.remarks, dict(daq.counters)))
         _, settings, ring_s = _told(commands)
-        trial = settings.build(0.0)
-        layout = Layout.of(bench, trial.arrays, len(daq.counters), ring_s)
-        memory = SharedMemory(descriptor, layout, create=True)
+        presumed = _presumed_latency(daq, bench)
+        layout, memory = _shared(daq, settings, presumed, ring_s, descriptor)
         _load_kernels(daq, bench, settings)
         came = _listen()
         said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")  # in no hurry, and never asleep
         daq.clear()
         daq.start(bench.block)
+        if daq.latency_samples > presumed:
+            layout, memory = _shared(daq, settings, daq.latency_samples, ring_s, descriptor)
         loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
-        loop.run()
-        statistics = _statistics(loop, said)
         try:
-            daq.stop()
-        except DaqError as error:
-            loop.failure = loop.failure or error
+            loop.run()
+        finally:
+            loop.stop()
+        statistics = _statistics(loop, said)
     failure = None if loop.failure is None else described(loop.failure)
     facts.send(("ended", failure, loop.cause, dict(daq.counters), statistics))
+
+
+def _presumed_latency(daq: DAQ, bench: Bench) -> float:
+    """Samples from output to input as far as they can be told before the device is started: queue, hold and filters."""
+    queue = bench.driver.options.get("queue_blocks", 1)
+    queue = queue if isinstance(queue, int) else 1
+    return queue * bench.block + 1.0 + daq.filter_delay_samples
+
+
+def _shared(
+    daq: DAQ, settings: TickSettings, latency_samples: float, ring_s: float, descriptor: int
+) -> tuple[Layout, SharedMemory]:
+    """The shared block, with room for a ramp and all that is under way in the device behind it."""
+    arrays = settings.build(latency_samples).arrays
+    layout = Layout.of(settings.bench, arrays, len(daq.counters), ring_s)
+    return layout, SharedMemory(descriptor, layout, create=True)
 
 
 def _begin(

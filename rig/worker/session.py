@@ -1,6 +1,7 @@
 """A bench whose driver and loop live in a process of their own, as a campaign sees it."""
 
 import pickle
+import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from types import TracebackType
@@ -49,6 +50,7 @@ class WorkerLoop:
         self.statistics = LoopStatistics(bench.sample_rate_hz)
         self.ended = False
         self._worker, self._memory = worker, SharedMemory(worker.memory, layout)
+        self._ramp_down_s = bench.limits.ramp_down_s
         self._silence_s = max(LONGEST_SILENCE_S, 50 * bench.block / bench.sample_rate_hz)
         self._said: dict[str, Any] = {}
 
@@ -82,18 +84,16 @@ class WorkerLoop:
         facts = self._worker.facts
         try:
             if not facts.poll(self._silence_s):
-                self._worker.end(HUNG_S)
-                return partial(self._fail, DaqError(self._silent_text()))
+                left = self._worker.end(HUNG_S + self._ramp_down_s)
+                return partial(self._fail, DaqError(self._silent_text(left)))
             said = facts.recv_bytes()
         except (EOFError, OSError):
             return partial(self._fail, self._worker.ended())
         return None if said == CHUNK_DONE else partial(self._finish, said)
 
-    def _silent_text(self) -> str:
-        return (
-            f"the loop's process has been silent for {self._silence_s:g} s and was ended: its driver hangs; "
-            "the device's own watchdog brings its output to 0 V"
-        )
+    def _silent_text(self, left: str) -> str:
+        how = left or "the loop's process was ended; the device's own watchdog brings its output to 0 V"
+        return f"the loop's process has been silent for {self._silence_s:g} s: its driver hangs; {how}"
 
     def _take(self) -> np.ndarray:
         slot = self._memory.to_take()
@@ -174,7 +174,9 @@ class WorkerSession:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Ramp down what still runs, and wait for it."""
-        patience_s = PATIENCE_S if self._loop is None else PATIENCE_S + self._bench.limits.ramp_down_s
+        patience_s = PATIENCE_S + self._bench.limits.ramp_down_s  # it may run although nobody was told any more
         if self._loop is not None and not self._loop.ended:
             self._loop.request_stop()
-        self._worker.close(patience_s)
+        left = self._worker.close(patience_s)
+        if left:
+            warnings.warn(left, RuntimeWarning, stacklevel=2)

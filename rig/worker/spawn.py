@@ -14,6 +14,8 @@ from rig.worker.memory import anonymous_file
 
 __all__ = ["Worker", "ask", "rebuilt", "supported"]
 
+KILLED = "the loop's process was killed; only the device's watchdog has acted"
+
 
 def supported() -> bool:
     """Whether this system can have a loop process: descriptors must be inherited."""
@@ -79,21 +81,24 @@ class Worker:
         how = signal.Signals(-status).name if status < 0 else f"status {status}"
         return DaqError(f"the loop's process has ended ({how}); the device's own watchdog brings its output to 0 V")
 
-    def end(self, patience_s: float) -> None:
-        """Ask it to end, then make it."""
-        for action in (self._process.terminate, self._process.kill):
+    def end(self, patience_s: float) -> str:
+        """Ask it to end, then make it. Returns in a sentence what could not be done in order; empty if it ended by itself."""
+        for action, said in ((self._process.terminate, ""), (self._process.kill, KILLED)):
             action()
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(patience_s)
-                break
+                return said
+        return f"{KILLED}, and it is there still as process {self.pid}"
 
-    def close(self, patience_s: float) -> None:
-        """Let it end by itself for a while, then make it."""
+    def close(self, patience_s: float) -> str:
+        """Let it end by itself for a while, then make it; returns what `end` does."""
         self._commands.close()
         try:
             self._process.wait(patience_s)
         except subprocess.TimeoutExpired:
-            self.end(patience_s)
+            return self.end(patience_s)
+        else:
+            return ""
         finally:
             self.facts.close()
             os.close(self.memory)

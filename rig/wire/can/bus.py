@@ -121,7 +121,7 @@ class PythonCanBus(FrameBus):
         left_s = timeout_s  # the same time after time: backends are slow to change it
         while True:
             try:
-                self._bus.send(message, timeout=left_s or None)
+                self._bus.send(message, timeout=left_s)
                 return True
             except (can.CanError, OSError) as error:
                 if _code(error) in _GONE:

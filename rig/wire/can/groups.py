@@ -11,6 +11,7 @@ OPEN_BLOCKS = 4
 
 
 _NEVER = 1 << 30
+INDICES = 1 << 32  # a frame has 32 bits for the index of a sample
 
 
 class _Open:
@@ -48,8 +49,10 @@ class Blocks:
         self._oldest, self._next = block, block * self._per_block
 
     def mark(self, sample: int) -> None:
-        """Somebody who knows says that this sample is next. Believed if it cannot be told from the sequence numbers."""
+        """Somebody who knows says that this sample, modulo 2^32, is next. Believed if the sequence numbers cannot tell it."""
         n = self._shape[0]
+        here = self._next // self._per_block * n
+        sample += INDICES * round((here - sample) / INDICES)
         group = sample // n * self._per_block
         far = sample % n == 0 and group - self._next >= self._wrap // 2
         self._mark = group if far else None

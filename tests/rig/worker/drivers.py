@@ -6,11 +6,22 @@ import time
 from pathlib import Path
 from typing import ClassVar
 
-from rig.daq import Capabilities
+from rig.daq import Capabilities, State
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqBusy, DaqDisconnected, DaqWatchdog
 
-OURS = ("log", "fails_after", "fails_with", "busy", "paced", "lockstep", "hangs_after", "opens_in_s", "latched")
+OURS = (
+    "log",
+    "fails_after",
+    "fails_with",
+    "busy",
+    "paced",
+    "lockstep",
+    "hangs_after",
+    "opens_in_s",
+    "latched",
+    "late_blocks",
+)
 
 
 class NotingDAQ(VirtualDAQ):
@@ -30,6 +41,11 @@ class NotingDAQ(VirtualDAQ):
     def capabilities(self):
         paced = bool(self.ours.get("paced"))
         return Capabilities(largest_block=1000, paced=paced, virtual=True, repeatable=bool(self.ours.get("lockstep")))
+
+    @property
+    def latency_samples(self):
+        later = self.ours.get("late_blocks", 0) * self.block if self.state is State.RUNNING else 0
+        return super().latency_samples + later
 
     @property
     def identity(self):

@@ -15,8 +15,10 @@ import rig.worker.session
 from rig.errors import DaqError
 from rig.safety.layout import GuardMode
 from rig.worker.loop import WallClockLoop
-from rig.worker.memory import Layout, SharedMemory, anonymous_file, packed
+from rig.worker.memory import PUBLISHED, Layout, SharedMemory, anonymous_file, packed
+from rig.worker.process import _presumed_latency, _shared
 from rig.worker.session import WorkerSession
+from rig.worker.spawn import Worker
 from tests.rig.worker.drivers import NotingDAQ
 from tests.rig.worker.rigs import slow_bench, tone
 from tests.rig.worker.test_worker import ROOT, is_there, ramped, ran
@@ -51,7 +53,8 @@ def test_a_driver_that_hangs_is_noticed_and_its_process_ended(noting, monkeypatc
         _, loop = ran(session, tone(slow_bench(), 60.0))
         assert not is_there(session.pid)
     assert type(loop.failure) is DaqError
-    assert "silent for 1 s and was ended" in str(loop.failure)
+    assert "silent for 1 s: its driver hangs" in str(loop.failure)
+    assert "was killed; only the device's watchdog has acted" in str(loop.failure)
     assert loop.tick.guard["mode"][0] == GuardMode.OFF
 
 
@@ -114,3 +117,94 @@ def test_a_stop_by_a_signal_is_recorded_with_its_name(tmp_path, noting):
         assert campaign.wait(30.0) == 0
     with rig.Recording(output) as recording:
         assert recording.parts[-1].end["text"] == "stopped by request (SIGTERM)"
+
+
+def test_after_a_drop_the_device_is_told_before_the_campaign(noting, monkeypatch):
+    loop = loop_here(slow_bench(fails_after=30), tone(slow_bench(), 60.0))
+    order = []
+    monkeypatch.setattr(loop._memory, "publish", lambda: order.append("rows"))
+    monkeypatch.setattr(loop.daq, "_stop", lambda: order.append("stop"))
+    loop.run()
+    assert order[-2:] == ["stop", "rows"]
+    assert order.count("stop") == 1
+
+
+def test_an_error_of_the_last_stop_is_the_failure_of_a_loop_without_another():
+    loop = loop_here(slow_bench(), tone(slow_bench(), 0.1))
+
+    def stop():
+        raise DaqError("no answer to STOP")
+
+    loop.daq._stop = stop
+    loop.run()
+    assert str(loop.failure) == "no answer to STOP"
+
+
+def reserve_s(layout):
+    return layout.reserve * layout.chunk / 1000.0
+
+
+def test_the_ring_has_room_for_the_ramp_and_what_is_under_way_in_the_device():
+    bench = slow_bench(queue_blocks=8)
+    daq = NotingDAQ(bench)
+    daq.open()
+    presumed = _presumed_latency(daq, bench)
+    layout, _ = _shared(daq, tone(bench, 1.0), presumed, 1.0, anonymous_file())
+    daq.start(bench.block)
+    assert presumed >= daq.latency_samples > 80
+    assert reserve_s(layout) >= 0.3 + 0.09 + 0.04  # ramp, queue and block, two chunks under way
+
+
+def test_a_latency_known_only_once_the_device_runs_is_made_room_for(noting):
+    with WorkerSession(slow_bench(late_blocks=40)) as session:
+        rows, loop = ran(session, tone(slow_bench(), 0.1))
+        assert reserve_s(loop._memory.layout) >= 0.3 + 0.4
+    assert loop.failure is None
+    assert rows.size == loop.statistics.samples > 400
+
+
+def test_a_full_ring_ends_the_loop_and_nothing_is_written_where_the_campaign_may_read(noting):
+    loop = loop_here(slow_bench(), tone(slow_bench(), 60.0))
+    memory = loop._memory
+    slots = memory.words[PUBLISHED] = memory.layout.slots
+    for slot in memory._slots:
+        slot.head[:] = -7
+    loop.run()
+    assert "no room for more" in str(loop.failure)
+    assert memory.published == slots
+    assert all((slot.head == -7).all() and not slot.rows["guard"].any() for slot in memory._slots)
+    assert loop.daq.blocks == 0
+    assert loop.daq.state.value == "open"  # stopped
+
+
+class Stubborn:
+    """A process that ends for no signal, or for the second one only."""
+
+    pid = 4711
+
+    def __init__(self, ends_when_killed):
+        self.ends_when_killed, self.killed, self.waited = ends_when_killed, False, []
+
+    def terminate(self):
+        pass
+
+    def kill(self):
+        self.killed = True
+
+    def wait(self, timeout):
+        self.waited.append(timeout)
+        if not (self.killed and self.ends_when_killed):
+            raise subprocess.TimeoutExpired("loop", timeout)
+
+
+@pytest.mark.parametrize(("killable", "said"), [(True, "has acted$"), (False, "there still as process 4711")])
+def test_a_process_that_had_to_be_killed_is_said_at_the_end_of_the_session(monkeypatch, killable, said):
+    process, bench = Stubborn(killable), slow_bench()
+    worker = object.__new__(Worker)
+    worker._process, worker.memory = process, anonymous_file()
+    worker._commands = worker.facts = SimpleNamespace(close=lambda: None)
+    session = object.__new__(WorkerSession)
+    session._bench, session._loop, session._worker = bench, None, worker
+    with pytest.warns(RuntimeWarning, match="was killed; only the device's watchdog.*" + said):
+        session.__exit__(None, None, None)
+    assert min(process.waited) >= rig.worker.session.PATIENCE_S + bench.limits.ramp_down_s  # it may run unheard of

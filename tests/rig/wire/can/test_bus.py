@@ -119,3 +119,12 @@ def test_a_link_sends_and_receives_whole_messages(bus: PythonCanBus) -> None:
     bus._bus.received = [can.Message(arbitration_id=0x011, is_extended_id=False, data=bytes((1, 2, 3, 4, 5, 0, 0, 0)))]
     assert link.receive(0.1) == Heartbeat(1, 2, 3, 5, 4)
     assert link.layout_crc != 0
+
+
+def test_a_send_whose_time_is_over_is_tried_once_and_does_not_wait_for_ever(
+    bus: PythonCanBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waited: list[float | None] = []
+    monkeypatch.setattr(bus._bus, "send", lambda message, timeout: waited.append(timeout))
+    assert bus.send(Frame(0x101, b""), 0.0)
+    assert waited == [0.0]  # None would be for ever

@@ -266,3 +266,20 @@ def test_frames_of_ones_own_that_a_bus_returns_are_counted_apart() -> None:
     assert host._counters["own_frames"] == 3  # with the index of the first output
     assert host._counters["foreign_frames"] == 0
     assert device.decode(device.encode(Answer(1, 0))[0]) is None
+
+
+@pytest.mark.parametrize(("n_channels", "fd", "n"), BUSES)
+def test_a_loss_is_put_right_where_the_index_of_32_bits_begins_anew(n_channels: int, fd: bool, n: int) -> None:
+    device, host = ends(n_channels, fd, n)
+    shape = host.protocol.shape
+    wrap = shape.wrap // -(-n // shape.rows)  # in blocks
+    start = (1 << 32) // n - wrap
+    host._incoming.begin(start)
+    numbers = range(start, start + 5 * wrap)
+    blocks = sent(device, numbers, n, n_channels)
+    kept = [*range(wrap // 3), *range(3 * wrap + 1, 5 * wrap)]
+    got = received(host, flat([blocks[k] for k in kept]))
+    assert [samples.first for samples in got[: wrap // 3]] == [j * n for j in numbers[: wrap // 3]]
+    assert got[-1].first == numbers[-1] * n > 1 << 32
+    assert [samples.first for samples in got] == sorted(samples.first for samples in got)
+    assert host._counters["resynchronised"] == 1
