@@ -1,6 +1,6 @@
 """Arming: who has let something physical move. A virtual rig arms itself, any other bench is armed by a person."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -61,7 +61,7 @@ def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]
     if session.capabilities.virtual:
         return {"how": "virtual", "by": "", "at": now(), "cautions": []}
     memory = memory_of(bench)
-    cautions = cautions_of(bench, memory, what)
+    cautions = cautions_of(bench, memory, what, session.identity)
     how = _how(ArmingRequest(bench, what, session.identity, memory, cautions), arm)
     if memory.trip is not None and how != "automated":
         remember(bench, trip=None)
@@ -87,7 +87,7 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
     )
 
 
-def cautions_of(bench: Bench, memory: BenchMemory, what: str) -> tuple[str, ...]:
+def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str]) -> tuple[str, ...]:
     """What speaks against arming: a trip that nobody has looked at; no check, or one that does not count."""
     out = []
     if memory.trip is not None:
@@ -100,10 +100,13 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str) -> tuple[str, ...]
         return tuple(out)
     if check.failed:
         out.append(f"the last check failed: {', '.join(check.failed)}")
-    if _age_h(check.at) > bench.arming.check_valid_h:
-        out.append(f"the last check is {_age_h(check.at):.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
-    if check.fingerprint != fingerprint(bench):
-        out.append("the last check was of other channels, another rate or another driver")
+    age_h = _age_h(check.at)
+    if age_h < 0.0:
+        out.append(f"the last check lies {-age_h:.1f} h ahead of the clock of this computer, so its age is not known")
+    if age_h > bench.arming.check_valid_h:
+        out.append(f"the last check is {age_h:.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
+    if check.fingerprint != fingerprint(bench, identity):
+        out.append("the last check was of other channels, another rate, another driver or another device")
     return tuple(out)
 
 

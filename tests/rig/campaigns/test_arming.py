@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 import rig
+from rig.bench import Bench
 from rig.campaigns.about import About
 from rig.campaigns.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.check.check import check
@@ -20,6 +21,7 @@ from tests.rig.check.rewired import flipped, rewire
 from tests.rig.rigs import bench_with
 from tests.rig.test_runs import plan_with
 
+DEVICE = {"serial_number": "7"}
 PLAN = plan_with(levels_v=(0.4,), record_periods=4)
 
 
@@ -42,7 +44,7 @@ def bench(**arming):
 
 def passed(chosen, hours_ago=0.0, failed=()):
     at = datetime.now(UTC) - timedelta(hours=hours_ago)
-    return RememberedCheck(at.isoformat(), failed, "check.h5", fingerprint(chosen))
+    return RememberedCheck(at.isoformat(), failed, "check.h5", fingerprint(chosen, DEVICE))
 
 
 def armed(run):
@@ -71,7 +73,7 @@ def test_a_word_given_beforehand_arms_and_is_recorded_with_what_spoke_against_it
         assert run.complete
         assert (armed(run)["how"], armed(run)["by"]) == ("switch", "Ada")
         assert "never checked" in armed(run)["cautions"][0]
-        assert run.recording.parts[0].information["about"]["device"]["serial number"] == "7"
+        assert run.recording.parts[0].information["about"]["device"]["serial_number"] == "7"
 
 
 @pytest.mark.usefixtures("physical")
@@ -80,7 +82,7 @@ def test_a_person_is_shown_bench_device_limits_and_check_and_types_the_name(monk
     with rig.run(PLAN, bench=bench(), arm=ask) as run:
         assert armed(run)["how"] == "person"
     shown = capsys.readouterr().err
-    for part in ("beam next door", "serial number 7", "9.5 V, 40 N", "never", "CAUTION"):
+    for part in ("beam next door", "serial_number 7", "9.5 V, 40 N", "never", "CAUTION"):
         assert part in shown
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
     with pytest.raises(NotArmed, match="nothing has moved"):
@@ -94,7 +96,9 @@ def test_a_person_is_shown_bench_device_limits_and_check_and_types_the_name(monk
         (lambda b: passed(b), None),
         (lambda b: passed(b, failed=("polarity drive",)), "failed: polarity drive"),
         (lambda b: passed(b, hours_ago=25.0), "25.0 h old"),
+        (lambda b: passed(b, hours_ago=-2.0), "2.0 h ahead of the clock"),
         (lambda b: replace(passed(b), fingerprint="another"), "other channels"),
+        (lambda b: replace(passed(b), fingerprint=fingerprint(b, {"serial_number": "8"})), "another device"),
     ],
 )
 def test_an_automated_bench_arms_itself_only_with_a_check_that_counts(remembered, caution):
@@ -154,7 +158,7 @@ def test_a_check_needs_arming_and_is_remembered_with_what_failed(tmp_path, monke
     memory = memory_of(bench())
     assert memory.check.failed == ("polarity acc_magnet",)
     assert memory.check.recording == str(tmp_path / "check.h5")
-    assert memory.check.fingerprint == fingerprint(bench())
+    assert memory.check.fingerprint == fingerprint(bench(), DEVICE)
 
 
 @pytest.mark.usefixtures("physical")
@@ -210,3 +214,15 @@ def test_a_day_that_is_none_is_refused(key):
 def test_text_that_is_no_line_is_refused():
     with pytest.raises(ConfigurationError, match="note = "):
         About(notes=("two\nlines",))
+
+
+def test_a_check_counts_for_one_device_and_one_emergency_stop_behind_any_port():
+    channels = list(bench_with().model_dump()["channels"])
+    channels.append({"name": "estop", "role": "monitor", "unit": "V", "sensitivity_v_per_unit": 1.0})
+    table = bench_with({"channels": channels}).model_dump()
+    one, other = (
+        Bench.model_validate({**table, "emergency_stop": {"channel": "estop", "below_v": v}}) for v in (2.5, 0.1)
+    )
+    assert fingerprint(one, DEVICE) != fingerprint(other, DEVICE)
+    assert fingerprint(one, DEVICE) != fingerprint(one, {"serial_number": "8"})
+    assert fingerprint(one, DEVICE) == fingerprint(one, {**DEVICE, "port": "elsewhere", "boot": "2"})
