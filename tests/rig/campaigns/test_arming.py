@@ -13,7 +13,9 @@ from rig.campaigns.about import About
 from rig.campaigns.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.check.check import check
 from rig.cli_arming import ask
-from rig.errors import ConfigurationError, NotArmed
+from rig.errors import ConfigurationError, DaqDisconnected, DaqRefused, NotArmed, RecordingError
+from rig.recording.journal import journal_path
+from rig.session import LocalSession
 from rig.summary import summarise
 from rig.tables import print_summary
 from rig.tuning.tuning import tune
@@ -226,3 +228,126 @@ def test_a_check_counts_for_one_device_and_one_emergency_stop_behind_any_port():
     assert fingerprint(one, DEVICE) != fingerprint(other, DEVICE)
     assert fingerprint(one, DEVICE) != fingerprint(one, {"serial_number": "8"})
     assert fingerprint(one, DEVICE) == fingerprint(one, {**DEVICE, "port": "elsewhere", "boot": "2"})
+
+
+class Started:
+    """A session whose device is started as wanted; notes what was there at that moment."""
+
+    def __init__(self, monkeypatch, then):
+        self.seen, real = [], LocalSession.start
+
+        def start(session, settings):
+            self.seen.append(memory_of(settings.bench).trip)
+            return then(real, session, settings)
+
+        monkeypatch.setattr(LocalSession, "start", start)
+
+
+def as_ever(real, session, settings):
+    return real(session, settings)
+
+
+def refused(real, session, settings):
+    raise DaqRefused("no room on the bus")
+
+
+def failing_at_stop(real, session, settings):
+    """A loop whose driver fails when it is stopped, once all rows are there."""
+    loop = real(session, settings)
+    rows = loop.run
+
+    def run():
+        yield from rows()
+        loop.failure = DaqDisconnected("gone while it was stopped")
+
+    loop.run = run
+    return loop
+
+
+@pytest.mark.usefixtures("physical")
+def test_while_something_physical_runs_that_is_remembered_and_an_orderly_end_takes_it_back(monkeypatch):
+    started = Started(monkeypatch, as_ever)
+    with rig.run(PLAN, bench=bench(), arm=True):
+        assert "its end was never noted" in started.seen[0].text
+        assert memory_of(bench()).trip is None
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_stop_by_request_is_an_orderly_end(monkeypatch):
+    def stopped(real, session, settings):
+        loop = real(session, settings)
+        loop.request_stop("enough")
+        return loop
+
+    Started(monkeypatch, stopped)
+    with rig.run(PLAN, bench=bench(), arm=True) as run:
+        assert run.recording.parts[-1].end["text"] == "enough"
+    assert memory_of(bench()).trip is None
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_campaign_that_dies_leaves_a_caution(monkeypatch, tmp_path):
+    def dies(real, session, settings):
+        loop = real(session, settings)
+        loop.run = lambda: (_ for _ in ()).throw(SystemExit(9))
+        return loop
+
+    Started(monkeypatch, dies)
+    with pytest.raises(SystemExit):
+        rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True)
+    with pytest.raises(NotArmed, match=r"a run into .*run\.h5 was under way"):
+        rig.run(PLAN, bench=bench(automated=True, require_check=False))
+
+
+@pytest.mark.usefixtures("physical")
+def test_where_nothing_can_be_remembered_nothing_moves(monkeypatch, tmp_path):
+    memory_path(bench()).with_name(memory_path(bench()).name + ".part").mkdir(parents=True)
+    started = Started(monkeypatch, as_ever)
+    output = tmp_path / "run.h5"
+    with pytest.raises(RecordingError, match="cannot be written"):
+        rig.run(PLAN, bench=bench(), output=output, arm=True)
+    assert not started.seen
+    assert not output.exists()
+    assert not journal_path(output).exists()
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_driver_that_fails_when_it_is_stopped_has_not_completed_and_is_remembered(monkeypatch):
+    Started(monkeypatch, failing_at_stop)
+    with rig.run(PLAN, bench=bench(), arm=True) as run:
+        end = run.recording.parts[-1].end
+        assert not run.complete
+        assert (end["completed"], end["reason"], end["tripped"]) == (False, "driver_failed", True)
+        assert end["text"] == "the plan was carried out, but the driver failed at the end: gone while it was stopped"
+    assert memory_of(bench()).trip.text == "gone while it was stopped"
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_start_that_fails_leaves_the_earlier_recording_its_journal_and_no_trip(monkeypatch, tmp_path):
+    output = tmp_path / "run.h5"
+    with rig.run(PLAN, bench=bench(), output=output, arm=True):
+        pass
+    journal_path(output).write_bytes(b"left by an earlier run")
+    before = output.read_bytes()
+    Started(monkeypatch, refused)
+    with pytest.raises(DaqRefused):
+        rig.run(PLAN, bench=bench(), output=output, arm=True, overwrite=True)
+    assert output.read_bytes() == before
+    assert journal_path(output).read_bytes() == b"left by an earlier run"
+    journal_path(output).unlink()
+    with pytest.raises(DaqRefused):
+        rig.resume(output, plan=plan_with(levels_v=(0.4, 0.5), record_periods=4), arm=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "state"]
+    assert memory_of(bench()).trip is None
+
+
+@pytest.mark.usefixtures("physical")
+def test_nothing_is_started_that_cannot_be_recorded(monkeypatch, tmp_path):
+    def full(path, header):
+        raise RecordingError(f"{path}: cannot be created (No space left on device)")
+
+    started = Started(monkeypatch, as_ever)
+    monkeypatch.setattr("rig.campaigns.runner.JournalWriter.create", full)
+    with pytest.raises(RecordingError, match="No space"):
+        rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True)
+    assert not started.seen

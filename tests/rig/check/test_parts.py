@@ -103,9 +103,9 @@ def test_a_number_that_is_none_fails():
 
 
 def recorded_with(bench, inputs):
-    """A recording of one point that holds these inputs, and 1 V at the output."""
+    """A recording of one point that holds these inputs, and 0.1 V at the output."""
     rows = np.zeros(len(inputs), recorded_row(len(bench.channels)))
-    rows["inputs"], rows["output_v"] = inputs, 1.0
+    rows["inputs"], rows["output_v"] = inputs, 0.1
     part = SimpleNamespace(read=lambda first, end: rows[first:end], end={"reason": "completed"})
     return SimpleNamespace(parts=[part], latest={0: {"first_sample": 0, "end_sample": len(rows)}})
 
@@ -123,6 +123,6 @@ def test_a_channel_of_which_nothing_was_seen_gives_no_higher_level(monkeypatch):
     unclear = SimpleNamespace(coherence=np.full(len(bench.channels), 0.9))
     monkeypatch.setattr("rig.check.check.responses_in", lambda recorded: unclear)
     inputs = np.zeros((100, len(bench.channels)))
-    assert next_level(bench, recorded_with(bench, inputs), 0.01) == pytest.approx(0.01 * 0.1 * bench.limits.voltage_v)
+    assert next_level(bench, recorded_with(bench, inputs), 0.01) == pytest.approx(0.04)  # four times, the most
     inputs[:, -1] = np.nan
     assert next_level(bench, recorded_with(bench, inputs), 0.01) is None
