@@ -10,6 +10,7 @@ import pytest
 import rig
 from rig.bench import Bench
 from rig.campaigns.about import About
+from rig.campaigns.arming import ArmingRequest, asked_once
 from rig.campaigns.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.check.check import check
 from rig.cli_arming import ask
@@ -124,8 +125,14 @@ def test_after_a_trip_an_automated_bench_waits_for_a_person(tmp_path):
         assert run.recording.parts[-1].end["tripped"]
     with pytest.raises(NotArmed, match="the last run tripped: response above its limit"):
         rig.run(PLAN, bench=chosen)
-    with rig.run(PLAN, bench=chosen, arm=True) as run:
+    with pytest.raises(
+        NotArmed, match=r"nobody has seen that the last run tripped: response .* terminal without --arm .* callable"
+    ):
+        rig.run(PLAN, bench=chosen, arm=True)
+    assert memory_of(chosen).trip is not None
+    with rig.run(PLAN, bench=chosen, arm=lambda request: "the last run tripped" in request.cautions[0]) as run:
         assert run.complete
+        assert armed(run)["how"] == "person"
     with rig.run(PLAN, bench=chosen) as run:
         assert armed(run)["how"] == "automated"
 
@@ -228,6 +235,29 @@ def test_a_check_counts_for_one_device_and_one_emergency_stop_behind_any_port():
     assert fingerprint(one, DEVICE) != fingerprint(other, DEVICE)
     assert fingerprint(one, DEVICE) != fingerprint(one, {"serial_number": "8"})
     assert fingerprint(one, DEVICE) == fingerprint(one, {**DEVICE, "port": "elsewhere", "boot": "2"})
+
+
+@pytest.mark.usefixtures("physical")
+@pytest.mark.parametrize("word", [None, True])
+def test_a_device_that_has_latched_waits_for_a_person(monkeypatch, capsys, word):
+    monkeypatch.setattr(LocalSession, "latched", "the device's watchdog had latched", raising=False)
+    chosen = bench(automated=True, require_check=False)
+    with pytest.raises(NotArmed, match="nobody has seen that the device's watchdog had latched; .*without --arm"):
+        rig.run(PLAN, bench=chosen, arm=word)
+    monkeypatch.setattr("sys.stdin", io.StringIO("beam next door\n"))
+    with rig.run(PLAN, bench=chosen, arm=ask) as run:
+        assert armed(run)["how"] == "person"
+        assert armed(run)["cautions"][0] == "the device's watchdog had latched"
+    assert "CAUTION  the device's watchdog had latched" in capsys.readouterr().err
+
+
+def test_whoever_is_asked_once_is_asked_again_after_a_trip():
+    asked = []
+    once = asked_once(lambda request: asked.append(request.unseen) or len(asked) == 1)
+    request = ArmingRequest(bench(), "check", {}, memory_of(bench()), ())
+    assert [once(request), once(request)] == [True, True]
+    assert once(replace(request, unseen=("the last run tripped: force",))) is False
+    assert asked == [(), ("the last run tripped: force",)]
 
 
 class Started:
