@@ -242,7 +242,7 @@ def test_a_check_counts_for_one_device_and_one_emergency_stop_behind_any_port():
 def test_a_device_that_has_latched_waits_for_a_person(monkeypatch, capsys, word):
     monkeypatch.setattr(LocalSession, "latched", "the device's watchdog had latched", raising=False)
     chosen = bench(automated=True, require_check=False)
-    with pytest.raises(NotArmed, match="nobody has seen that the device's watchdog had latched; .*without --arm"):
+    with pytest.raises(NotArmed, match=r"nobody has seen that the device's watchdog had latched; .*without --arm"):
         rig.run(PLAN, bench=chosen, arm=word)
     monkeypatch.setattr("sys.stdin", io.StringIO("beam next door\n"))
     with rig.run(PLAN, bench=chosen, arm=ask) as run:
