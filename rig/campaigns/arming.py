@@ -1,6 +1,6 @@
 """Arming: who has let something physical move. A virtual rig arms itself, any other bench is armed by a person."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -30,6 +30,8 @@ class ArmingRequest:
     """Last check and trip."""
     cautions: tuple[str, ...]
     """What speaks against it, one line each."""
+    unseen: tuple[str, ...] = ()
+    """Those of them that only a person who is shown them takes back: a trip, a device that has latched."""
 
     def lines(self) -> list[str]:
         """All of it for the terminal."""
@@ -53,32 +55,39 @@ Arm = bool | Callable[[ArmingRequest], bool] | None
 
 
 def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]:
-    """How the bench was armed and by whom, for the record; a person's word also takes back a trip.
+    """How the bench was armed and by whom, for the record; a person who is asked also takes back a trip.
 
-    A rig whose driver says ``virtual`` arms itself. ``[arming] automated`` does where nothing speaks against it. Raises
+    A rig whose driver says ``virtual`` arms itself. ``[arming] automated`` does where nothing speaks against it. A word given
+    beforehand, ``arm`` True, does where no trip is remembered and the device has not latched: nobody has seen those. Raises
     `NotArmed`, which says how to arm, before anything has moved.
     """
     if session.capabilities.virtual:
         return {"how": "virtual", "by": "", "at": now(), "cautions": []}
     memory = memory_of(bench)
-    cautions = cautions_of(bench, memory, what)
-    how = _how(ArmingRequest(bench, what, session.identity, memory, cautions), arm)
-    if memory.trip is not None and how != "automated":
+    unseen = _unseen(memory, getattr(session, "latched", ""))
+    cautions = (*unseen, *cautions_of(bench, memory, what, session.identity))
+    how = _how(ArmingRequest(bench, what, session.identity, memory, cautions, unseen), arm)
+    if memory.trip is not None and how == "person":
         remember(bench, trip=None)
     return {"how": how, "by": user_name(), "at": now(), "cautions": list(cautions)}
 
 
 def _how(request: ArmingRequest, arm: Arm) -> str:
-    bench, memory = request.bench, request.memory
+    bench = request.bench
     checked = not request.cautions or not bench.arming.require_check
-    if bench.arming.automated and arm is not False and arm is not True and memory.trip is None and checked:
+    if bench.arming.automated and arm is not False and arm is not True and not request.unseen and checked:
         return "automated"
     if callable(arm):
         if arm(request):
             return "person"
         raise NotArmed(f"bench {bench.name}: was not armed; nothing has moved")
-    if arm:
+    if arm and not request.unseen:
         return "switch"
+    if request.unseen:
+        raise NotArmed(
+            f"bench {bench.name}: something physical would move and nobody has seen that {'; '.join(request.unseen)}; run at a "
+            "terminal without --arm and type the bench's name, or ask with a callable (arm=ask from Python)"
+        )
     against = f" ({'; '.join(request.cautions)})" if request.cautions else ""
     automated = "" if bench.arming.automated else ", or [arming] automated = true in a bench made for it"
     raise NotArmed(
@@ -87,36 +96,46 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
     )
 
 
-def cautions_of(bench: Bench, memory: BenchMemory, what: str) -> tuple[str, ...]:
-    """What speaks against arming: a trip that nobody has looked at; no check, or one that does not count."""
-    out = []
-    if memory.trip is not None:
-        out.append(f"the last run tripped: {memory.trip.text}" if memory.trip.recording else memory.trip.text)
+def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str]) -> tuple[str, ...]:
+    """What speaks against arming for ``what``: no check, or one that does not count. A check itself needs none."""
+    out: list[str] = []
     check = memory.check
     if what == CHECK:
-        return tuple(out)
+        return ()
     if check is None:
-        out.append(f"the bench was never checked: rig check --bench {bench.name}")
-        return tuple(out)
+        return (f"the bench was never checked: rig check --bench {bench.name}",)
     if check.failed:
         out.append(f"the last check failed: {', '.join(check.failed)}")
-    if _age_h(check.at) > bench.arming.check_valid_h:
-        out.append(f"the last check is {_age_h(check.at):.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
-    if check.fingerprint != fingerprint(bench):
-        out.append("the last check was of other channels, another rate or another driver")
+    age_h = _age_h(check.at)
+    if age_h < 0.0:
+        out.append(f"the last check lies {-age_h:.1f} h ahead of the clock of this computer, so its age is not known")
+    if age_h > bench.arming.check_valid_h:
+        out.append(f"the last check is {age_h:.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
+    if check.fingerprint != fingerprint(bench, identity):
+        out.append("the last check was of other channels, another rate, another driver or another device")
+    return tuple(out)
+
+
+def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:
+    """What nobody has looked at yet: a trip, or a run without an end; what the device has latched."""
+    out: list[str] = []
+    if memory.trip is not None:
+        out.append(f"the last run tripped: {memory.trip.text}" if memory.trip.recording else memory.trip.text)
+    if latched:
+        out.append(latched)
     return tuple(out)
 
 
 def asked_once(arm: Arm) -> Arm:
-    """The same word for several parts of one recording: a person is asked before the first only."""
+    """The same word for several parts of one recording: a person is asked before the first only, and after a trip again."""
     if not callable(arm):
         return arm
     answers: list[bool] = []
 
     def ask(request: ArmingRequest) -> bool:
-        if not answers:
+        if not answers or request.unseen:
             answers.append(arm(request))
-        return answers[0]
+        return answers[-1]
 
     return ask
 

@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -75,10 +76,16 @@ def memory_path(bench: Bench) -> Path:
     return folder / "vibrolock" / "benches" / f"{readable}.json"
 
 
-def fingerprint(bench: Bench) -> str:
-    """Of what a check depends on: channels, driver, rate, range. The port may change, the wiring may not."""
-    table = bench.model_dump(mode="json", include={"channels", "sample_rate_hz", "output_range_v"})
-    text = json.dumps({**table, "driver": bench.driver.name}, sort_keys=True)
+def fingerprint(bench: Bench, identity: Mapping[str, str]) -> str:
+    """Of what a check depends on: channels, emergency stop, driver, rate, range, and which device it was.
+
+    ``identity`` is what the driver says of the device, of which ``serial_number`` counts, if it has one. The port may change,
+    the wiring may not.
+    """
+    kept = {"channels", "sample_rate_hz", "output_range_v", "emergency_stop"}
+    table = bench.model_dump(mode="json", include=kept)
+    device = {"driver": bench.driver.name, "serial_number": identity.get("serial_number", "")}
+    text = json.dumps({**table, **device}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

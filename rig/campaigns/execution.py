@@ -18,8 +18,8 @@ from rig.campaigns.stop_signals import stop_on_signals
 from rig.errors import RecordingError
 from rig.loop import LoopStatistics, RunningLoop
 from rig.recording.journal import JournalWriter
-from rig.safety.layout import EndReason, GuardMode
-from rig.safety.limits import describe_end
+from rig.safety.layout import TEXT, EndReason, GuardMode
+from rig.safety.limits import describe_end, end_reason_of
 from rig.sequencer.layout import Outcome, SegmentKind
 from rig.tick.tick import Tick
 
@@ -248,8 +248,9 @@ class Execution:
                 self._report(failed_point(self.plan, self.targets[int(segment["point"])], entry))
 
     def _end(self) -> dict[str, Any]:
-        guard = self.tick.guard
-        reason = EndReason(int(guard["reason"][0]))
+        reason = EndReason(int(self.tick.guard["reason"][0]))
+        if self.loop.failure is not None and not reason.is_trip:
+            reason = end_reason_of(self.loop.failure)  # it failed once the output was down, when it was stopped
         return {
             "completed": reason is EndReason.COMPLETED and self.accepted == len(self.targets) and self.failure is None,
             "reason": reason.name.lower(),
@@ -262,11 +263,12 @@ class Execution:
 
     def _why(self) -> str:
         """Why the output was brought down, in one sentence."""
+        reason = EndReason(int(self.tick.guard["reason"][0]))
         if self.loop.failure is not None:
-            return str(self.loop.failure)
+            down = "" if reason.is_trip else f"{TEXT[reason]}, but the driver failed at the end: "
+            return f"{down}{self.loop.failure}"
         if self.failure is not None:
             return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
-        reason = int(self.tick.guard["reason"][0])
         return (
             self.loop.cause
             if self.loop.cause and reason == EndReason.STOP_REQUESTED

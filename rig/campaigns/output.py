@@ -27,19 +27,25 @@ def make_way(output: Path, overwrite: bool) -> None:
 
 @contextmanager
 def set_aside(output: Path) -> Iterator[None]:
-    """Keep an earlier recording under another name until the new one has begun to be written, and put it back if it has not."""
+    """Keep an earlier recording, and its journal, under other names until the new one is written; put back if it never is."""
     journal = journal_path(output)
-    if journal.exists():
-        with exclusive(journal):  # refuses while another run is writing it
-            journal.unlink()
-    aside = output.with_name(output.name + ".before")
-    if output.exists():
-        output.replace(aside)
+    moved: list[tuple[Path, Path]] = []
     try:
+        if journal.exists():
+            with exclusive(journal):  # refuses while another run is writing it
+                moved.append(_moved(journal))
+        if output.exists():
+            moved.append(_moved(output))
         yield
     finally:
-        if aside.exists():
-            if journal.exists():
+        begun = journal.exists()
+        for path, aside in moved:
+            if begun:
                 aside.unlink()
             else:
-                aside.replace(output)
+                aside.replace(path)
+
+
+def _moved(path: Path) -> tuple[Path, Path]:
+    """A file, moved, and where it is now."""
+    return path, path.replace(path.with_name(path.name + ".before"))

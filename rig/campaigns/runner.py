@@ -15,6 +15,7 @@ from rig.campaigns.continuation import what_is_left
 from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
 from rig.campaigns.output import make_way, set_aside
 from rig.campaigns.plan import Plan
+from rig.errors import RigError
 from rig.loop import RunningLoop
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
@@ -24,7 +25,7 @@ from rig.safety.layout import EndReason
 from rig.safety.limits import describe_end
 from rig.sequencer.segments import Segment
 from rig.session import Session, TickSettings, open_session
-from rig.tick.layout import ROW_COLUMNS
+from rig.tick.layout import ROW_COLUMNS, recorded_row
 
 __all__ = ["carry_out", "take_up"]
 
@@ -52,21 +53,24 @@ def carry_out(
     make_way(output, overwrite)
     with open_session(bench, seed, realtime=realtime) as session:
         facts = _facts(plan, bench, session, arm, about, progress)
-        loop = session.start(_settings(plan, bench, plan.segments(bench.sample_rate_hz)))
         header = Header(
             kind=plan.kind,
             configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
             channels=[channel.model_dump(mode="json") for channel in bench.channels],
-            row_dtype=loop.tick.row_dtype,
+            row_dtype=recorded_row(len(bench.channels)),
             columns=[Column(**column) for column in ROW_COLUMNS],
             software_version=vibrolock.__version__,
             started=datetime.now(UTC).isoformat(timespec="seconds"),
             seed=seed,
         )
-        with set_aside(output), JournalWriter.create(journal_path(output), header) as journal:
+        settings = _settings(plan, bench, plan.segments(bench.sample_rate_hz))
+        with (
+            set_aside(output),
+            _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
+            _started(session, settings, output) as loop,
+        ):
             execution = Execution(plan, bench, loop, journal, progress or Silent())
-            with _trip_remembered(bench, session, loop, output):
-                execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
+            execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
     finalise(journal_path(output), output)
     return Recording(output)
 
@@ -101,12 +105,14 @@ def take_up(
     if segments:
         with open_session(bench, drawn, realtime=realtime) as session:
             facts = _facts(plan, bench, session, arm, about, progress)
-            loop = session.start(_settings(plan, bench, segments))
             columns = [Column(**column) for column in ROW_COLUMNS]
-            with continue_recording(output, row_dtype=loop.tick.row_dtype, columns=columns) as journal:
+            rows = recorded_row(len(bench.channels))
+            with (
+                _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
+                _started(session, _settings(plan, bench, segments), output) as loop,
+            ):
                 execution = Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers)
-                with _trip_remembered(bench, session, loop, output):
-                    execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
+                execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
     elif not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
@@ -139,15 +145,47 @@ def _lead(loop: RunningLoop) -> float:
 
 
 @contextmanager
-def _trip_remembered(bench: Bench, session: Session, loop: RunningLoop, output: Path) -> Iterator[None]:
-    """After a trip of something physical the next run needs a person."""
+def _unless_empty(journal: JournalWriter) -> Iterator[JournalWriter]:
+    """A journal that is removed at the end where no part was begun in it, for nothing has run."""
     try:
-        yield
+        with journal:
+            yield journal
     finally:
-        reason = EndReason(int(loop.tick.guard["reason"][0]))
-        if reason.is_trip and not session.capabilities.virtual:
-            text = str(loop.failure) if loop.failure is not None else describe_end(loop.tick.guard, bench)
-            remember(bench, trip=RememberedTrip(now(), text, str(output.absolute())))
+        if journal.n_parts == 0:
+            journal.path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _started(session: Session, settings: TickSettings, output: Path) -> Iterator[RunningLoop]:
+    """A loop that was started. Of something physical it is remembered that it runs, and then that it tripped, if it did.
+
+    So a campaign that never comes to its end, or cannot write any more, leaves a word for the person who arms the next.
+    """
+    if session.capabilities.virtual:
+        yield session.start(settings)
+        return
+    bench, at = settings.bench, now()
+    text = f"a run into {output.absolute()} was under way at {at} and its end was never noted"
+    remember(bench, trip=RememberedTrip(at, text, ""))
+    try:
+        loop = session.start(settings)
+    except RigError:  # nothing but 0 V was put out
+        remember(bench, trip=None)
+        raise
+    try:
+        yield loop
+    finally:
+        _remember_end(bench, loop, output)
+
+
+def _remember_end(bench: Bench, loop: RunningLoop, output: Path) -> None:
+    """A trip, or a driver that failed at any time, is remembered; an orderly end takes back the word of a run under way."""
+    reason = EndReason(int(loop.tick.guard["reason"][0]))
+    if loop.failure is not None or reason.is_trip:
+        text = str(loop.failure) if loop.failure is not None else describe_end(loop.tick.guard, bench)
+        remember(bench, trip=RememberedTrip(now(), text, str(output.absolute())))
+    elif reason is not EndReason.NONE:
+        remember(bench, trip=None)
 
 
 def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:

@@ -18,7 +18,7 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.recording.reader import Recording
 from rig.safety.layout import EndReason
 
-__all__ = ["check"]
+__all__ = ["check", "next_level", "share_of_limits"]
 
 BAND = (0.4, 2.5)  # of the linear frequency
 LINES = 200.0  # up to the linear frequency
@@ -80,7 +80,7 @@ def check(
         else:
             done = take_up(path, change=plan, realtime=realtime, progress=progress, arm=arm, about=about)
         with done as recorded:
-            higher = _next_level(bench, recorded, level)
+            higher = next_level(bench, recorded, level)
         if higher is None:
             break
         level = higher
@@ -94,9 +94,10 @@ def _assessed(bench: Bench, path: Path, reference: str | Path | None) -> Assessm
         else:
             with Recording(reference) as known:
                 found = assess(recorded, known)
-        virtual = recorded.parts[0].information["about"]["armed"]["how"] == "virtual"
+        facts = recorded.parts[0].information["about"]
+        virtual, identity = facts["armed"]["how"] == "virtual", facts["device"]
     if not virtual:
-        remembered = RememberedCheck(now(), found.failed, str(path.absolute()), fingerprint(bench))
+        remembered = RememberedCheck(now(), found.failed, str(path.absolute()), fingerprint(bench, identity))
         remember(bench, check=remembered)
     return found
 
@@ -126,7 +127,7 @@ def _plan(bench: Bench, name: str, level_rms_v: float, *, silent: bool) -> Multi
     )
 
 
-def _next_level(bench: Bench, recorded: Recording, level: float) -> float | None:
+def next_level(bench: Bench, recorded: Recording, level: float) -> float | None:
     """The level to go on with; None where this one suffices, none would, or the run ended early."""
     end = recorded.parts[-1].end
     found = responses_in(recorded)
@@ -137,12 +138,15 @@ def _next_level(bench: Bench, recorded: Recording, level: float) -> float | None
     hopeless = (coherence < DEAD) & (coherence.max() > CLEAR)
     if np.all((coherence >= ENOUGH) | hopeless):
         return None
-    rise = min(RISE, SAFE / _share_of_limits(bench, recorded))
+    share = share_of_limits(bench, recorded)
+    if not math.isfinite(share):
+        return None
+    rise = min(RISE, SAFE / share)
     return level * rise if rise > 1.2 else None
 
 
-def _share_of_limits(bench: Bench, recorded: Recording) -> float:
-    """Largest peak of the last realisation against its limit."""
+def share_of_limits(bench: Bench, recorded: Recording) -> float:
+    """Largest peak of the last realisation against its limit, lost samples left out; inf where a channel has none left."""
     point = [point for point in recorded.latest.values() if "end_sample" in point][-1]
     rows = recorded.parts[-1].read(point["first_sample"], point["end_sample"])
     limits = bench.limits
@@ -152,6 +156,9 @@ def _share_of_limits(bench: Bench, recorded: Recording) -> float:
         if channel.role == "monitor":
             continue
         values = rows["inputs"][:, index].astype(float)
+        values = values[np.isfinite(values)]
+        if not values.size:
+            return math.inf  # what was never seen may have been anything
         largest = float(np.abs(values - values.mean()).max())
         shares.append(largest / (limits.force_n if channel.role == "force" else limits.acceleration_m_s2))
         if channel.role != "force":  # as if all of it were at the lowest frequency, where it moves the farthest

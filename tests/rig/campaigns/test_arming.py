@@ -8,11 +8,15 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 import rig
+from rig.bench import Bench
 from rig.campaigns.about import About
+from rig.campaigns.arming import ArmingRequest, asked_once
 from rig.campaigns.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.check.check import check
 from rig.cli_arming import ask
-from rig.errors import ConfigurationError, NotArmed
+from rig.errors import ConfigurationError, DaqDisconnected, DaqRefused, NotArmed, RecordingError
+from rig.recording.journal import journal_path
+from rig.session import LocalSession
 from rig.summary import summarise
 from rig.tables import print_summary
 from rig.tuning.tuning import tune
@@ -20,6 +24,7 @@ from tests.rig.check.rewired import flipped, rewire
 from tests.rig.rigs import bench_with
 from tests.rig.test_runs import plan_with
 
+DEVICE = {"serial_number": "7"}
 PLAN = plan_with(levels_v=(0.4,), record_periods=4)
 
 
@@ -42,7 +47,7 @@ def bench(**arming):
 
 def passed(chosen, hours_ago=0.0, failed=()):
     at = datetime.now(UTC) - timedelta(hours=hours_ago)
-    return RememberedCheck(at.isoformat(), failed, "check.h5", fingerprint(chosen))
+    return RememberedCheck(at.isoformat(), failed, "check.h5", fingerprint(chosen, DEVICE))
 
 
 def armed(run):
@@ -71,7 +76,7 @@ def test_a_word_given_beforehand_arms_and_is_recorded_with_what_spoke_against_it
         assert run.complete
         assert (armed(run)["how"], armed(run)["by"]) == ("switch", "Ada")
         assert "never checked" in armed(run)["cautions"][0]
-        assert run.recording.parts[0].information["about"]["device"]["serial number"] == "7"
+        assert run.recording.parts[0].information["about"]["device"]["serial_number"] == "7"
 
 
 @pytest.mark.usefixtures("physical")
@@ -80,7 +85,7 @@ def test_a_person_is_shown_bench_device_limits_and_check_and_types_the_name(monk
     with rig.run(PLAN, bench=bench(), arm=ask) as run:
         assert armed(run)["how"] == "person"
     shown = capsys.readouterr().err
-    for part in ("beam next door", "serial number 7", "9.5 V, 40 N", "never", "CAUTION"):
+    for part in ("beam next door", "serial_number 7", "9.5 V, 40 N", "never", "CAUTION"):
         assert part in shown
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
     with pytest.raises(NotArmed, match="nothing has moved"):
@@ -94,7 +99,9 @@ def test_a_person_is_shown_bench_device_limits_and_check_and_types_the_name(monk
         (lambda b: passed(b), None),
         (lambda b: passed(b, failed=("polarity drive",)), "failed: polarity drive"),
         (lambda b: passed(b, hours_ago=25.0), "25.0 h old"),
+        (lambda b: passed(b, hours_ago=-2.0), "2.0 h ahead of the clock"),
         (lambda b: replace(passed(b), fingerprint="another"), "other channels"),
+        (lambda b: replace(passed(b), fingerprint=fingerprint(b, {"serial_number": "8"})), "another device"),
     ],
 )
 def test_an_automated_bench_arms_itself_only_with_a_check_that_counts(remembered, caution):
@@ -118,8 +125,14 @@ def test_after_a_trip_an_automated_bench_waits_for_a_person(tmp_path):
         assert run.recording.parts[-1].end["tripped"]
     with pytest.raises(NotArmed, match="the last run tripped: response above its limit"):
         rig.run(PLAN, bench=chosen)
-    with rig.run(PLAN, bench=chosen, arm=True) as run:
+    with pytest.raises(
+        NotArmed, match=r"nobody has seen that the last run tripped: response .* terminal without --arm .* callable"
+    ):
+        rig.run(PLAN, bench=chosen, arm=True)
+    assert memory_of(chosen).trip is not None
+    with rig.run(PLAN, bench=chosen, arm=lambda request: "the last run tripped" in request.cautions[0]) as run:
         assert run.complete
+        assert armed(run)["how"] == "person"
     with rig.run(PLAN, bench=chosen) as run:
         assert armed(run)["how"] == "automated"
 
@@ -154,7 +167,7 @@ def test_a_check_needs_arming_and_is_remembered_with_what_failed(tmp_path, monke
     memory = memory_of(bench())
     assert memory.check.failed == ("polarity acc_magnet",)
     assert memory.check.recording == str(tmp_path / "check.h5")
-    assert memory.check.fingerprint == fingerprint(bench())
+    assert memory.check.fingerprint == fingerprint(bench(), DEVICE)
 
 
 @pytest.mark.usefixtures("physical")
@@ -210,3 +223,161 @@ def test_a_day_that_is_none_is_refused(key):
 def test_text_that_is_no_line_is_refused():
     with pytest.raises(ConfigurationError, match="note = "):
         About(notes=("two\nlines",))
+
+
+def test_a_check_counts_for_one_device_and_one_emergency_stop_behind_any_port():
+    channels = list(bench_with().model_dump()["channels"])
+    channels.append({"name": "estop", "role": "monitor", "unit": "V", "sensitivity_v_per_unit": 1.0})
+    table = bench_with({"channels": channels}).model_dump()
+    one, other = (
+        Bench.model_validate({**table, "emergency_stop": {"channel": "estop", "below_v": v}}) for v in (2.5, 0.1)
+    )
+    assert fingerprint(one, DEVICE) != fingerprint(other, DEVICE)
+    assert fingerprint(one, DEVICE) != fingerprint(one, {"serial_number": "8"})
+    assert fingerprint(one, DEVICE) == fingerprint(one, {**DEVICE, "port": "elsewhere", "boot": "2"})
+
+
+@pytest.mark.usefixtures("physical")
+@pytest.mark.parametrize("word", [None, True])
+def test_a_device_that_has_latched_waits_for_a_person(monkeypatch, capsys, word):
+    monkeypatch.setattr(LocalSession, "latched", "the device's watchdog had latched", raising=False)
+    chosen = bench(automated=True, require_check=False)
+    with pytest.raises(NotArmed, match=r"nobody has seen that the device's watchdog had latched; .*without --arm"):
+        rig.run(PLAN, bench=chosen, arm=word)
+    monkeypatch.setattr("sys.stdin", io.StringIO("beam next door\n"))
+    with rig.run(PLAN, bench=chosen, arm=ask) as run:
+        assert armed(run)["how"] == "person"
+        assert armed(run)["cautions"][0] == "the device's watchdog had latched"
+    assert "CAUTION  the device's watchdog had latched" in capsys.readouterr().err
+
+
+def test_whoever_is_asked_once_is_asked_again_after_a_trip():
+    asked = []
+    once = asked_once(lambda request: asked.append(request.unseen) or len(asked) == 1)
+    request = ArmingRequest(bench(), "check", {}, memory_of(bench()), ())
+    assert [once(request), once(request)] == [True, True]
+    assert once(replace(request, unseen=("the last run tripped: force",))) is False
+    assert asked == [(), ("the last run tripped: force",)]
+
+
+class Started:
+    """A session whose device is started as wanted; notes what was there at that moment."""
+
+    def __init__(self, monkeypatch, then):
+        self.seen, real = [], LocalSession.start
+
+        def start(session, settings):
+            self.seen.append(memory_of(settings.bench).trip)
+            return then(real, session, settings)
+
+        monkeypatch.setattr(LocalSession, "start", start)
+
+
+def as_ever(real, session, settings):
+    return real(session, settings)
+
+
+def refused(real, session, settings):
+    raise DaqRefused("no room on the bus")
+
+
+def failing_at_stop(real, session, settings):
+    """A loop whose driver fails when it is stopped, once all rows are there."""
+    loop = real(session, settings)
+    rows = loop.run
+
+    def run():
+        yield from rows()
+        loop.failure = DaqDisconnected("gone while it was stopped")
+
+    loop.run = run
+    return loop
+
+
+@pytest.mark.usefixtures("physical")
+def test_while_something_physical_runs_that_is_remembered_and_an_orderly_end_takes_it_back(monkeypatch):
+    started = Started(monkeypatch, as_ever)
+    with rig.run(PLAN, bench=bench(), arm=True):
+        assert "its end was never noted" in started.seen[0].text
+        assert memory_of(bench()).trip is None
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_stop_by_request_is_an_orderly_end(monkeypatch):
+    def stopped(real, session, settings):
+        loop = real(session, settings)
+        loop.request_stop("enough")
+        return loop
+
+    Started(monkeypatch, stopped)
+    with rig.run(PLAN, bench=bench(), arm=True) as run:
+        assert run.recording.parts[-1].end["text"] == "enough"
+    assert memory_of(bench()).trip is None
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_campaign_that_dies_leaves_a_caution(monkeypatch, tmp_path):
+    def dies(real, session, settings):
+        loop = real(session, settings)
+        loop.run = lambda: (_ for _ in ()).throw(SystemExit(9))
+        return loop
+
+    Started(monkeypatch, dies)
+    with pytest.raises(SystemExit):
+        rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True)
+    with pytest.raises(NotArmed, match=r"a run into .*run\.h5 was under way"):
+        rig.run(PLAN, bench=bench(automated=True, require_check=False))
+
+
+@pytest.mark.usefixtures("physical")
+def test_where_nothing_can_be_remembered_nothing_moves(monkeypatch, tmp_path):
+    memory_path(bench()).with_name(memory_path(bench()).name + ".part").mkdir(parents=True)
+    started = Started(monkeypatch, as_ever)
+    output = tmp_path / "run.h5"
+    with pytest.raises(RecordingError, match="cannot be written"):
+        rig.run(PLAN, bench=bench(), output=output, arm=True)
+    assert not started.seen
+    assert not output.exists()
+    assert not journal_path(output).exists()
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_driver_that_fails_when_it_is_stopped_has_not_completed_and_is_remembered(monkeypatch):
+    Started(monkeypatch, failing_at_stop)
+    with rig.run(PLAN, bench=bench(), arm=True) as run:
+        end = run.recording.parts[-1].end
+        assert not run.complete
+        assert (end["completed"], end["reason"], end["tripped"]) == (False, "driver_failed", True)
+        assert end["text"] == "the plan was carried out, but the driver failed at the end: gone while it was stopped"
+    assert memory_of(bench()).trip.text == "gone while it was stopped"
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_start_that_fails_leaves_the_earlier_recording_its_journal_and_no_trip(monkeypatch, tmp_path):
+    output = tmp_path / "run.h5"
+    with rig.run(PLAN, bench=bench(), output=output, arm=True):
+        pass
+    journal_path(output).write_bytes(b"left by an earlier run")
+    before = output.read_bytes()
+    Started(monkeypatch, refused)
+    with pytest.raises(DaqRefused):
+        rig.run(PLAN, bench=bench(), output=output, arm=True, overwrite=True)
+    assert output.read_bytes() == before
+    assert journal_path(output).read_bytes() == b"left by an earlier run"
+    journal_path(output).unlink()
+    with pytest.raises(DaqRefused):
+        rig.resume(output, plan=plan_with(levels_v=(0.4, 0.5), record_periods=4), arm=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "state"]
+    assert memory_of(bench()).trip is None
+
+
+@pytest.mark.usefixtures("physical")
+def test_nothing_is_started_that_cannot_be_recorded(monkeypatch, tmp_path):
+    def full(path, header):
+        raise RecordingError(f"{path}: cannot be created (No space left on device)")
+
+    started = Started(monkeypatch, as_ever)
+    monkeypatch.setattr("rig.campaigns.runner.JournalWriter.create", full)
+    with pytest.raises(RecordingError, match="No space"):
+        rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True)
+    assert not started.seen

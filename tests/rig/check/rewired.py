@@ -88,7 +88,7 @@ class RewiredDAQ(DAQ):
     @property
     def identity(self) -> dict[str, str]:
         """A made-up device."""
-        return {"model": "rewired", "serial number": "7"}
+        return {"model": "rewired", "serial_number": "7"}
 
     def _open(self) -> None:
         self.inner.open()

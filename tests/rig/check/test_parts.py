@@ -1,13 +1,17 @@
 """The parts of a check against closed forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import freqs
 
+from rig.check.check import next_level, share_of_limits
 from rig.check.findings import graded
 from rig.check.responses import fit_mode
 from rig.check.silence import hum, silent_findings
 from rig.check.wiring import best_assignment, by_magnitude
+from rig.tick.layout import recorded_row
 from tests.rig.rigs import bench_with
 
 RATE_HZ = 5000.0
@@ -96,3 +100,29 @@ def test_a_load_cell_that_should_make_noise_and_does_not_is_doubted():
 def test_a_number_that_is_none_fails():
     assert graded(float("nan"), (0.0, 1.0), (0.0, 2.0)) == "fail"
     assert graded(1.5, (0.0, 1.0), (0.0, 2.0)) == "warn"
+
+
+def recorded_with(bench, inputs):
+    """A recording of one point that holds these inputs, and 0.1 V at the output."""
+    rows = np.zeros(len(inputs), recorded_row(len(bench.channels)))
+    rows["inputs"], rows["output_v"] = inputs, 0.1
+    part = SimpleNamespace(read=lambda first, end: rows[first:end], end={"reason": "completed"})
+    return SimpleNamespace(parts=[part], latest={0: {"first_sample": 0, "end_sample": len(rows)}})
+
+
+def test_lost_samples_do_not_hide_how_near_a_limit_the_others_were():
+    bench = bench_with()
+    inputs = np.zeros((100, len(bench.channels)))
+    inputs[::2, 0], inputs[1::2, 0] = 36.0, -36.0  # of 40 N
+    inputs[10:14] = np.nan
+    assert share_of_limits(bench, recorded_with(bench, inputs)) == pytest.approx(36.0 / bench.limits.force_n, rel=1e-6)
+
+
+def test_a_channel_of_which_nothing_was_seen_gives_no_higher_level(monkeypatch):
+    bench = bench_with()
+    unclear = SimpleNamespace(coherence=np.full(len(bench.channels), 0.9))
+    monkeypatch.setattr("rig.check.check.responses_in", lambda recorded: unclear)
+    inputs = np.zeros((100, len(bench.channels)))
+    assert next_level(bench, recorded_with(bench, inputs), 0.01) == pytest.approx(0.04)  # four times, the most
+    inputs[:, -1] = np.nan
+    assert next_level(bench, recorded_with(bench, inputs), 0.01) is None
