@@ -64,7 +64,7 @@ def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]
     if session.capabilities.virtual:
         return {"how": "virtual", "by": "", "at": now(), "cautions": []}
     memory = memory_of(bench)
-    unseen = _unseen(memory, getattr(session, "latched", ""))
+    unseen = _unseen(memory, session.latched)
     cautions = (*unseen, *cautions_of(bench, memory, what, session.identity))
     how = _how(ArmingRequest(bench, what, session.identity, memory, cautions, unseen), arm)
     if memory.trip is not None and how == "person":
