@@ -129,7 +129,7 @@ class ArmedRig:
         return done
 
     def _armed(self, request: ArmingRequest) -> bool:
-        """Whether ``--rig-arm`` is enough: a trip from before these tests is for a person to see, those provoked here are not."""
+        """Whether ``--rig-arm`` is enough: a trip from before these tests is for a person to see, one provoked here is not."""
         return not request.unseen or bool(self._runs)
 
     def notes(self, numbers: Mapping[str, object]) -> None:
