@@ -290,12 +290,23 @@ def test_one_period_of_a_multisine_does_not_count_as_settled():
 
 def test_a_vibration_beyond_the_limit_of_the_response_is_ramped_down_though_its_peaks_cannot_be_integrated():
     bench = bench_with({"limits": {"acceleration_m_s2": 60.0}}, **QUIET)
-    with rig.run(_plan(frequencies_hz=(25.0,), levels_v=(4.0,)), bench=bench) as run:
+    with rig.run(_plan(frequencies_hz=(25.0,), levels_v=(2.5,)), bench=bench) as run:
         part = run.recording.parts[0]
         assert part.end["reason"] == "response_limit"
         ramp = np.count_nonzero(part.rows("guard") == GuardMode.RAMPING)
         assert np.abs(part.rows("inputs")).max() > 61.0
     assert ramp == bench.limits.ramp_down_s * bench.sample_rate_hz
+
+
+def test_a_vibration_that_grows_on_while_it_is_ramped_down_is_dropped_at_five_quarters_of_the_limit():
+    bench = bench_with({"limits": {"acceleration_m_s2": 60.0}}, **QUIET)
+    with rig.run(_plan(frequencies_hz=(25.0,), levels_v=(4.0,)), bench=bench) as run:
+        part = run.recording.parts[0]
+        guard, readings = part.rows("guard"), np.abs(part.rows("inputs")).max(axis=1)
+    dropped = int(np.flatnonzero(guard == GuardMode.OFF)[0])
+    assert guard[dropped - 1] == GuardMode.RAMPING
+    assert readings[dropped] > 75.0
+    assert readings[guard == GuardMode.RAMPING].max() <= 75.0
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -14,6 +14,7 @@ from rig.campaigns.arming import ArmingRequest, asked_once
 from rig.campaigns.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.check.check import check
 from rig.cli_arming import ask
+from rig.daq import DAQ
 from rig.errors import ConfigurationError, DaqDisconnected, DaqRefused, NotArmed, RecordingError
 from rig.recording.journal import journal_path
 from rig.session import LocalSession
@@ -240,7 +241,7 @@ def test_a_check_counts_for_one_device_and_one_emergency_stop_behind_any_port():
 @pytest.mark.usefixtures("physical")
 @pytest.mark.parametrize("word", [None, True])
 def test_a_device_that_has_latched_waits_for_a_person(monkeypatch, capsys, word):
-    monkeypatch.setattr(LocalSession, "latched", "the device's watchdog had latched", raising=False)
+    monkeypatch.setattr(DAQ, "latched", "the device's watchdog had latched")
     chosen = bench(automated=True, require_check=False)
     with pytest.raises(NotArmed, match=r"nobody has seen that the device's watchdog had latched; .*without --arm"):
         rig.run(PLAN, bench=chosen, arm=word)

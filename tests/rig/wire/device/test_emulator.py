@@ -163,7 +163,7 @@ def test_the_bench_it_writes_has_blocks_of_2_ms_where_the_clock_does_not_wait(
     ready = Ready("serial", {"port": "/dev/ttyACM0"}, lockstep, "ordinary scheduling", largest)
     bench = load_bench("magnet-beam").model_copy(update={"sample_rate_hz": rate_hz, "block": block})
     file = tmp_path / "emulated.toml"
-    file.write_text(_bench_text("magnet-beam", _block(bench, ready), ready), encoding="utf-8")
+    file.write_text(_bench_text("magnet-beam", _block(bench, ready), ready, False), encoding="utf-8")
     assert load_bench(file).block == written
 
 
