@@ -19,7 +19,8 @@ from rig.bench import Bench
 from rig.campaigns.plans import bench_of, load_plan
 from rig.wire.device.emulator import emulated
 
-BLOCKS = {"serial": 10, "can": 14}
+BLOCKS = {"serial": 14, "can": 14}
+QUEUE = 2
 WIRES = {"virtual": None, "serial": "serial", "can": "can"}
 
 
@@ -30,7 +31,7 @@ def bench_behind(wire: str | None, bench: Bench, lockstep: bool) -> Iterator[Ben
         yield bench
         return
     blocked = bench.model_copy(update={"block": BLOCKS[wire]})
-    with emulated(blocked, wire=wire, lockstep=lockstep) as reached:
+    with emulated(blocked, wire=wire, lockstep=lockstep, options={"queue_blocks": QUEUE}) as reached:
         yield reached
 
 
@@ -40,11 +41,14 @@ def measure(plan_name: str, lockstep: bool) -> dict[str, dict[str, Any]]:
     out: dict[str, dict[str, Any]] = {}
     for name, wire in WIRES.items():
         with bench_behind(wire, bench_of(plan, plan_name), lockstep) as bench, rig.run(plan, bench=bench) as done:
-            points = [point for point in done.recording.latest.values() if point["accepted"]]
+            latest = done.recording.latest
+            points = [point for point in latest.values() if point["accepted"]]
             end = done.recording.parts[-1].end or {}
             out[name] = {
                 "rate_hz": bench.sample_rate_hz,
                 "block": bench.block,
+                "number": [point["number"] for point in points],
+                "refused": {point["number"]: point["reason"] for point in latest.values() if not point["accepted"]},
                 "force_n": [point["force_n"] for point in points],
                 "frequency_hz": [point["frequency_hz"] for point in points],
                 "damping_ratio": [point["damping_ratio"] for point in points],
@@ -56,17 +60,25 @@ def measure(plan_name: str, lockstep: bool) -> dict[str, dict[str, Any]]:
 
 
 def compare(found: dict[str, dict[str, Any]]) -> dict[str, dict[str, float]]:
-    """Largest differences from the virtual rig, percent, over the points all have."""
+    """Largest differences from the virtual rig, percent, over the points that both have."""
     out = {}
     truth = found["virtual"]
     for name, one in found.items():
-        n = min(len(one["frequency_hz"]), len(truth["frequency_hz"]))
+        _, mine, theirs = np.intersect1d(one["number"], truth["number"], return_indices=True)
         differ = {
-            key: float(np.max(np.abs(np.array(one[key][:n]) / np.array(truth[key][:n]) - 1.0))) * 100.0
+            key: float(np.max(np.abs(np.array(one[key])[mine] / np.array(truth[key])[theirs] - 1.0))) * 100.0
             for key in ("frequency_hz", "damping_ratio")
         }
         out[name] = {"points": float(len(one["frequency_hz"])), **{f"{k}_percent": v for k, v in differ.items()}}
     return out
+
+
+def cell(one: dict[str, Any], number: int) -> str:
+    """Frequency and damping of a point, or dashes where it was not accepted."""
+    if number not in one["number"]:
+        return f"{'-':>11} {'-':>6}"
+    at = one["number"].index(number)
+    return f"{one['frequency_hz'][at]:11.5f} {100 * one['damping_ratio'][at]:6.4f}"
 
 
 def main() -> None:
@@ -82,15 +94,11 @@ def main() -> None:
         json.dump({"found": found, "differences": differences}, sys.stdout, indent=2)
         return
     print("force N   " + "   ".join(f"{name:>8} Hz      %" for name in found))
-    for row in zip(
-        *(zip(one["frequency_hz"], one["damping_ratio"], strict=True) for one in found.values()), strict=False
-    ):
-        index = found["virtual"]["frequency_hz"].index(row[0][0])
-        cells = "   ".join(f"{frequency:11.5f} {100 * damping:6.4f}" for frequency, damping in row)
-        print(f"{found['virtual']['force_n'][index]:7.3f}   {cells}")
+    for number, force_n in zip(found["virtual"]["number"], found["virtual"]["force_n"], strict=True):
+        print(f"{force_n:7.3f}   " + "   ".join(cell(one, number) for one in found.values()))
     for name, one in found.items():
         print(
-            f"\n{name}: {one['rate_hz']:g} Hz, block {one['block']}, {one['reason']}; differences {differences[name]}"
+            f"\n{name}: {one['rate_hz']:g} Hz, block {one['block']}, {one['reason']}; differences {differences[name]}, refused {one['refused']}"
         )
         for key, value in {**one["loop"], **one["counters"]}.items():
             if not isinstance(value, list | dict):
