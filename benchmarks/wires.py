@@ -97,9 +97,8 @@ def main() -> None:
     for number, force_n in zip(found["virtual"]["number"], found["virtual"]["force_n"], strict=True):
         print(f"{force_n:7.3f}   " + "   ".join(cell(one, number) for one in found.values()))
     for name, one in found.items():
-        print(
-            f"\n{name}: {one['rate_hz']:g} Hz, block {one['block']}, {one['reason']}; differences {differences[name]}, refused {one['refused']}"
-        )
+        told = f"{one['rate_hz']:g} Hz, block {one['block']}, {one['reason']}"
+        print(f"\n{name}: {told}; differences {differences[name]}, refused {one['refused']}")
         for key, value in {**one["loop"], **one["counters"]}.items():
             if not isinstance(value, list | dict):
                 print(f"    {key} = {value}")
