@@ -40,6 +40,10 @@ if TYPE_CHECKING:
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.pnlss.experiment import Experiment
+    from identification.pnlss.features import Features
+    from identification.pnlss.model import PnlssModel
+    from identification.pnlss.simulation import Simulation
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
@@ -72,7 +76,9 @@ __all__ = [
     "ContinuousBackbone",
     "DistortionLevels",
     "Exciter",
+    "Experiment",
     "ExtrapolationError",
+    "Features",
     "ForceDropOut",
     "ForceSurface",
     "FrequencyResponse",
@@ -91,12 +97,14 @@ __all__ = [
     "NonlinearModeMapping",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "PnlssModel",
     "PredictionError",
     "Predictions",
     "Repeatability",
     "ResponseBand",
     "ResponseMatrixMapping",
     "ShortPoint",
+    "Simulation",
     "SlowFlow",
     "StabilisationDiagram",
     "StateSpace",
@@ -156,7 +164,9 @@ _MODULE_OF = {
     "ContinuousBackbone": "slow_flows.continuous",
     "DistortionLevels": "multisine.distortion",
     "Exciter": "prediction.exciter",
+    "Experiment": "pnlss.experiment",
     "ExtrapolationError": "prediction.properties",
+    "Features": "pnlss.features",
     "ForceDropOut": "signals.sweeps",
     "ForceSurface": "response_control.force_surface",
     "FrequencyResponse": "frequency_responses",
@@ -175,12 +185,14 @@ _MODULE_OF = {
     "NonlinearModeMapping": "mapping.nonlinear_mode",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "PnlssModel": "pnlss.model",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
     "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
     "ShortPoint": "slow_flows.short_points",
+    "Simulation": "pnlss.simulation",
     "SlowFlow": "slow_flows.slow_flow",
     "StabilisationDiagram": "linear.stabilisation",
     "StateSpace": "linear.subspace",

@@ -1,0 +1,1 @@
+"""Polynomial nonlinear state-space models: identified from experiments, simulated, balanced harmonically."""

@@ -1,0 +1,168 @@
+"""Training and test data of nonlinear state-space models: inputs and outputs over time, periodic or not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+
+__all__ = ["Experiment", "InitialState", "same_channels"]
+
+Float = NDArray[np.float64]
+InitialState = Literal["zero", "estimated"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Experiment:
+    """One record of inputs and outputs.
+
+    Parameters
+    ----------
+    inputs, outputs
+        float[n_inputs, n], float[n_outputs, n], in the units of the channels, without gaps.
+    sample_rate_hz
+        Samples per second.
+    input_channels, output_channels
+        One per row.
+    counted_from
+        First sample that counts in errors; those before let transients decay: they are simulated and not compared.
+    period_samples
+        Samples of a period, of which the counted part holds a whole number; 0 for a record that is not periodic.
+    initial_state
+        Whether the state before the first sample is ``zero`` or ``estimated`` together with the model.
+    weight
+        Weight of its squared errors beside those of other experiments.
+    name
+        What it is, for tables and messages.
+    level
+        Its level (RMS or peak of what was set), by which tables sort; NaN if it has none.
+    specimen
+        Name of what was tested.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, shapes that do not agree, nothing left to count, a counted part that is not whole periods.
+    """
+
+    inputs: Float
+    outputs: Float
+    sample_rate_hz: float
+    input_channels: tuple[Channel, ...]
+    output_channels: tuple[Channel, ...]
+    counted_from: int = 0
+    period_samples: int = 0
+    initial_state: InitialState = "zero"
+    weight: float = 1.0
+    name: str = ""
+    level: float = float("nan")
+    specimen: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("input_channels", "output_channels"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        where = f"experiment '{self.name}', " if self.name else ""
+        for name, channels in (("inputs", self.input_channels), ("outputs", self.output_channels)):
+            array = finite_array(f"{where}{name}", getattr(self, name), np.float64, 2)
+            if array.shape[0] != len(channels) or not len(channels):
+                raise IdentificationError(
+                    f"{where}{name}: shape {array.shape}, needs a row for each channel, one at least"
+                )
+            object.__setattr__(self, name, array)
+        n = self.inputs.shape[1]
+        if self.outputs.shape[1] != n:
+            raise IdentificationError(f"{where}outputs: have {self.outputs.shape[1]} samples, inputs {n}")
+        positive(f"{where}sample_rate_hz", self.sample_rate_hz, "Hz")
+        positive(f"{where}weight", self.weight)
+        if self.initial_state not in get_args(InitialState):
+            raise IdentificationError(
+                f"{where}initial_state: is '{self.initial_state}', allowed are {', '.join(get_args(InitialState))}"
+            )
+        if not 0 <= self.counted_from < n:
+            raise IdentificationError(
+                f"{where}counted_from: is {self.counted_from}, allowed is 0 to {n - 1}, one sample at least must count"
+            )
+        if self.period_samples < 0 or (self.period_samples and self.counted % self.period_samples):
+            raise IdentificationError(
+                f"{where}period_samples: is {self.period_samples}, the {self.counted} samples that count are no whole "
+                "number of periods"
+            )
+
+    @classmethod
+    def periodic(
+        cls,
+        inputs: ArrayLike,
+        outputs: ArrayLike,
+        *,
+        transient_samples: int,
+        sample_rate_hz: float,
+        input_channels: Sequence[Channel],
+        output_channels: Sequence[Channel],
+        name: str = "",
+        level: float = float("nan"),
+        specimen: str = "",
+    ) -> "Experiment":
+        """One settled period (float[n_channels, n_period]), with so many samples of the period before put ahead of it.
+
+        They let the transient of a simulation from rest decay, and are not compared. They may be more than a period.
+        """
+        both: list[Float] = []
+        for values in (inputs, outputs):
+            period = np.asarray(values, dtype=np.float64)
+            n = period.shape[-1]
+            both.append(period[..., np.arange(-transient_samples, n) % max(n, 1)])
+        return cls(
+            inputs=both[0],
+            outputs=both[1],
+            sample_rate_hz=sample_rate_hz,
+            input_channels=tuple(input_channels),
+            output_channels=tuple(output_channels),
+            counted_from=transient_samples,
+            period_samples=both[0].shape[-1] - transient_samples,
+            name=name,
+            level=level,
+            specimen=specimen,
+        )
+
+    @property
+    def counted(self) -> int:
+        """Number of samples that count."""
+        return int(self.inputs.shape[1]) - self.counted_from
+
+    @property
+    def counted_inputs(self) -> Float:
+        """float[n_inputs, counted]."""
+        return np.asarray(self.inputs[:, self.counted_from :])
+
+    @property
+    def counted_outputs(self) -> Float:
+        """float[n_outputs, counted]."""
+        return np.asarray(self.outputs[:, self.counted_from :])
+
+    def weighted(self, weight: float) -> "Experiment":
+        """The same with another weight."""
+        return replace(self, weight=weight)
+
+
+def same_channels(experiments: Sequence[Experiment]) -> None:
+    """Raise `IdentificationError` unless there is one at least and all have the same channels and sample rate."""
+    if not experiments:
+        raise IdentificationError("experiments: none given, needs one at least")
+    first = experiments[0]
+    for index, other in enumerate(experiments):
+        what = f"experiments[{index}]{f' ({other.name})' if other.name else ''}"
+        if abs(other.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
+            raise IdentificationError(
+                f"{what}: sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one"
+            )
+        for name in ("input_channels", "output_channels"):
+            mine, theirs = (tuple(c.name for c in getattr(e, name)) for e in (other, first))
+            if mine != theirs:
+                raise IdentificationError(
+                    f"{what}: {name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}"
+                )

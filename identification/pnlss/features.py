@@ -1,0 +1,170 @@
+"""Nonlinear features of states and inputs: monomials, and saturating functions of linear combinations.
+
+A model is linear in what its features give (`identification.pnlss.model`). Whatever is asked of features is asked here and
+in the kernels `feature_values` and `feature_derivatives`: a further kind of feature is a further loop in each of the two.
+Monomials as in Paduart et al., Automatica 46, 2010; saturating features are the nonlinear feedback of an NL-LFR model
+(Schoukens and Toth, IFAC-PapersOnLine 53, 2020), with tanh.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.errors import IdentificationError
+from identification.pnlss.kernels import Table, feature_derivatives, feature_values
+from identification.validation import finite_array, read_only
+
+__all__ = ["Features"]
+
+Float = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Features:
+    """Features ``phi(v)`` of the variables ``v = (x, u)``: first monomials, then saturating ones.
+
+    Parameters
+    ----------
+    variables
+        Number of states and inputs together.
+    exponents
+        int[n_monomials, variables], powers of each monomial, of degree two at least.
+    weights
+        float[n_saturating, variables + 1]: feature ``tanh(w . v + b) - tanh(b)``, zero at rest, b in the last column.
+    limits
+        float[variables], magnitude beyond which a variable counts as just that much in monomials; inf for none. With them
+        the features are bounded; the model is the same where no variable is beyond its own.
+
+    Raises
+    ------
+    IdentificationError
+        On shapes that do not agree, negative powers, monomials below degree two or given twice, limits not above zero.
+    """
+
+    variables: int
+    exponents: Integers = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    weights: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    limits: Float = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if self.variables < 1:
+            raise IdentificationError(f"variables: is {self.variables}, needs at least 1")
+        given = {"exponents": (self.exponents, self.variables), "weights": (self.weights, self.variables + 1)}
+        for name, (values, width) in given.items():
+            dtype = np.int64 if name == "exponents" else np.float64
+            array = finite_array(name, np.reshape(values, (-1, width)) if np.size(values) == 0 else values, dtype, 2)
+            if array.shape[1] != width:
+                raise IdentificationError(f"{name}: shape {array.shape}, needs {width} columns")
+            object.__setattr__(self, name, array)
+        limits = np.full(self.variables, np.inf) if np.size(self.limits) == 0 else np.asarray(self.limits, dtype=float)
+        if limits.shape != (self.variables,) or not np.all(limits > 0.0):
+            raise IdentificationError(f"limits: {limits}, needs {self.variables} values above zero")
+        object.__setattr__(self, "limits", read_only(limits, np.float64))
+        if np.any(self.exponents < 0) or np.any(self.exponents.sum(axis=1) < 2):
+            raise IdentificationError("exponents: have a negative power or a degree below 2, which is the linear part")
+        if len({tuple(row) for row in self.exponents.tolist()}) < len(self.exponents):
+            raise IdentificationError("exponents: hold a monomial twice")
+
+    @classmethod
+    def monomials(
+        cls, states: int, inputs: int, degrees: Iterable[int], *, of: Sequence[int] | None = None
+    ) -> "Features":
+        """All monomials of the given degrees, of all states and inputs or of the variables ``of`` alone.
+
+        States alone are ``of=range(states)``. Raises `IdentificationError` on a degree below two or a variable that is not
+        there.
+        """
+        chosen = list(range(states + inputs) if of is None else of)
+        wrong = [j for j in chosen if not 0 <= j < states + inputs]
+        if wrong:
+            raise IdentificationError(f"of: variable {wrong[0]}, allowed are 0 to {states + inputs - 1}")
+        rows = []
+        for degree in sorted(set(degrees)):
+            if degree < 2:
+                raise IdentificationError(f"degrees: {degree}, allowed are 2 and above; 1 is the linear part")
+            for picked in combinations_with_replacement(chosen, degree):
+                rows.append(np.bincount(np.array(picked), minlength=states + inputs))
+        return cls(variables=states + inputs, exponents=np.array(rows, dtype=np.int64))
+
+    @classmethod
+    def none(cls, states: int, inputs: int) -> "Features":
+        """No features: a linear equation."""
+        return cls(variables=states + inputs)
+
+    @classmethod
+    def saturating(cls, weights: ArrayLike) -> "Features":
+        """``tanh(w . v + b) - tanh(b)`` with weights float[n_saturating, n_variables + 1], b last."""
+        array = finite_array("weights", weights, np.float64, 2)
+        return cls(variables=array.shape[1] - 1, weights=array)
+
+    @property
+    def count(self) -> int:
+        """Number of features."""
+        return len(self.exponents) + len(self.weights)
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters inside the features: the weights and biases of saturating ones."""
+        return int(self.weights.size)
+
+    @property
+    def table(self) -> Table:
+        """The same as the kernels take it."""
+        degree = int(self.exponents.sum(axis=1).max(initial=0))
+        factors = np.full((len(self.exponents), degree), -1, dtype=np.int64)
+        for row, powers in zip(factors, self.exponents, strict=True):
+            used = np.repeat(np.arange(self.variables), powers)
+            row[: used.size] = used
+        return Table(factors, np.array(self.limits), np.array(self.weights))
+
+    def names(self, states: int) -> tuple[str, ...]:
+        """One per feature: ``x1^2 x2``, ``u1 x1``, ``tanh 1``."""
+        variables = [f"x{j + 1}" if j < states else f"u{j + 1 - states}" for j in range(self.variables)]
+        found = []
+        for powers in self.exponents:
+            used = [(name, power) for name, power in zip(variables, powers, strict=True) if power]
+            found.append(" ".join(name if power == 1 else f"{name}^{power}" for name, power in used))
+        return (*found, *(f"tanh {index + 1}" for index in range(len(self.weights))))
+
+    def values(self, v: ArrayLike) -> Float:
+        """float[n_features, n] at variables float[n_variables, n]."""
+        points, table = self._points(v), self.table
+        found = np.empty((len(points), self.count))
+        for point, row in zip(points, found, strict=True):
+            feature_values(table, point, row)
+        return found.T
+
+    def derivatives(self, v: ArrayLike) -> Float:
+        """float[n_features, n_variables, n]: derivatives with respect to the variables at float[n_variables, n]."""
+        points, table = self._points(v), self.table
+        found, steep = np.empty((len(points), self.count, self.variables)), np.empty((len(self.weights), 2))
+        for point, slope in zip(points, found, strict=True):
+            feature_derivatives(table, point, slope, steep)
+        return np.moveaxis(found, 0, -1)
+
+    def scaled(self, scale: ArrayLike) -> tuple["Features", Float]:
+        """Features of ``v / scale``, and the factors float[n_features] by which theirs are to be multiplied to be these.
+
+        Raises `IdentificationError` unless there is a scale above zero for every variable.
+        """
+        size = np.asarray(scale, dtype=float)
+        if size.shape != (self.variables,) or not np.all((size > 0.0) & np.isfinite(size)):
+            raise IdentificationError(f"scale: {size}, needs {self.variables} finite values above zero")
+        weights = np.array(self.weights)
+        weights[:, :-1] *= size
+        factors = np.concatenate([np.prod(size**self.exponents, axis=1), np.ones(len(weights))])
+        return replace(self, weights=weights, limits=self.limits / size), factors
+
+    def bounded(self, limits: ArrayLike) -> "Features":
+        """The same with variables held at ``limits`` (float[n_variables]) in monomials."""
+        return replace(self, limits=np.asarray(limits, dtype=float))
+
+    def _points(self, v: ArrayLike) -> Float:
+        array = finite_array("v", v, np.float64, 2)
+        if array.shape[0] != self.variables:
+            raise IdentificationError(f"v: shape {array.shape}, needs {self.variables} rows")
+        return np.ascontiguousarray(array.T)

@@ -1,0 +1,175 @@
+"""Compiled features of a nonlinear state-space model, their derivatives, and the simulation of the model."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vibrolock.compiled import kernel
+
+__all__ = [
+    "Matrices",
+    "Table",
+    "Workspace",
+    "feature_derivatives",
+    "feature_values",
+    "outputs_at",
+    "simulate",
+    "state_after",
+    "workspace",
+]
+
+
+class Table(NamedTuple):
+    """Features ``phi(v)`` of ``v = (x, u)`` as arrays; see `identification.pnlss.features.Features`."""
+
+    factors: np.ndarray
+    """int[n_monomials, degree], variables that are multiplied; -1 for none."""
+    limits: np.ndarray
+    """float[n_variables], magnitude beyond which a variable counts as that much in monomials; inf for none."""
+    weights: np.ndarray
+    """float[n_saturating, n_variables + 1], ``tanh(w . v + b) - tanh(b)``; b in the last column."""
+
+
+class Matrices(NamedTuple):
+    """``x(k+1) = A x + B u + E phi(x, u)``, ``y = C x + D u + F chi(x, u)``."""
+
+    a: np.ndarray
+    b: np.ndarray
+    e: np.ndarray
+    c: np.ndarray
+    d: np.ndarray
+    f: np.ndarray
+
+
+class Workspace(NamedTuple):
+    """Room for what a simulation works with."""
+
+    v: np.ndarray
+    """float[n_variables], states and inputs."""
+    x: np.ndarray
+    """float[n_states], the next states."""
+    phi: np.ndarray
+    """float[n_state_features]."""
+    chi: np.ndarray
+    """float[n_output_features]."""
+
+
+def workspace(m: Matrices) -> Workspace:
+    """Room for a simulation of a model with these matrices."""
+    n = m.a.shape[0]
+    return Workspace(np.empty(n + m.b.shape[1]), np.empty(n), np.empty(m.e.shape[1]), np.empty(m.f.shape[1]))
+
+
+@kernel
+def feature_values(table: Table, v: np.ndarray, phi: np.ndarray) -> None:
+    """Write the features of ``v`` (float[n_variables]) to ``phi`` (float[n_features])."""
+    count, degree = table.factors.shape
+    for i in range(count):
+        product = 1.0
+        for position in range(degree):
+            j = table.factors[i, position]
+            if j >= 0:
+                product *= min(max(v[j], -table.limits[j]), table.limits[j])
+        phi[i] = product
+    for i in range(table.weights.shape[0]):
+        total = table.weights[i, v.size]
+        for j in range(v.size):
+            total += table.weights[i, j] * v[j]
+        phi[count + i] = np.tanh(total) - np.tanh(table.weights[i, v.size])
+
+
+@kernel
+def feature_derivatives(table: Table, v: np.ndarray, slope: np.ndarray, steep: np.ndarray) -> None:
+    """Write the derivatives of the features at ``v``.
+
+    ``slope`` (float[n_features, n_variables]) are those with respect to v. Of a saturating feature, ``tanh'`` at its argument
+    and at its bias go to ``steep`` (float[n_saturating, 2]): by a weight it changes with ``steep[0] v_j``, by its bias with
+    ``steep[0] - steep[1]``.
+    """
+    count, degree = table.factors.shape
+    slope[:] = 0.0
+    for i in range(count):
+        for position in range(degree):
+            j = table.factors[i, position]
+            if j < 0 or abs(v[j]) > table.limits[j]:
+                continue
+            product = 1.0
+            for other in range(degree):
+                k = table.factors[i, other]
+                if other != position and k >= 0:
+                    product *= min(max(v[k], -table.limits[k]), table.limits[k])
+            slope[i, j] += product
+    for i in range(table.weights.shape[0]):
+        bias = table.weights[i, v.size]
+        total = bias
+        for j in range(v.size):
+            total += table.weights[i, j] * v[j]
+        steep[i, 0] = 1.0 - np.tanh(total) ** 2
+        steep[i, 1] = 1.0 - np.tanh(bias) ** 2
+        for j in range(v.size):
+            slope[count + i, j] = steep[i, 0] * table.weights[i, j]
+
+
+@kernel
+def state_after(m: Matrices, phi: np.ndarray, v: np.ndarray, x: np.ndarray) -> None:
+    """Write ``A x + B u + E phi`` to ``x``, which is no part of ``v``."""
+    n = m.a.shape[0]
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += m.a[i, j] * v[j]
+        for j in range(m.b.shape[1]):
+            total += m.b[i, j] * v[n + j]
+        for j in range(phi.size):
+            total += m.e[i, j] * phi[j]
+        x[i] = total
+
+
+@kernel
+def outputs_at(m: Matrices, chi: np.ndarray, v: np.ndarray, y: np.ndarray) -> None:
+    """Write ``C x + D u + F chi`` to ``y``."""
+    n = m.a.shape[0]
+    for i in range(m.c.shape[0]):
+        total = 0.0
+        for j in range(n):
+            total += m.c[i, j] * v[j]
+        for j in range(m.d.shape[1]):
+            total += m.d[i, j] * v[n + j]
+        for j in range(chi.size):
+            total += m.f[i, j] * chi[j]
+        y[i] = total
+
+
+@kernel
+def simulate(
+    m: Matrices,
+    state_table: Table,
+    output_table: Table,
+    u: np.ndarray,
+    x0: np.ndarray,
+    bound: np.ndarray,
+    work: Workspace,
+    x: np.ndarray,
+    y: np.ndarray,
+) -> int:
+    """Simulate from ``x0`` under ``u`` (float[n, n_inputs]); write ``x`` (float[n, n_states]) and ``y`` (float[n, n_outputs]).
+
+    Returns n, or the first sample at which a state is beyond its ``bound`` (float[n_states]) or not a number: from there on
+    nothing is written. The state after the last sample is in ``work.x``.
+    """
+    n, count = m.a.shape[0], u.shape[0]
+    for i in range(n):
+        work.x[i] = x0[i]
+    for k in range(count):
+        for i in range(n):
+            if not abs(work.x[i]) <= bound[i]:
+                return int(k)
+            work.v[i] = work.x[i]
+            x[k, i] = work.x[i]
+        for j in range(u.shape[1]):
+            work.v[n + j] = u[k, j]
+        feature_values(output_table, work.v, work.chi)
+        outputs_at(m, work.chi, work.v, y[k])
+        feature_values(state_table, work.v, work.phi)
+        state_after(m, work.phi, work.v, work.x)
+    return int(count)

@@ -1,0 +1,268 @@
+"""Nonlinear state-space models in discrete time, polynomial ones (PNLSS) first.
+
+    x(k+1) = A x(k) + B u(k) + E phi(x(k), u(k)),    y(k) = C x(k) + D u(k) + F chi(x(k), u(k)),
+
+Paduart et al., Automatica 46, 2010; Scheel et al., Eq. (1). What the features phi and chi may be is said in
+`identification.pnlss.features`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.linear.subspace import StateSpace
+from identification.pnlss.features import Features
+from identification.pnlss.kernels import Matrices, simulate, workspace
+from identification.pnlss.simulation import Simulation
+from identification.validation import finite_array, positive, read_only
+
+__all__ = ["PnlssModel"]
+
+Float = NDArray[np.float64]
+
+_UNBOUNDED = 1e4
+"""A state this many times the largest of the training data has left every range in which a model says anything."""
+_MATRICES = ("a", "b", "e", "c", "d", "f")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PnlssModel:
+    """A nonlinear state-space model, in the units of its channels.
+
+    Parameters
+    ----------
+    a, b, e
+        float[n_states, n_states], float[n_states, n_inputs], float[n_states, n_state_features].
+    c, d, f
+        float[n_outputs, n_states], float[n_outputs, n_inputs], float[n_outputs, n_output_features].
+    state_features, output_features
+        phi and chi.
+    sample_rate_hz
+        Rate of the model.
+    inputs, outputs
+        What goes in, and what comes out.
+    state_range, input_range
+        float[n_states], float[n_inputs]: largest magnitudes in the training data; NaN if unknown.
+    training
+        What it was trained on, one line per experiment.
+    specimen
+        Name of what was tested.
+    notes
+        What a user should know about the model, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf in the matrices, and shapes that do not agree.
+    """
+
+    a: Float
+    b: Float
+    c: Float
+    d: Float
+    e: Float
+    f: Float
+    state_features: Features
+    output_features: Features
+    sample_rate_hz: float
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    state_range: Float
+    input_range: Float
+    training: tuple[str, ...] = ()
+    specimen: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("inputs", "outputs", "training", "notes"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        positive("sample_rate_hz", self.sample_rate_hz, "Hz")
+        for name in _MATRICES:
+            object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, 2))
+        for name in ("state_range", "input_range"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+        n, m, outputs = self.a.shape[0], len(self.inputs), len(self.outputs)
+        expected: dict[str, tuple[int, ...]] = {
+            "a": (n, n),
+            "b": (n, m),
+            "e": (n, self.state_features.count),
+            "c": (outputs, n),
+            "d": (outputs, m),
+            "f": (outputs, self.output_features.count),
+            "state_range": (n,),
+            "input_range": (m,),
+        }
+        for name, shape in expected.items():
+            if getattr(self, name).shape != shape:
+                raise IdentificationError(f"{name}: shape {getattr(self, name).shape}, needs {shape}")
+        for name, features in (("state_features", self.state_features), ("output_features", self.output_features)):
+            if features.variables != n + m:
+                raise IdentificationError(
+                    f"{name}: are of {features.variables} variables, needs {n} states and {m} inputs"
+                )
+
+    @classmethod
+    def linear(
+        cls,
+        matrices: StateSpace,
+        *,
+        sample_rate_hz: float,
+        inputs: tuple[Channel, ...],
+        outputs: tuple[Channel, ...],
+        specimen: str = "",
+        notes: tuple[str, ...] = (),
+    ) -> "PnlssModel":
+        """A linear model, without any features."""
+        n, m = matrices.b.shape
+        none = Features.none(n, m)
+        return cls(
+            **matrices._asdict(),
+            e=np.zeros((n, 0)),
+            f=np.zeros((len(outputs), 0)),
+            state_features=none,
+            output_features=none,
+            sample_rate_hz=sample_rate_hz,
+            inputs=inputs,
+            outputs=outputs,
+            state_range=np.full(n, np.nan),
+            input_range=np.full(m, np.nan),
+            specimen=specimen,
+            notes=notes,
+        )
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        return int(self.a.shape[0])
+
+    @property
+    def linear_part(self) -> StateSpace:
+        """A, B, C and D."""
+        return StateSpace(self.a, self.b, self.c, self.d)
+
+    @property
+    def matrices(self) -> Matrices:
+        """The matrices as the kernels take them."""
+        return Matrices(*(np.ascontiguousarray(getattr(self, name)) for name in _MATRICES))
+
+    @property
+    def nonlinear_coefficients(self) -> int:
+        """Coefficients in E and F."""
+        return int(self.e.size + self.f.size)
+
+    def with_features(self, state_features: Features, output_features: Features | None = None) -> "PnlssModel":
+        """The same linear part with features whose coefficients are zero; none in the outputs if not given."""
+        chi = Features.none(self.states, len(self.inputs)) if output_features is None else output_features
+        return replace(
+            self,
+            state_features=state_features,
+            output_features=chi,
+            e=np.zeros((self.states, state_features.count)),
+            f=np.zeros((len(self.outputs), chi.count)),
+        )
+
+    def scaled(self, *, states: ArrayLike, inputs: ArrayLike, outputs: ArrayLike) -> "PnlssModel":
+        """The same model of ``x / states``, ``u / inputs``, ``y / outputs`` (one scale above zero for each)."""
+        sx, su, sy = (np.asarray(values, dtype=float) for values in (states, inputs, outputs))
+        variables = np.concatenate([sx, su])
+        phi, of_phi = self.state_features.scaled(variables)
+        chi, of_chi = self.output_features.scaled(variables)
+        return replace(
+            self,
+            a=self.a * sx / sx[:, None],
+            b=self.b * su / sx[:, None],
+            e=self.e * of_phi / sx[:, None],
+            c=self.c * sx / sy[:, None],
+            d=self.d * su / sy[:, None],
+            f=self.f * of_chi / sy[:, None],
+            state_features=phi,
+            output_features=chi,
+            state_range=self.state_range / sx,
+            input_range=self.input_range / su,
+        )
+
+    def bounded(self, factor: float = 1.0) -> "PnlssModel":
+        """The same with every variable held at ``factor`` times its range in the monomials.
+
+        Nothing changes inside the range of the training data. Beyond it the features stay finite, and so does a run whose
+        linear part is stable: but bounded is not accurate. Raises `IdentificationError` where the range is unknown.
+        """
+        limits = positive("factor", factor) * np.concatenate([self.state_range, self.input_range])
+        if not np.all(np.isfinite(limits)):
+            raise IdentificationError("state_range: is unknown, and so where to hold the states")
+        return replace(
+            self,
+            state_features=self.state_features.bounded(limits),
+            output_features=self.output_features.bounded(limits),
+        )
+
+    def simulate(self, inputs: ArrayLike, *, initial_state: ArrayLike | None = None) -> Simulation:
+        """Response to ``inputs`` (float[n_inputs, n]) from an initial state (float[n_states]; rest if None).
+
+        A run that leaves all bounds is no error: it ends there, and `Simulation` says where. Raises `IdentificationError` on
+        NaN or inf, and on shapes that do not agree.
+        """
+        u = finite_array("inputs", inputs, np.float64, 2)
+        if u.shape[0] != len(self.inputs):
+            raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
+        begin = np.zeros(self.states) if initial_state is None else initial_state
+        x0 = np.array(finite_array("initial_state", begin, np.float64, 1))
+        if x0.size != self.states:
+            raise IdentificationError(f"initial_state: has {x0.size} values, needs {self.states}")
+        x, y = np.empty((u.shape[1], self.states)), np.empty((u.shape[1], len(self.outputs)))
+        m, tables = self.matrices, (self.state_features.table, self.output_features.table)
+        count = simulate(m, *tables, np.ascontiguousarray(u.T), x0, self.bound, workspace(m), x, y)
+        x[count:], y[count:] = np.nan, np.nan
+        return Simulation(
+            outputs=y.T,
+            states=x.T,
+            state_use=np.max(np.abs(x[:count]), axis=0, initial=0.0) / self.state_range,
+            input_use=np.max(np.abs(u), axis=1, initial=0.0) / self.input_range,
+            unbounded_at=None if count == u.shape[1] else int(count),
+        )
+
+    @property
+    def bound(self) -> Float:
+        """float[n_states]: magnitude beyond which a run counts as unbounded."""
+        return np.where(np.isfinite(self.state_range) & (self.state_range > 0.0), _UNBOUNDED * self.state_range, 1e100)
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        arrays: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in _MATRICES}
+        arrays |= {"state_range": self.state_range, "input_range": self.input_range}
+        for name, features in (("state_features", self.state_features), ("output_features", self.output_features)):
+            arrays |= {f"{name}/{part}": getattr(features, part) for part in ("exponents", "weights", "limits")}
+        return arrays, {
+            "sample_rate_hz": self.sample_rate_hz,
+            "inputs": [vars(channel) for channel in self.inputs],
+            "outputs": [vars(channel) for channel in self.outputs],
+            "training": list(self.training),
+            "specimen": self.specimen,
+            "notes": list(self.notes),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "PnlssModel":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        try:
+            values: dict[str, Any] = {name: arrays[name] for name in (*_MATRICES, "state_range", "input_range")}
+            variables = int(values["a"].shape[0] + values["b"].shape[1])
+            for name in ("state_features", "output_features"):
+                parts: dict[str, Any] = {part: arrays[f"{name}/{part}"] for part in ("exponents", "weights", "limits")}
+                values[name] = Features(variables=variables, **parts)
+            for name in ("inputs", "outputs"):
+                values[name] = tuple(Channel(**channel) for channel in attributes[name])
+            texts: dict[str, Any] = {name: tuple(attributes[name]) for name in ("training", "notes")}
+            return cls(
+                **values,
+                **texts,
+                sample_rate_hz=float(attributes["sample_rate_hz"]),
+                specimen=str(attributes["specimen"]),
+            )
+        except (KeyError, TypeError, IndexError) as error:
+            raise IdentificationError(f"PNLSS model: {error} is missing or unknown") from None

@@ -1,0 +1,47 @@
+"""What a nonlinear state-space model makes of an input, and how far outside of what it knows that lies."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Simulation"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Simulation:
+    """A simulated run.
+
+    Parameters
+    ----------
+    outputs
+        float[n_outputs, n]; NaN from ``unbounded_at`` on.
+    states
+        float[n_states, n], those before each sample's input acts; NaN from ``unbounded_at`` on.
+    state_use, input_use
+        float[n_states], float[n_inputs]: largest magnitude over the largest in the training data; NaN where that is
+        unknown. Beyond one a model extrapolates, and polynomials do that badly.
+    unbounded_at
+        First sample at which the states left all bounds; None if they never did.
+    """
+
+    outputs: Float
+    states: Float
+    state_use: Float
+    input_use: Float
+    unbounded_at: int | None = None
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the run stayed bounded."""
+        return self.unbounded_at is None
+
+    @property
+    def range_use(self) -> float:
+        """Largest of ``state_use`` and ``input_use``; inf for an unbounded run, NaN where nothing is known."""
+        if not self.bounded:
+            return float(np.inf)
+        both = np.concatenate([self.state_use, self.input_use])
+        return float(np.nanmax(both)) if np.any(np.isfinite(both)) else float(np.nan)
