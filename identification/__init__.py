@@ -40,10 +40,13 @@ if TYPE_CHECKING:
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.pnlss.error_table import ErrorTable
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
     from identification.pnlss.model import PnlssModel
+    from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
+    from identification.pnlss.study import IdentifiedModel, identify_many
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
@@ -75,6 +78,7 @@ __all__ = [
     "ConstantForceCurve",
     "ContinuousBackbone",
     "DistortionLevels",
+    "ErrorTable",
     "Exciter",
     "Experiment",
     "ExtrapolationError",
@@ -86,11 +90,13 @@ __all__ = [
     "FrequencyResponseMatrix",
     "HalfPeriods",
     "IdentificationError",
+    "IdentifiedModel",
     "InstrumentResponse",
     "LinearModes",
     "ModalAnalysis",
     "ModalProperties",
     "ModeShapes",
+    "ModelJob",
     "MultisineDesign",
     "MultisineMapping",
     "NonlinearMode",
@@ -128,6 +134,7 @@ __all__ = [
     "force_surface",
     "frequency_response",
     "identify_exciter",
+    "identify_many",
     "linear_modes",
     "mac",
     "mac_matrix",
@@ -141,6 +148,7 @@ __all__ = [
     "periodic_spectra",
     "periodic_vibration",
     "predict_sweep",
+    "realisation_combinations",
     "recorded_force_response",
     "repeatability",
     "response_band",
@@ -163,6 +171,7 @@ _MODULE_OF = {
     "ConstantForceCurve": "response_control.curves",
     "ContinuousBackbone": "slow_flows.continuous",
     "DistortionLevels": "multisine.distortion",
+    "ErrorTable": "pnlss.error_table",
     "Exciter": "prediction.exciter",
     "Experiment": "pnlss.experiment",
     "ExtrapolationError": "prediction.properties",
@@ -174,11 +183,13 @@ _MODULE_OF = {
     "FrequencyResponseMatrix": "linear.response_matrix",
     "HalfPeriods": "signals.half_periods",
     "IdentificationError": "errors",
+    "IdentifiedModel": "pnlss.study",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
     "ModalAnalysis": "linear.analysis",
     "ModalProperties": "prediction.properties",
     "ModeShapes": "nonlinear.mode_shapes",
+    "ModelJob": "pnlss.model_jobs",
     "MultisineDesign": "multisine.design",
     "MultisineMapping": "mapping.multisine",
     "NonlinearMode": "nonlinear.nonlinear_modes",
@@ -216,6 +227,7 @@ _MODULE_OF = {
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
     "identify_exciter": "prediction.exciter_fit",
+    "identify_many": "pnlss.study",
     "linear_modes": "linear.modal_analysis",
     "mac": "nonlinear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",
@@ -229,6 +241,7 @@ _MODULE_OF = {
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
     "predict_sweep": "prediction.sweeps",
+    "realisation_combinations": "pnlss.model_jobs",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",

@@ -1,0 +1,230 @@
+"""Tests of many models on what they were not trained on, and the table of their errors (Scheel et al., Tables 2 and 4)."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.model import PnlssModel
+from identification.pnlss.model_jobs import ModelJob
+
+__all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest", "simulation_error"]
+
+SAME_LEVEL = "same level"
+"""Test on the realisations that a model's own training set left out."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelTest:
+    """One model simulated with the input of one experiment."""
+
+    model: str
+    training_set: str
+    test: str
+    experiment: str
+    error: float
+    """Relative RMS error of the output; inf for a run that left all bounds."""
+    range_use: float
+    """Largest state or input over the largest in the training data; beyond 1 the model extrapolates."""
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the run stayed bounded."""
+        return bool(np.isfinite(self.error))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorCell:
+    """Statistics of the tests of one training set at one level; mean, deviation and largest are of the bounded runs."""
+
+    mean: float
+    standard_deviation: float
+    largest: float
+    models: int
+    runs: int
+    unbounded_runs: int
+    unbounded_models: int
+    range_use: float
+    """Largest of the bounded runs."""
+
+    @classmethod
+    def of(cls, tests: Iterable[ModelTest]) -> "ErrorCell":
+        """Statistics of some tests; NaN where there is nothing to take them of."""
+        rows = list(tests)
+        bounded = [row for row in rows if row.bounded]
+        errors = np.array([row.error for row in bounded])
+        return cls(
+            mean=float(errors.mean()) if errors.size else float("nan"),
+            standard_deviation=float(errors.std(ddof=1)) if errors.size > 1 else float("nan"),
+            largest=float(errors.max()) if errors.size else float("nan"),
+            models=len({row.model for row in rows}),
+            runs=len(rows),
+            unbounded_runs=len(rows) - len(bounded),
+            unbounded_models=len({row.model for row in rows if not row.bounded}),
+            range_use=max((row.range_use for row in bounded), default=float("nan")),
+        )
+
+    def row(self) -> dict[str, Any]:
+        """The numbers by name, ready for JSON."""
+        return dict(vars(self))
+
+    def __str__(self) -> str:
+        """As the paper writes it: mean and, in brackets, deviation; what is unbounded is counted and not called unstable."""
+        if not self.runs:
+            return "-"
+        text = f"{100 * self.mean:.2f} %"
+        if np.isfinite(self.standard_deviation):
+            text += f" ({100 * self.standard_deviation:.2f} %)"
+        if not self.unbounded_runs:
+            return text
+        counted = f"unbounded {self.unbounded_runs} of {self.runs}"
+        return counted if self.unbounded_runs == self.runs else f"{counted}; {text}"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ErrorTable:
+    """Errors by training set and test.
+
+    Parameters
+    ----------
+    output
+        Name of the output channel whose errors these are.
+    levels
+        Test levels, lowest first.
+    training_sets
+        Training sets in the order of the table.
+    tests
+        Every single test.
+    failures
+        Reasons by the names of models that could not be identified.
+    """
+
+    output: str
+    levels: tuple[str, ...]
+    training_sets: tuple[str, ...]
+    tests: tuple[ModelTest, ...]
+    failures: Mapping[str, str]
+
+    @classmethod
+    def of(
+        cls,
+        models: Mapping[str, PnlssModel],
+        jobs: Sequence[ModelJob],
+        levels: Mapping[str, Sequence[Experiment]],
+        *,
+        output: int | str = 0,
+        failures: Mapping[str, str] | None = None,
+    ) -> "ErrorTable":
+        """Test the models (by the names of their jobs) on every realisation of every level that they have not seen.
+
+        The same-level error is that on the realisations which a model's training set left out: one, of the mixed set one of
+        each level. Other levels are tested with all their realisations, of the mixed set with the one left out. ``output``
+        is the output channel by name or number. Raises `IdentificationError` where it is not there, or there is no level.
+        """
+        if not levels:
+            raise IdentificationError("levels: none given, needs one at least")
+        names = [channel.name for channel in next(iter(levels.values()))[0].output_channels]
+        index = names.index(output) if output in names else output
+        if not isinstance(index, int) or not 0 <= index < len(names):
+            raise IdentificationError(f"output: is {output}, allowed are {', '.join(names)}")
+        tests: list[ModelTest] = []
+        for job in jobs:
+            if job.name not in models:
+                continue
+            for test, experiments in ((SAME_LEVEL, job.left_out), *levels.items()):
+                unseen = [one for one in experiments if test == SAME_LEVEL or not job.seen(one)]
+                tests += [_test(models[job.name], job, test, one, index) for one in unseen if test != job.training_set]
+        return cls(
+            output=names[index],
+            levels=tuple(levels),
+            training_sets=tuple(dict.fromkeys(job.training_set for job in jobs)),
+            tests=tuple(tests),
+            failures=dict(failures or {}),
+        )
+
+    def cell(self, training_set: str, test: str, *, model: str | None = None) -> ErrorCell:
+        """Statistics over all models of a training set, or of one of them."""
+        return ErrorCell.of(
+            row
+            for row in self.tests
+            if (row.training_set, row.test) == (training_set, test) and model in (None, row.model)
+        )
+
+    @cached_property
+    def selected(self) -> dict[str, str]:
+        """Per training set the model of smallest mean same-level error among those bounded there; none if there is none."""
+        found: dict[str, str] = {}
+        for training_set in self.training_sets:
+            names = dict.fromkeys(row.model for row in self.tests if row.training_set == training_set)
+            cells = {name: self.cell(training_set, SAME_LEVEL, model=name) for name in names}
+            bounded = {name: cell.mean for name, cell in cells.items() if cell.runs and not cell.unbounded_runs}
+            if bounded:
+                found[training_set] = min(bounded, key=bounded.__getitem__)
+        return found
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One dictionary per training set and test, of all models and of the selected one (``model`` has its name)."""
+        found = []
+        for training_set in self.training_sets:
+            for model in (None, self.selected.get(training_set)):
+                for test in (SAME_LEVEL, *(level for level in self.levels if level != training_set)):
+                    cell = self.cell(training_set, test, model=model)
+                    if cell.runs and (model is not None or cell.models):
+                        found.append({"training_set": training_set, "test": test, "model": model, **cell.row()})
+        return found
+
+    def text(self) -> str:
+        """Both parts as the paper has them: all models, and the selected ones."""
+        counts = {name: self.cell(name, SAME_LEVEL).models for name in self.training_sets}
+        heads = [f"{name} ({count} model{'' if count == 1 else 's'})" for name, count in counts.items()]
+        lines = [f"relative error of {self.output}: mean (standard deviation) over the bounded runs"]
+        lines += _aligned(["trained at", *heads], self._part({}))
+        chosen = [self.selected.get(name, "none bounded") for name in self.training_sets]
+        lines += ["selected: the smallest same-level error among the bounded"]
+        lines += _aligned(["model", *chosen], self._part(self.selected))
+        return "\n".join([*lines, *(f"not identified: {name}: {why}" for name, why in self.failures.items())])
+
+    def _part(self, models: Mapping[str, str]) -> list[list[str]]:
+        rows = []
+        for test in (SAME_LEVEL, *self.levels):
+            row = [test]
+            for name in self.training_sets:
+                shown = "-" if models and name not in models else str(self.cell(name, test, model=models.get(name)))
+                row.append("(same level)" if test == name else shown)
+            rows.append(row)
+        return rows
+
+
+def simulation_error(model: PnlssModel, experiment: Experiment, output: int = 0) -> tuple[float, float]:
+    """Relative RMS error of an output over the samples that count (Scheel et al., Section 3.3), and the range used.
+
+    Simulated from rest with the experiment's own input. The error of an unbounded run is inf.
+    """
+    simulation = model.simulate(experiment.inputs)
+    if not simulation.bounded:
+        return float("inf"), float("inf")
+    measured = experiment.counted_outputs[output]
+    difference = simulation.outputs[output, experiment.counted_from :] - measured
+    return float(np.linalg.norm(difference) / np.linalg.norm(measured)), simulation.range_use
+
+
+def _test(model: PnlssModel, job: ModelJob, test: str, experiment: Experiment, output: int) -> ModelTest:
+    error, range_use = simulation_error(model, experiment, output)
+    return ModelTest(
+        model=job.name,
+        training_set=job.training_set,
+        test=test,
+        experiment=experiment.name,
+        error=error,
+        range_use=range_use,
+    )
+
+
+def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table with columns as wide as they need."""
+    widths = [max(len(row[column]) for row in (heads, *rows)) for column in range(len(heads))]
+    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in (heads, *rows)]
