@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 
 from identification import (
     Backbone,
+    Experiment,
     ForceSurface,
     FrequencyResponse,
     FrequencyResponseMatrix,
@@ -20,6 +21,8 @@ from rig.campaigns.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.runner import carry_out, take_up
 from rig.errors import ConfigurationError
+from rig.experiments import experiments
+from rig.experiments.periods import Periods
 from rig.measurements import Estimator, backbone, force_surface, frequency_responses, response_matrices, spectra, sweeps
 from rig.recording.reader import Recording
 
@@ -61,6 +64,27 @@ class Run:
     def response_matrices(self, *, estimator: Estimator = "instrument") -> dict[float, FrequencyResponseMatrix]:
         """Frequency responses from the force to every motion of a multisine test, by level in V RMS."""
         return response_matrices(self.recording, estimator=estimator)
+
+    def experiments(
+        self,
+        *,
+        inputs: Sequence[str] = ("force",),
+        outputs: Sequence[str] | None = None,
+        rate_hz: float | None = None,
+        periods: Periods = "mean",
+        transient_periods: float = 1.0,
+        segment_periods: int = 30,
+    ) -> tuple[Experiment, ...]:
+        """The accepted points as training or test data of nonlinear state-space models (`rig.experiments.experiments`)."""
+        return experiments(
+            self.recording,
+            inputs=inputs,
+            outputs=outputs,
+            rate_hz=rate_hz,
+            periods=periods,
+            transient_periods=transient_periods,
+            segment_periods=segment_periods,
+        )
 
     def close(self) -> None:
         """Let go of the file; a temporary one is removed."""

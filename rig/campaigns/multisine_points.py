@@ -15,7 +15,7 @@ from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.plan import Column, Target
 from rig.daq import Channel
 
-__all__ = ["MULTISINE_COLUMNS", "measure_multisine_point", "spectra_of"]
+__all__ = ["MULTISINE_COLUMNS", "measure_multisine_point", "spectra_of", "turned_periods"]
 
 MULTISINE_COLUMNS = (
     Column("realisation", "realisation", "", ".0f"),
@@ -81,25 +81,34 @@ def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarr
     The channels' skew is taken out. Periods in which samples were lost are left out.
     """
     design = plan.design(bench.sample_rate_hz)
-    size = design.period_samples
-    turned: list[np.ndarray] = []
-    for index, rows in records.items():
-        if rows.size < plan.periods * size:
-            raise IdentificationError(f"record: has {rows.size} samples, needs {plan.periods * size}")
-        rows = rows[: plan.periods * size]
-        begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
-        signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
-        periods = signals.reshape(signals.shape[0], plan.periods, size)
-        whole = ~lost_rows(rows).reshape(plan.periods, size).any(axis=1)
-        if not whole.any():
-            raise IdentificationError("record: samples were lost on their way in every period")
-        turned.append(np.roll(periods[:, whole], begun, axis=2).reshape(signals.shape[0], -1))
+    channels = len(bench.channels) + 1
+    turned = [turned_periods(bench, plan, index, rows).reshape(channels, -1) for index, rows in records.items()]
     shortest = min(record.shape[1] for record in turned)  # all realisations with as many periods as the poorest has
     turned = [record[:, :shortest] for record in turned]
     spectra = periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
     without_skew = spectra.spectra.copy()
     without_skew[:, :, :-1] *= skew_turn(bench, spectra.frequency_hz)
     return replace(spectra, spectra=without_skew)
+
+
+def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarray) -> np.ndarray:
+    """float[n_channels + 1, n_periods, n]: whole periods of realisation ``index``, each beginning where the signal does.
+
+    The output comes last. Periods in which samples were lost are left out; the channels' skew is still in them. Raises
+    `identification.IdentificationError` where the record is too short, or no period is left.
+    """
+    design = plan.design(bench.sample_rate_hz)
+    size = design.period_samples
+    if rows.size < plan.periods * size:
+        raise IdentificationError(f"record: has {rows.size} samples, needs {plan.periods * size}")
+    rows = rows[: plan.periods * size]
+    begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
+    signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
+    periods = signals.reshape(signals.shape[0], plan.periods, size)
+    whole = ~lost_rows(rows).reshape(plan.periods, size).any(axis=1)
+    if not whole.any():
+        raise IdentificationError("record: samples were lost on their way in every period")
+    return np.asarray(np.roll(periods[:, whole], begun, axis=2))
 
 
 def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:
