@@ -16,6 +16,7 @@ from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
 from rig.cli_options import Json, Output, Overwrite, Realtime, show_file
+from rig.cli_reproduce import reproduce_
 from rig.cli_tune import tune_
 
 __all__ = ["app", "main"]
@@ -47,6 +48,7 @@ app.command("tune")(tune_)
 app.command()(emulate)
 app.command()(conformance)
 app.command("check")(check_)
+app.command("reproduce")(reproduce_)
 
 
 @app.command()

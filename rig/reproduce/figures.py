@@ -1,0 +1,132 @@
+"""Figures of a study: errors by training set, steady responses with the truth, sweeps."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.pnlss.error_table import SAME_LEVEL
+from rig.errors import RecordingError
+from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, title
+from rig.reproduce.study import Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_study"]
+
+_SEED = 0
+
+
+def draw_study(study: Study) -> None:
+    """Write ``errors.png``, ``steady.png`` and ``sweeps.png``, those that there is something for."""
+    _write(study, "errors", _errors, (9.0, 3.8))
+    if study.steady:
+        _write(study, "steady", _steady, (9.0, 4.2))
+    if study.sweeps:
+        _write(study, "sweeps", _sweeps, (9.0, 2.4 * len(study.options.specimen.sweeps) + 0.6))
+
+
+def _write(study: Study, name: str, draw: Callable[["Figure", Study], None], size: tuple[float, float]) -> None:
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    path = study.options.result(f"{name}.png")
+    with mpl.rc_context(STYLE):
+        page = Figure(figsize=size, layout="constrained")
+        draw(page, study)
+        try:
+            page.savefig(path)
+        except OSError as error:
+            raise RecordingError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _errors(page: "Figure", study: Study) -> None:
+    """Every test as a dot: a panel per training set, a column per test level; what is unbounded is counted on top."""
+    table = study.table
+    axes = page.subplots(1, len(table.training_sets), sharey=True, squeeze=False)[0]
+    random = np.random.default_rng(_SEED)
+    for axis, training_set in zip(axes, table.training_sets, strict=True):
+        tests = [test for test in (SAME_LEVEL, *table.levels) if table.cell(training_set, test).runs]
+        for column, test in enumerate(tests):
+            rows = [row for row in table.tests if (row.training_set, row.test) == (training_set, test)]
+            errors = np.array([row.error for row in rows if row.bounded])
+            axis.plot(column + random.uniform(-0.25, 0.25, errors.size), 100 * errors, ".", color=MAIN, ms=4, alpha=0.6)
+            if errors.size:
+                axis.plot([column - 0.3, column + 0.3], 2 * [100 * errors.mean()], color=SECOND)
+            if errors.size < len(rows):
+                text = f"{len(rows) - errors.size} of {len(rows)}\nunbounded"
+                axis.text(column, 0.99, text, transform=axis.get_xaxis_transform(), ha="center", va="top", fontsize=7)
+        axis.set_xticks(range(len(tests)), tests, rotation=30)
+        axis.set_xlim(-0.6, len(tests) - 0.4)
+        axis.set_title(f"trained at {training_set}", fontsize=9)
+        axis.set_yscale("log")
+    axes[0].set_ylabel(f"relative error of {table.output}, %")
+    title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of all models")
+
+
+def _steady(page: "Figure", study: Study) -> None:
+    """One panel per force: selected models, the rig at constant fundamental, and its peak under a pure sine."""
+    forces = sorted({one.force_n for one in study.steady})
+    axes = page.subplots(1, len(forces), squeeze=False)[0]
+    colours = _colours(study)
+    for axis, force_n in zip(axes, forces, strict=True):
+        truth = study.truth[force_n]
+        axis.plot(
+            truth.frequency_hz, 1e3 * truth.amplitude_m, color=REJECTED, lw=3.0, label="rig, constant fundamental"
+        )
+        for one in study.steady:
+            if one.force_n != force_n:
+                continue
+            if one.held == "pure-sine":
+                axis.plot(one.truth_hz, 1e3 * one.truth_m, "k+", ms=8)
+            if one.prediction is not None:
+                dashed = one.held == "fundamental" and study.options.input == "force"
+                axis.plot(
+                    one.prediction.frequency_hz,
+                    1e3 * one.prediction.amplitude_m(),
+                    "--" if dashed else "-",
+                    color=colours[one.training_set],
+                    lw=1.0,
+                    label=None if dashed else one.training_set,
+                )
+        _around(axis, truth.frequency_hz, 1e3 * truth.amplitude_m)
+        axis.set(xlabel="frequency, Hz", title=f"{force_n:g} N")
+    axes[0].set_ylabel("displacement of the drive point, mm")
+    axes[0].legend(fontsize=7)
+    title(page, f"{study.options.specimen.name}: steady responses; dashed: exciter coupled; +: rig, pure sine")
+
+
+def _sweeps(page: "Figure", study: Study) -> None:
+    """One panel per sweep: envelopes over the frequency of the plan."""
+    names = list(dict.fromkeys(one.sweep for one in study.sweeps))
+    axes = page.subplots(len(names), 1, squeeze=False)[:, 0]
+    colours = _colours(study)
+    for axis, name in zip(axes, names, strict=True):
+        shown = [one for one in study.sweeps if one.sweep == name]
+        top = float(shown[0].measured.max())
+        axis.plot(shown[0].frequency_hz, shown[0].measured, color=REJECTED, lw=2.4, label="recorded")
+        for one in shown:
+            unbounded = "" if np.isnan(one.unbounded_s) else ", unbounded"
+            label = f"{one.training_set}{unbounded}"
+            axis.plot(one.frequency_hz, one.simulated, color=colours[one.training_set], lw=1.0, label=label)
+        axis.set_ylim(0.0, 2.5 * top)
+        axis.set(ylabel="acceleration, m/s²", title=name)
+        axis.legend(fontsize=7, ncols=5, loc="upper right")
+    axes[-1].set_xlabel("frequency of the plan, Hz")
+    title(page, f"{study.options.specimen.name}: sweeps simulated from the measured {study.options.input}")
+
+
+def _around(axis: Any, frequency_hz: Any, amplitude: Any) -> None:
+    """The resonance, and what models make of it next to it."""
+    near = frequency_hz[amplitude > 0.15 * amplitude.max()]
+    margin = 0.5 * np.ptp(near)
+    axis.set_xlim(near.min() - margin, near.max() + margin)
+    axis.set_ylim(0.0, 2.0 * amplitude.max())
+
+
+def _colours(study: Study) -> dict[str, Any]:
+    from matplotlib import colormaps
+
+    sets = study.table.training_sets
+    return {name: colormaps["viridis"](0.9 * index / max(1, len(sets) - 1)) for index, name in enumerate(sets)}

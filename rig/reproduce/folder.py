@@ -1,0 +1,48 @@
+"""The folder of a study: what is in it is taken up, and nothing else is mixed with it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rig.errors import RecordingError
+from rig.reproduce.options import Options
+
+__all__ = ["prepare", "write_json"]
+
+
+def prepare(options: Options) -> None:
+    """Make the folders; `RecordingError` where one holds a study of other settings, or cannot be made."""
+    try:
+        options.recordings.mkdir(parents=True, exist_ok=True)
+        options.models_folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{options.folder}: cannot be made: {error.strerror}") from None
+    _same(options.folder / "study.json", options.of_the_recordings)
+    _same(options.result("models.json"), options.of_the_models)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a document whole or not at all; `RecordingError` where it cannot be."""
+    new = path.with_name(path.name + ".new")
+    try:
+        new.write_text(json.dumps(value, indent=1), encoding="utf-8")
+        new.replace(path)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _same(path: Path, settings: dict[str, Any]) -> None:
+    """Keep the settings, or refuse others than those that are kept."""
+    settings = json.loads(json.dumps(settings))
+    if not path.exists():
+        write_json(path, settings)
+        return
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        differing = [name for name in settings if kept.get(name) != settings[name]]
+    except (OSError, ValueError, AttributeError) as error:
+        raise RecordingError(f"{path}: cannot be read: {error}; choose another folder") from None
+    if differing:
+        name = differing[0]
+        was = "" if name == "bench" else f" {kept.get(name)}, asked for is {settings[name]}"
+        raise RecordingError(f"{path}: the folder holds a study with another {name}{was or ''}; choose another folder")

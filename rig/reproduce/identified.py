@@ -1,0 +1,109 @@
+"""The models of a study: identified once, each kept as it comes."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification import (
+    Experiment,
+    FitSettings,
+    ModelJob,
+    PnlssFit,
+    identify_many,
+    identify_pnlss,
+    realisation_combinations,
+)
+from rig.models.files import load, save
+from rig.reproduce.options import Options
+
+__all__ = ["Models", "identify_all"]
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """All models of a study."""
+
+    jobs: tuple[ModelJob, ...]
+    """What each was identified from."""
+    fits: Mapping[str, PnlssFit]
+    """By name."""
+    failures: Mapping[str, str]
+    """Reasons of those that could not be identified, by name."""
+
+    def times(self) -> list[dict[str, Any]]:
+        """Per training set: number of models, seconds and iterations of their fits over time."""
+        found = []
+        for training_set in dict.fromkeys(job.training_set for job in self.jobs):
+            fits = [self.fits[j.name] for j in self.jobs if j.training_set == training_set and j.name in self.fits]
+            if not fits:
+                continue
+            seconds = np.array([fit.history.seconds[-1] for fit in fits])
+            iterations = np.array([fit.history.iterations for fit in fits])
+            found.append(
+                {
+                    "training_set": training_set,
+                    "models": len(fits),
+                    "seconds_mean": float(seconds.mean()),
+                    "seconds_most": float(seconds.max()),
+                    "iterations_mean": float(iterations.mean()),
+                    "seconds_per_iteration": float(seconds.sum() / max(1, iterations.sum())),
+                    "chosen_mean": float(np.mean([fit.chosen for fit in fits])),
+                }
+            )
+        return found
+
+
+def identify_all(
+    options: Options,
+    levels: Mapping[str, Sequence[Experiment]],
+    beside: Sequence[Experiment],
+    say: Callable[[str], None],
+) -> Models:
+    """Identify what is not in the folder yet. `KeyboardInterrupt` leaves there what was finished."""
+    jobs = realisation_combinations(levels, models=options.counts, mixed=options.mixed, beside=beside)
+    files = {job.name: _file(options, job.name) for job in jobs}
+    fits: dict[str, PnlssFit] = {name: load(path) for name, path in files.items() if path.exists()}
+    failures: dict[str, str] = {}
+    specimen = options.specimen
+    identify = partial(
+        _identify,
+        states=specimen.states,
+        degrees=specimen.degrees,
+        saturating=options.saturating,
+        seed=options.seed,
+        settings=FitSettings(iterations=options.iterations),
+    )
+    for found in identify_many(jobs, identify, n_jobs=options.jobs, done=fits):
+        if found.fit is None:
+            failures[found.name] = found.reason
+        else:
+            fits[found.name] = found.fit
+            save(found.fit, files[found.name])
+        count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
+        say(f"{count}  {_outcome(found.fit, found.reason)}  {found.seconds:.1f} s")
+    return Models(jobs, fits, failures)
+
+
+def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment], **how: Any) -> PnlssFit:
+    """One model; a fit that Ctrl-C has cut short is none."""
+    fit = identify_pnlss(training, validation=validation, **how)
+    if fit.interrupted:
+        raise KeyboardInterrupt
+    return fit
+
+
+def _outcome(fit: PnlssFit | None, reason: str) -> str:
+    if fit is None:
+        return f"FAILED: {reason}"
+    return (
+        f"training {100 * fit.training_error:6.3f} %  validation {100 * fit.validation_error:6.3f} %  iteration "
+        f"{fit.chosen} of {fit.history.iterations}"
+    )
+
+
+def _file(options: Options, name: str) -> Path:
+    return options.models_folder / f"{name.replace(' ', '-')}.h5"

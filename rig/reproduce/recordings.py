@@ -1,0 +1,130 @@
+"""The recordings of a study: made once, taken up where they were interrupted."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rig
+from identification import Experiment
+from rig.bench import Bench
+from rig.campaigns.execution import Progress
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.plan import Plan
+from rig.campaigns.plans import load_plan
+from rig.console import RunProgress
+from rig.errors import RigError
+from rig.experiments import experiments
+from rig.recording.journal import journal_path
+from rig.recording.reader import Recording
+from rig.reproduce.options import Options
+
+__all__ = ["multisines", "recorded", "segments", "training_data"]
+
+_REDRAWN = 20
+"""Times that the phases of a realisation are drawn anew, where its peaks are beyond the bench's limits."""
+_STOPPED = "stop_requested"
+
+
+def multisines(options: Options, say: Callable[[str], None]) -> dict[str, tuple[Experiment, ...]]:
+    """All realisations by level."""
+    found: dict[str, tuple[Experiment, ...]] = {}
+    for level, name in options.plans.items():
+        plan = _multisine(options, name)
+        if not options.scatter:
+            found[level] = training_data(options, recorded(options, name, say))
+            continue
+        say(f"{name}: {plan.realisations} realisations, a run each")
+        runs = [_own_run(options, name, plan, index) for index in range(plan.realisations)]
+        found[level] = tuple(one for path in runs for one in training_data(options, path))
+    return found
+
+
+def segments(options: Options, say: Callable[[str], None]) -> tuple[Experiment, ...]:
+    """Points of the backbone, to be fitted beside multisines."""
+    return training_data(options, recorded(options, options.specimen.backbone, say))
+
+
+def recorded(options: Options, name: str, say: Callable[[str], None]) -> Path:
+    """The recording of a shipped plan, one run with a seed of its own."""
+    path = options.recordings / f"{name}.h5"
+    if not path.exists():
+        say(f"{name}: recording")
+    plan = load_plan(f"{options.specimen.name}/{name}")
+    _make(plan, _bench(options), path, _seed(options, name))
+    return path
+
+
+def _own_run(options: Options, name: str, plan: MultisinePlan, index: int) -> Path:
+    """One realisation as a run with a seed of its own: the specimen then is another one."""
+    path = options.recordings / f"{name}-{index:02d}.h5"
+    seed = _seed(options, name) + 1 + index
+    for draw in range(_REDRAWN):
+        phases = plan.phase_seed + 1000 * (1 + index) + 100_000 * draw
+        one = plan.model_copy(update={"realisations": 1, "phase_seed": phases})
+        if _make(one, _bench(options), path, seed, quiet=True):
+            return path
+        path.unlink()
+    raise RigError(
+        f"{path}: no phases of {_REDRAWN} keep {name} within the limits of bench {options.bench.name}; lower the level"
+    )
+
+
+def _make(plan: Plan, bench: Bench, path: Path, seed: int, *, quiet: bool = False) -> bool:
+    """Record, finish, or leave what is complete; whether it is. `KeyboardInterrupt` where the user stopped it."""
+    if path.exists() and not journal_path(path).exists():
+        with Recording(path) as recording:
+            if recording.complete:
+                return True
+    progress: Any = None if quiet else RunProgress(KINDS[plan.kind].columns)
+    with _closed(progress):
+        if path.exists() or journal_path(path).exists():
+            run = rig.resume(path, progress=progress)
+        else:
+            run = rig.run(plan, bench=bench, output=path, seed=seed, progress=progress)
+    with run:
+        end = run.recording.parts[-1].end or {}
+        if end.get("reason") == _STOPPED:
+            raise KeyboardInterrupt
+        return run.complete
+
+
+@contextmanager
+def _closed(progress: "Progress | None") -> Iterator[None]:
+    try:
+        yield
+    finally:
+        if isinstance(progress, RunProgress):
+            progress.close()
+
+
+def training_data(options: Options, path: Path) -> tuple[Experiment, ...]:
+    """Experiments of a recording, as the models of this study want them."""
+    outputs = (*(("force",) if options.input == "voltage" else ()), *options.specimen.outputs)
+    with Recording(path) as recording:
+        return experiments(recording, inputs=(options.input,), outputs=outputs, rate_hz=options.specimen.rate_hz)
+
+
+def _multisine(options: Options, name: str) -> MultisinePlan:
+    plan = load_plan(f"{options.specimen.name}/{name}")
+    assert isinstance(plan, MultisinePlan)
+    return plan
+
+
+def _bench(options: Options) -> Bench:
+    """The bench, scattering if that was asked for."""
+    if not options.scatter:
+        return options.bench
+    driver = options.bench.driver
+    scatter = {**driver.options.get("scatter", {}), "frequency": options.scatter}
+    return options.bench.model_copy(
+        update={"driver": driver.model_copy(update={"options": {**driver.options, "scatter": scatter}})}
+    )
+
+
+def _seed(options: Options, name: str) -> int:
+    """A seed for every plan, from that of the study; the thousand after it are for its runs."""
+    specimen = options.specimen
+    names = [*specimen.levels.values(), specimen.backbone, specimen.exciter, *specimen.sweeps]
+    return options.seed * 1_000_000 + 1000 * names.index(name)

@@ -1,0 +1,170 @@
+"""A study as text, and as files: the table as JSON and CSV."""
+
+import csv
+import io
+import json
+from typing import Any
+
+from identification.pnlss.error_table import SAME_LEVEL
+from rig.console import number, print_table
+from rig.errors import RecordingError
+from rig.reproduce.folder import write_json
+from rig.reproduce.options import Options
+from rig.reproduce.study import VARIANTS, Study
+
+__all__ = ["say_study", "write_tables"]
+
+_ERROR_COLUMNS = (
+    "variant",
+    "training_set",
+    "test",
+    "model",
+    "mean",
+    "standard_deviation",
+    "largest",
+    "models",
+    "runs",
+    "unbounded_runs",
+    "unbounded_models",
+    "range_use",
+)
+
+
+def write_tables(study: Study) -> None:
+    """``table.json`` with everything, ``errors.csv`` with the error tables; `RecordingError` where they cannot be written."""
+    summary = study.summary()
+    write_json(study.options.result("table.json"), _plain(summary))
+    text = io.StringIO()
+    rows = csv.DictWriter(text, _ERROR_COLUMNS, lineterminator="\n")
+    rows.writeheader()
+    for variant, errors in summary["errors"].items():
+        for error in errors:
+            rows.writerow({"variant": variant, **error, "model": error["model"] or "all"})
+    path = study.options.result("errors.csv")
+    try:
+        path.write_text(text.getvalue(), encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def say_study(study: Study) -> None:
+    """Print what a person wants to read."""
+    options = study.options
+    scatter = f", {100 * options.scatter:g} % scatter from run to run" if options.scatter else ""
+    print(f"{options.specimen.name}, models {options.variant}{scatter}")
+    print(study.table.text())
+    print()
+    _say_variants(study)
+    _say_times(study)
+    if study.steady:
+        _say_steady(study)
+    if study.sweeps:
+        _say_sweeps(study)
+    _say_others(options)
+
+
+def _say_variants(study: Study) -> None:
+    """What each remedy that needs no further fit buys, over all models."""
+    print("what else the fits offer, all models:")
+    rows = []
+    for name, table in study.tables.items():
+        for training_set in table.training_sets:
+            cells = [table.cell(training_set, test) for test in (SAME_LEVEL, *table.levels)]
+            rows.append([name, training_set, *(str(cell) for cell in cells)])
+    print_table(["model", "trained at", SAME_LEVEL, *study.table.levels], rows)
+    print()
+
+
+def _say_times(study: Study) -> None:
+    print_table(
+        ("trained at", "models", "s a model", "at most s", "iterations", "s an iteration", "chosen"),
+        [
+            (
+                row["training_set"],
+                str(row["models"]),
+                number(row["seconds_mean"], ".1f"),
+                number(row["seconds_most"], ".1f"),
+                number(row["iterations_mean"], ".0f"),
+                number(row["seconds_per_iteration"], ".3f"),
+                number(row["chosen_mean"], ".0f"),
+            )
+            for row in study.models.times()
+        ],
+    )
+    print()
+
+
+def _say_steady(study: Study) -> None:
+    print("steady peaks of the selected models against the rig's own:")
+    rows = []
+    for row in (one.row() for one in study.steady):
+        rows.append(
+            (
+                row["training_set"],
+                f"{row['force_n']:g} N",
+                row["force"],
+                number(row["truth_m"], ".4f", 1e3),
+                number(row["peak_m"], ".4f", 1e3),
+                number(row["error"], "+.1f", 100.0),
+                number(row.get("frequency_error"), "+.3f", 100.0),
+                number(row["range_use"], ".2f"),
+                "" if row["error"] is not None else row["notes"][0],
+            )
+        )
+    print_table(("trained at", "force", "", "rig mm", "model mm", "error %", "frequency %", "range use", ""), rows)
+    print()
+
+
+def _say_sweeps(study: Study) -> None:
+    print("sweeps simulated by the selected models, drive channel:")
+    rows = []
+    for row in (one.row() for one in study.sweeps):
+        rows.append(
+            (
+                row["sweep"],
+                row["training_set"],
+                number(row["peak_measured"], ".3f"),
+                number(row["peak_error"], "+.1f", 100.0),
+                number(row["rms_error"], ".1f", 100.0),
+                number(row["range_use"], ".2f"),
+                "" if row["bounded"] else f"unbounded from {row['unbounded_s']:.2f} s on",
+            )
+        )
+    print_table(("sweep", "trained at", "peak m/s^2", "peak error %", "RMS error %", "range use", ""), rows)
+    print()
+
+
+def _say_others(options: Options) -> None:
+    """The same errors of other kinds of models of these recordings, as far as they are in the folder."""
+    main = next(iter(VARIANTS))
+    rows = []
+    for path in sorted(options.folder.glob("*/table.json")):
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))["errors"][main]
+        except (OSError, ValueError, KeyError):
+            continue
+        for row in found:
+            if row["model"] is None:
+                rows.append(
+                    (
+                        path.parent.name,
+                        row["training_set"],
+                        row["test"],
+                        number(row["mean"], ".2f", 100.0),
+                        f"{row['unbounded_runs']} of {row['runs']}",
+                    )
+                )
+    if len({row[0] for row in rows}) > 1:
+        print("all kinds of models in this folder:")
+        print_table(("models", "trained at", "tested at", "mean error %", "unbounded"), rows)
+
+
+def _plain(value: Any) -> Any:
+    """The same with null for numbers that do not exist."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and (value != value or abs(value) == float("inf")):
+        return None
+    return value

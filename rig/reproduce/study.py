@@ -1,0 +1,104 @@
+"""`rig reproduce`: record, identify, test, predict, one after the other, all of it kept in a folder."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from identification import ErrorTable, Experiment, IdentificationError, PnlssFit, PnlssModel
+from rig.reproduce.folder import prepare
+from rig.reproduce.identified import Models, identify_all
+from rig.reproduce.options import Options
+from rig.reproduce.recordings import multisines, segments
+from rig.reproduce.steady import Steady, steady
+from rig.reproduce.sweeps import SweepResult, simulated_sweeps
+from simulators.analysis import PeriodicResponses
+
+__all__ = ["VARIANTS", "Study", "reproduce"]
+
+VARIANTS: dict[str, Callable[[PnlssFit], PnlssModel | None]] = {
+    "chosen on validation data": lambda fit: fit.model,
+    "last iterate": lambda fit: fit.last,
+    "chosen, monomials bounded": lambda fit: fit.model.bounded(),
+    "linear start": lambda fit: fit.linear,
+}
+"""What a fit offers without another one, by what it is called in tables; the first is the model."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Study:
+    """All results of a study."""
+
+    options: Options
+    """What was asked for."""
+    models: Models
+    """All models."""
+    tables: Mapping[str, ErrorTable]
+    """Error tables by variant."""
+    steady: Sequence[Steady] = ()
+    """Steady predictions of the selected models."""
+    truth: Mapping[float, PeriodicResponses] = field(default_factory=dict)
+    """Responses of the rig to constant fundamentals, by force."""
+    sweeps: Sequence[SweepResult] = ()
+    """Sweeps simulated by the selected models."""
+
+    @property
+    def table(self) -> ErrorTable:
+        """That of the models themselves."""
+        return self.tables[next(iter(VARIANTS))]
+
+    def summary(self) -> dict[str, Any]:
+        """Everything in one JSON-able dictionary."""
+        options = self.options
+        return {
+            "kind": "reproduction",
+            "specimen": options.specimen.name,
+            "input": options.input,
+            "with_backbone": options.with_backbone,
+            "saturating": options.saturating,
+            "scatter": options.scatter,
+            "seed": options.seed,
+            "iterations": options.iterations,
+            "output": self.table.output,
+            "selected": self.table.selected,
+            "failures": dict(self.models.failures),
+            "times": self.models.times(),
+            "errors": {name: table.rows() for name, table in self.tables.items()},
+            "steady": [one.row() for one in self.steady],
+            "sweeps": [one.row() for one in self.sweeps],
+        }
+
+
+def reproduce(options: Options, say: Callable[[str], None]) -> Study:
+    """Carry out a study, or what is missing of it in its folder.
+
+    ``say`` is given a line for everything that is begun or finished. Raises `rig.errors.RigError` where something cannot be
+    recorded or written, `identification.IdentificationError` where no model can be identified, `KeyboardInterrupt` after
+    Ctrl-C: the same call takes the folder up again.
+    """
+    prepare(options)
+    levels = multisines(options, say)
+    beside = segments(options, say) if options.with_backbone else ()
+    models = identify_all(options, levels, beside, say)
+    if not models.fits:
+        name, reason = next(iter(models.failures.items()))
+        raise IdentificationError(f"no model could be identified; {name}: {reason}")
+    tables = {name: _table(models, levels, of) for name, of in VARIANTS.items()}
+    table = next(iter(tables.values()))
+    selected = {name: (model, models.fits[model].model) for name, model in table.selected.items()}
+    found: list[Steady] = []
+    truth: dict[float, PeriodicResponses] = {}
+    if "steady" not in options.without:
+        say("steady responses")
+        found, truth = steady(options, selected, say)
+    swept: list[SweepResult] = []
+    if "sweeps" not in options.without:
+        swept = simulated_sweeps(options, selected, say)
+    return Study(options=options, models=models, tables=tables, steady=found, truth=truth, sweeps=swept)
+
+
+def _table(
+    models: Models, levels: Mapping[str, Sequence[Experiment]], of: Callable[[PnlssFit], PnlssModel | None]
+) -> ErrorTable:
+    variants = {name: of(fit) for name, fit in models.fits.items()}
+    known = {name: model for name, model in variants.items() if model is not None}
+    return ErrorTable.of(known, models.jobs, levels, output="drive", failures=models.failures)
