@@ -19,7 +19,7 @@ AT_REST = 0.01
 """Share of its largest value that a signal may have, RMS, in the first period of a record that begins at rest."""
 FEWEST_PERIODS = 8
 """Periods without which a settled point says nothing: its initial state takes some, and is to be known."""
-SHORTEST_PIECE = 50
+SHORTEST_PIECE = 20
 """Periods of a sweep's first frequency that a piece of it has at least."""
 
 
