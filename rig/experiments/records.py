@@ -71,7 +71,7 @@ def sweep_pieces(
         slow = _slower(signals, values, rate_hz, begins_at_rest=rest)
         called = name if len(pieces) == 1 else f"{name}, piece {number}"
         found = _experiment(signals, slow, rate_hz, "zero" if rest else "estimated", called, float(point["level"]))
-        yield replace(found, counted_from=int(max(0, before - piece.start) * rate_hz / fs))
+        yield replace(found, counted_from=round(max(0, before - piece.start) * rate_hz / fs))
 
 
 def _stretches(rows: np.ndarray) -> list[slice]:
