@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from typing import Any, get_args
 
 import numpy as np
 
 from identification import Experiment, IdentificationError
+from identification.signals.decimation import LARGEST_FACTOR
 from identification.validation import positive
 from rig.campaigns.drift import of_the_result
 from rig.campaigns.multisine import MultisinePlan
@@ -117,7 +119,7 @@ def _records(
         rows, name = point_rows(recording, point["number"]), _called(recording.path.stem, point)
         if recording.kind == "sweep":
             start_hz = float(recording.configuration["plan"]["start_hz"])
-            lead = _from_rest(recording, point["number"])
+            lead = _from_rest(recording, point["number"], Fraction(rate_hz / signals.bench.sample_rate_hz))
             rows = np.concatenate([lead, rows])
             yield from sweep_pieces(signals, point, rows, lead.size, start_hz=start_hz, rate_hz=rate_hz, name=name)
         else:
@@ -127,16 +129,25 @@ def _records(
                 yield found
 
 
-def _from_rest(recording: Recording, number: int) -> np.ndarray:
-    """The rows before a point from the last one without an output on: how it was brought to where it begins."""
+def _from_rest(recording: Recording, number: int, ratio: Fraction) -> np.ndarray:
+    """The rows before a point from the last one without an output on: how it was brought to where it begins.
+
+    With as many more as it takes for a sample at the new rate to fall on the point's first.
+    """
+    step = ratio.limit_denominator(LARGEST_FACTOR).denominator
     for part in reversed(recording.parts):
         for point in part.points:
             if point["number"] == number and "end_sample" in point:
                 first = int(point["first_sample"])
-                ends = [int(p["end_sample"]) for p in part.points if p.get("end_sample", first + 1) <= first]
-                rows = part.read(max(ends, default=0), first)
+                begin = max(
+                    (int(p["end_sample"]) for p in part.points if p.get("end_sample", first + 1) <= first), default=0
+                )
+                rows = part.read(begin, first)
                 quiet = np.flatnonzero(np.abs(rows["command_v"]) == 0.0)
-                return rows[int(quiet[-1]) :] if quiet.size else rows[:0]
+                if not quiet.size:
+                    return rows[:0]
+                lead = -(-(rows.size - int(quiet[-1])) // step) * step
+                return rows[max(rows.size - lead, rows.size % step) :]
     raise RecordingError(f"point {number}: nothing was recorded of it")
 
 

@@ -19,7 +19,7 @@ AT_REST = 0.01
 """Share of its largest value that a signal may have, RMS, in the first period of a record that begins at rest."""
 FEWEST_PERIODS = 8
 """Periods without which a settled point says nothing: its initial state takes some, and is to be known."""
-SHORTEST_PIECE = 50
+SHORTEST_PIECE = 20
 """Periods of a sweep's first frequency that a piece of it has at least."""
 
 
@@ -71,7 +71,7 @@ def sweep_pieces(
         slow = _slower(signals, values, rate_hz, begins_at_rest=rest)
         called = name if len(pieces) == 1 else f"{name}, piece {number}"
         found = _experiment(signals, slow, rate_hz, "zero" if rest else "estimated", called, float(point["level"]))
-        yield replace(found, counted_from=int(max(0, before - piece.start) * rate_hz / fs))
+        yield replace(found, counted_from=round(max(0, before - piece.start) * rate_hz / fs))
 
 
 def _stretches(rows: np.ndarray) -> list[slice]:
