@@ -41,8 +41,12 @@ if TYPE_CHECKING:
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.pnlss.error_table import ErrorTable
+    from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
+    from identification.pnlss.fitting.fit import fit_pnlss
+    from identification.pnlss.fitting.result import FitHistory, PnlssFit
+    from identification.pnlss.fitting.settings import FitProgress, FitSettings
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
@@ -83,6 +87,9 @@ __all__ = [
     "Experiment",
     "ExtrapolationError",
     "Features",
+    "FitHistory",
+    "FitProgress",
+    "FitSettings",
     "ForceDropOut",
     "ForceSurface",
     "FrequencyResponse",
@@ -103,6 +110,8 @@ __all__ = [
     "NonlinearModeMapping",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "PnlssErrors",
+    "PnlssFit",
     "PnlssModel",
     "PredictionError",
     "Predictions",
@@ -129,7 +138,9 @@ __all__ = [
     "demodulate",
     "distortion_levels",
     "error_table",
+    "estimated_initial_state",
     "extrapolated_to_zero",
+    "fit_pnlss",
     "force_drop_out",
     "force_surface",
     "frequency_response",
@@ -147,6 +158,7 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "pnlss_errors",
     "predict_sweep",
     "realisation_combinations",
     "recorded_force_response",
@@ -176,6 +188,9 @@ _MODULE_OF = {
     "Experiment": "pnlss.experiment",
     "ExtrapolationError": "prediction.properties",
     "Features": "pnlss.features",
+    "FitHistory": "pnlss.fitting.result",
+    "FitProgress": "pnlss.fitting.settings",
+    "FitSettings": "pnlss.fitting.settings",
     "ForceDropOut": "signals.sweeps",
     "ForceSurface": "response_control.force_surface",
     "FrequencyResponse": "frequency_responses",
@@ -196,6 +211,8 @@ _MODULE_OF = {
     "NonlinearModeMapping": "mapping.nonlinear_mode",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "PnlssErrors": "pnlss.errors",
+    "PnlssFit": "pnlss.fitting.result",
     "PnlssModel": "pnlss.model",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
@@ -222,7 +239,9 @@ _MODULE_OF = {
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
     "error_table": "prediction.comparison",
+    "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
+    "fit_pnlss": "pnlss.fitting.fit",
     "force_drop_out": "signals.sweeps",
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
@@ -240,6 +259,7 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "pnlss_errors": "pnlss.errors",
     "predict_sweep": "prediction.sweeps",
     "realisation_combinations": "pnlss.model_jobs",
     "recorded_force_response": "prediction.recorded_force",
