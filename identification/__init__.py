@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
+    from identification.linear.state_space_fit import StateSpaceFit, fit_state_space
     from identification.linear.subspace import StateSpace, subspace
     from identification.mapping.backbone import BackboneMapping, map_backbone
     from identification.mapping.multisine import MultisineMapping, map_multisine
@@ -108,6 +109,7 @@ __all__ = [
     "SlowFlow",
     "StabilisationDiagram",
     "StateSpace",
+    "StateSpaceFit",
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
@@ -124,6 +126,7 @@ __all__ = [
     "distortion_levels",
     "error_table",
     "extrapolated_to_zero",
+    "fit_state_space",
     "force_drop_out",
     "force_surface",
     "frequency_response",
@@ -196,6 +199,7 @@ _MODULE_OF = {
     "SlowFlow": "slow_flows.slow_flow",
     "StabilisationDiagram": "linear.stabilisation",
     "StateSpace": "linear.subspace",
+    "StateSpaceFit": "linear.state_space_fit",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
@@ -212,6 +216,7 @@ _MODULE_OF = {
     "distortion_levels": "multisine.distortion",
     "error_table": "prediction.comparison",
     "extrapolated_to_zero": "linear.extrapolation",
+    "fit_state_space": "linear.state_space_fit",
     "force_drop_out": "signals.sweeps",
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
