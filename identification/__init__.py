@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.pnlss.best_linear import best_linear_responses
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
     from identification.pnlss.model import PnlssModel
@@ -116,6 +117,7 @@ __all__ = [
     "VoltagePath",
     "VoltageSweep",
     "best_linear_approximation",
+    "best_linear_responses",
     "coherence",
     "combined",
     "compare",
@@ -206,6 +208,7 @@ _MODULE_OF = {
     "VoltagePath": "prediction.exciter",
     "VoltageSweep": "prediction.sweep_inputs",
     "best_linear_approximation": "multisine.best_linear_approximation",
+    "best_linear_responses": "pnlss.best_linear",
     "coherence": "multisine.coherences",
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",

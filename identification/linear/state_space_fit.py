@@ -1,8 +1,8 @@
 """Weighted fit of a discrete-time state-space model to frequency responses.
 
-The cost is ``sum_k e_k^H P_k e_k`` with ``e_k`` all paths of ``H(z_k) - H_k``, ``H(z) = C (z - A)^-1 B + D``, and P_k the inverse
-of their covariance (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 9 and
-14). All entries of A, B, C and D are free: a change of the states changes no response, so that n^2 directions are flat. The
+The cost is ``sum_k e_k^H P_k e_k`` with ``e_k`` all paths of ``H(z_k) - H_k``, ``H(z) = C (z - A)^-1 B + D``, and P_k the
+inverse of their covariance (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 9
+and 14). All entries of A, B, C and D are free: a change of the states changes no response, so that n^2 directions are flat. The
 step is a Levenberg-Marquardt step in the singular vectors of the Jacobian, columns scaled, without the flat ones (McKelvey,
 Helmersson and Ribarits, Automatica 40, 2004). Derivatives, with ``L = C (z - A)^-1`` and ``R = (z - A)^-1 B``:
 
