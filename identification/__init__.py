@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
+    from identification.linear.state_space_fit import StateSpaceFit, fit_state_space
     from identification.linear.subspace import StateSpace, subspace
     from identification.mapping.backbone import BackboneMapping, map_backbone
     from identification.mapping.multisine import MultisineMapping, map_multisine
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.pnlss.best_linear import best_linear_responses
     from identification.pnlss.error_table import ErrorTable
     from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
@@ -123,12 +125,14 @@ __all__ = [
     "SlowFlow",
     "StabilisationDiagram",
     "StateSpace",
+    "StateSpaceFit",
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
     "VoltagePath",
     "VoltageSweep",
     "best_linear_approximation",
+    "best_linear_responses",
     "coherence",
     "combined",
     "compare",
@@ -141,6 +145,7 @@ __all__ = [
     "estimated_initial_state",
     "extrapolated_to_zero",
     "fit_pnlss",
+    "fit_state_space",
     "force_drop_out",
     "force_surface",
     "frequency_response",
@@ -224,12 +229,14 @@ _MODULE_OF = {
     "SlowFlow": "slow_flows.slow_flow",
     "StabilisationDiagram": "linear.stabilisation",
     "StateSpace": "linear.subspace",
+    "StateSpaceFit": "linear.state_space_fit",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
     "VoltagePath": "prediction.exciter",
     "VoltageSweep": "prediction.sweep_inputs",
     "best_linear_approximation": "multisine.best_linear_approximation",
+    "best_linear_responses": "pnlss.best_linear",
     "coherence": "multisine.coherences",
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
@@ -242,6 +249,7 @@ _MODULE_OF = {
     "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
     "fit_pnlss": "pnlss.fitting.fit",
+    "fit_state_space": "linear.state_space_fit",
     "force_drop_out": "signals.sweeps",
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
