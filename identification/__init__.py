@@ -40,8 +40,12 @@ if TYPE_CHECKING:
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
+    from identification.pnlss.fitting.fit import fit_pnlss
+    from identification.pnlss.fitting.result import FitHistory, PnlssFit
+    from identification.pnlss.fitting.settings import FitProgress, FitSettings
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.simulation import Simulation
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
@@ -79,6 +83,9 @@ __all__ = [
     "Experiment",
     "ExtrapolationError",
     "Features",
+    "FitHistory",
+    "FitProgress",
+    "FitSettings",
     "ForceDropOut",
     "ForceSurface",
     "FrequencyResponse",
@@ -97,6 +104,8 @@ __all__ = [
     "NonlinearModeMapping",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "PnlssErrors",
+    "PnlssFit",
     "PnlssModel",
     "PredictionError",
     "Predictions",
@@ -123,7 +132,9 @@ __all__ = [
     "demodulate",
     "distortion_levels",
     "error_table",
+    "estimated_initial_state",
     "extrapolated_to_zero",
+    "fit_pnlss",
     "force_drop_out",
     "force_surface",
     "frequency_response",
@@ -140,6 +151,7 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "pnlss_errors",
     "predict_sweep",
     "recorded_force_response",
     "repeatability",
@@ -167,6 +179,9 @@ _MODULE_OF = {
     "Experiment": "pnlss.experiment",
     "ExtrapolationError": "prediction.properties",
     "Features": "pnlss.features",
+    "FitHistory": "pnlss.fitting.result",
+    "FitProgress": "pnlss.fitting.settings",
+    "FitSettings": "pnlss.fitting.settings",
     "ForceDropOut": "signals.sweeps",
     "ForceSurface": "response_control.force_surface",
     "FrequencyResponse": "frequency_responses",
@@ -185,6 +200,8 @@ _MODULE_OF = {
     "NonlinearModeMapping": "mapping.nonlinear_mode",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "PnlssErrors": "pnlss.errors",
+    "PnlssFit": "pnlss.fitting.result",
     "PnlssModel": "pnlss.model",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
@@ -211,7 +228,9 @@ _MODULE_OF = {
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
     "error_table": "prediction.comparison",
+    "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
+    "fit_pnlss": "pnlss.fitting.fit",
     "force_drop_out": "signals.sweeps",
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
@@ -228,6 +247,7 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "pnlss_errors": "pnlss.errors",
     "predict_sweep": "prediction.sweeps",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
