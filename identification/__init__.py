@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
+    from identification.linear.state_space_fit import StateSpaceFit, fit_state_space
     from identification.linear.subspace import StateSpace, subspace
     from identification.mapping.backbone import BackboneMapping, map_backbone
     from identification.mapping.multisine import MultisineMapping, map_multisine
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
+    from identification.pnlss.best_linear import best_linear_responses
     from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
@@ -55,6 +57,7 @@ if TYPE_CHECKING:
     from identification.prediction.predictions import Predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
+    from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun, error_spectra, simulated_run
     from identification.prediction.steady_prediction import SteadyPrediction
     from identification.prediction.sweep_inputs import VoltageSweep
     from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
@@ -79,6 +82,7 @@ __all__ = [
     "ConstantForceCurve",
     "ContinuousBackbone",
     "DistortionLevels",
+    "ErrorSpectra",
     "Exciter",
     "Experiment",
     "ExtrapolationError",
@@ -113,16 +117,19 @@ __all__ = [
     "ResponseBand",
     "ResponseMatrixMapping",
     "ShortPoint",
+    "SimulatedRun",
     "Simulation",
     "SlowFlow",
     "StabilisationDiagram",
     "StateSpace",
+    "StateSpaceFit",
     "SteadyPrediction",
     "SweepPrediction",
     "Transient",
     "VoltagePath",
     "VoltageSweep",
     "best_linear_approximation",
+    "best_linear_responses",
     "coherence",
     "combined",
     "compare",
@@ -131,10 +138,12 @@ __all__ = [
     "decimated",
     "demodulate",
     "distortion_levels",
+    "error_spectra",
     "error_table",
     "estimated_initial_state",
     "extrapolated_to_zero",
     "fit_pnlss",
+    "fit_state_space",
     "force_drop_out",
     "force_surface",
     "frequency_response",
@@ -157,6 +166,7 @@ __all__ = [
     "repeatability",
     "response_band",
     "short_point",
+    "simulated_run",
     "single_point_mode",
     "slow_flow",
     "stabilisation",
@@ -175,6 +185,7 @@ _MODULE_OF = {
     "ConstantForceCurve": "response_control.curves",
     "ContinuousBackbone": "slow_flows.continuous",
     "DistortionLevels": "multisine.distortion",
+    "ErrorSpectra": "prediction.simulated_runs",
     "Exciter": "prediction.exciter",
     "Experiment": "pnlss.experiment",
     "ExtrapolationError": "prediction.properties",
@@ -209,16 +220,19 @@ _MODULE_OF = {
     "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
     "ShortPoint": "slow_flows.short_points",
+    "SimulatedRun": "prediction.simulated_runs",
     "Simulation": "pnlss.simulation",
     "SlowFlow": "slow_flows.slow_flow",
     "StabilisationDiagram": "linear.stabilisation",
     "StateSpace": "linear.subspace",
+    "StateSpaceFit": "linear.state_space_fit",
     "SteadyPrediction": "prediction.steady_prediction",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
     "VoltagePath": "prediction.exciter",
     "VoltageSweep": "prediction.sweep_inputs",
     "best_linear_approximation": "multisine.best_linear_approximation",
+    "best_linear_responses": "pnlss.best_linear",
     "coherence": "multisine.coherences",
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
@@ -227,10 +241,12 @@ _MODULE_OF = {
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
+    "error_spectra": "prediction.simulated_runs",
     "error_table": "prediction.comparison",
     "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
     "fit_pnlss": "pnlss.fitting.fit",
+    "fit_state_space": "linear.state_space_fit",
     "force_drop_out": "signals.sweeps",
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
@@ -253,6 +269,7 @@ _MODULE_OF = {
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",
     "short_point": "slow_flows.short_points",
+    "simulated_run": "prediction.simulated_runs",
     "single_point_mode": "nonlinear.single_points",
     "slow_flow": "slow_flows.slow_flow",
     "stabilisation": "linear.stabilisation",

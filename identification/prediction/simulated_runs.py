@@ -54,7 +54,9 @@ class SimulatedRun:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         object.__setattr__(self, "error", read_only(self.error, np.float64))
         if self.error.shape != (len(self.outputs),):
-            raise IdentificationError(f"error: shape {self.error.shape}, needs one for each of {len(self.outputs)} outputs")
+            raise IdentificationError(
+                f"error: shape {self.error.shape}, needs one for each of {len(self.outputs)} outputs"
+            )
 
     @property
     def bounded(self) -> bool:

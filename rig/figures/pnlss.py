@@ -94,8 +94,12 @@ def _runs(axis: "Axes", found: "IdentifiedPnlss") -> None:
         of_use = [run for run in bounded if run.use == use]
         if of_use:
             axis.semilogy(
-                [run.range_use for run in of_use], [100.0 * run.error.max() for run in of_use],
-                mark, ms=4, color=colour, label=use,
+                [run.range_use for run in of_use],
+                [100.0 * run.error.max() for run in of_use],
+                mark,
+                ms=4,
+                color=colour,
+                label=use,
             )
     axis.axvline(1.0, color=REJECTED, lw=0.8, ls="--")
     lost = len(found.runs) - len(bounded)

@@ -141,9 +141,7 @@ def _say(summary: dict[str, Any]) -> None:
         f"{summary['nonlinear_coefficients']} nonlinear coefficients; features of the states: "
         f"{_said(summary['state_features'])}; of the outputs: {_said(summary['output_features'])}"
     )
-    modes = (
-        f"{p['frequency_hz']:.4f} Hz, {100.0 * p['damping_ratio']:.3f} %" for p in summary["poles"]
-    )
+    modes = (f"{p['frequency_hz']:.4f} Hz, {100.0 * p['damping_ratio']:.3f} %" for p in summary["poles"])
     print(f"poles of the linear part: {'; '.join(modes)}")
     if summary["fit"] is not None:
         fit = summary["fit"]

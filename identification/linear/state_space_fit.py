@@ -1,0 +1,205 @@
+"""Weighted fit of a discrete-time state-space model to frequency responses.
+
+The cost is ``sum_k e_k^H P_k e_k`` with ``e_k`` all paths of ``H(z_k) - H_k``, ``H(z) = C (z - A)^-1 B + D``, and P_k the
+inverse of their covariance (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 9
+and 14). All entries of A, B, C and D are free: a change of the states changes no response, so that n^2 directions are flat. The
+step is a Levenberg-Marquardt step in the singular vectors of the Jacobian, columns scaled, without the flat ones (McKelvey,
+Helmersson and Ribarits, Automatica 40, 2004). Derivatives, with ``L = C (z - A)^-1`` and ``R = (z - A)^-1 B``:
+
+    dH/dA_ij = L_i R_j,    dH/dB_ij = L_i e_j,    dH/dC_ij = e_i R_j,    dH/dD_ij = e_i e_j.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.linear.accelerance import WeightedResponses, Weighting, weighted_responses
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.linear.subspace import StateSpace
+from identification.validation import positive
+
+__all__ = ["StateSpaceFit", "fit_state_space", "response_jacobian", "spectral_radius"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_FLAT = 1e-11
+"""Singular value, relative to the largest, of a direction that says nothing: a similarity, or lost in rounding."""
+_CONVERGED = 1e-9
+"""Relative gain of the cost below which the iteration has come to rest; twice in a row."""
+_LEAST, _MOST = 1e-10, 1e6
+"""Range of the damping, relative to the largest singular value."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StateSpaceFit:
+    """A state-space model fitted to frequency responses.
+
+    Parameters
+    ----------
+    model
+        A, B, C and D; stable.
+    cost
+        float[n_iterations + 1], the weighted squared misfit at the start and after each iteration, over its number of values.
+        Relative weights: a mean squared relative error; known covariance: about one where nothing but noise is left.
+    residual
+        Root of the squared misfit over what the covariance lets expect; NaN where none is known.
+    error
+        float[n_outputs, n_inputs], RMS misfit over RMS response of every path, unweighted.
+    weighting
+        What weighted: ``total``, ``noise`` or ``relative``.
+    converged
+        Whether the iteration came to rest.
+    """
+
+    model: StateSpace
+    cost: Float
+    residual: float
+    error: Float
+    weighting: str
+    converged: bool
+
+
+def fit_state_space(
+    responses: FrequencyResponseMatrix,
+    start: StateSpace,
+    *,
+    sample_rate_hz: float,
+    weighting: Weighting = "auto",
+    iterations: int = 100,
+) -> StateSpaceFit:
+    """Fit a state-space model of the order of ``start`` to frequency responses, beginning from it.
+
+    Parameters
+    ----------
+    responses
+        One or several inputs and outputs; with their covariance where it is known.
+    start
+        Stable, for instance from `subspace`.
+    sample_rate_hz
+        Rate of the model, ``z = exp(2 pi i f / sample_rate_hz)``.
+    weighting
+        Which covariance weights the lines: ``total``, ``noise``, ``relative`` (none), or the first that is known.
+    iterations
+        At most so many.
+
+    Raises
+    ------
+    IdentificationError
+        On matrices that do not fit the responses, an unstable start, lines at or above half the sample rate, or fewer values
+        than free parameters.
+    """
+    data = weighted_responses(responses, weighting)
+    z = _points(responses, sample_rate_hz)
+    _check(data, start)
+    whitening = data.whitening
+    n = start.a.shape[0]
+    scale = 1.0 / np.sqrt(data.value.size)
+    model, damping, calm = start, 1e-3, 0
+    misfit = scale * _whitened(whitening, model.response(z) - data.value)
+    costs = [float(misfit @ misfit)]
+    for _ in range(iterations):
+        jacobian = scale * _whitened(whitening, response_jacobian(model, z))
+        size = np.linalg.norm(jacobian, axis=0)
+        size[size == 0.0] = 1.0
+        left, singular, right = np.linalg.svd(jacobian / size, full_matrices=False)
+        kept = singular > _FLAT * singular[0]
+        gradient = left[:, kept].T @ misfit
+        strong = singular[kept]
+        while damping < _MOST:
+            move = right[kept].T @ (gradient * strong / (strong**2 + (damping * strong[0]) ** 2))
+            trial = _moved(model, -move / size)
+            if spectral_radius(trial.a) < 1.0:
+                new = scale * _whitened(whitening, trial.response(z) - data.value)
+                if (cost := float(new @ new)) <= costs[-1]:
+                    break
+            damping *= 4.0
+        else:
+            calm = 2
+            break
+        calm = calm + 1 if costs[-1] - cost <= _CONVERGED * costs[-1] else 0
+        model, misfit, damping = trial, new, max(0.2 * damping, _LEAST)
+        costs.append(cost)
+        if calm > 1 or cost <= 1e-30:
+            break
+    free = sum(part.size for part in model) - n * n
+    return StateSpaceFit(
+        model=model,
+        cost=np.array(costs),
+        residual=_residual(data, costs[-1], free),
+        error=np.sqrt(np.mean(np.abs(model.response(z) - data.value) ** 2, axis=0))
+        / np.sqrt(np.mean(np.abs(data.value) ** 2, axis=0)),
+        weighting=data.kind,
+        converged=calm > 1 or costs[-1] <= 1e-30,
+    )
+
+
+def response_jacobian(model: StateSpace, z: Complex) -> Complex:
+    """complex[n_points, n_outputs, n_inputs, p]: derivatives of the response by A, B, C, D, each row by row."""
+    n, inputs, outputs = model.a.shape[0], model.b.shape[1], model.c.shape[0]
+    inverse = np.linalg.inv(z[:, None, None] * np.eye(n) - model.a)
+    left, right = model.c @ inverse, inverse @ model.b
+    row, column = np.eye(outputs), np.eye(inputs)
+    shape = (z.size, outputs, inputs)
+    parts = (
+        np.einsum("koi,kjm->komij", left, right),
+        np.einsum("koi,jm->komij", left, column),
+        np.einsum("oi,kjm->komij", row, right),
+        np.broadcast_to(np.einsum("oi,jm->omij", row, column), (*shape, outputs, inputs)),
+    )
+    return np.concatenate([part.reshape(*shape, -1) for part in parts], axis=-1)
+
+
+def spectral_radius(a: Float) -> float:
+    """Largest magnitude of an eigenvalue; 0 without states."""
+    return float(np.max(np.abs(np.linalg.eigvals(a)), initial=0.0))
+
+
+def _points(responses: FrequencyResponseMatrix, sample_rate_hz: float) -> Complex:
+    if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
+        raise IdentificationError(
+            f"sample_rate_hz: is {sample_rate_hz:g} Hz, needs more than twice {responses.frequency_hz[-1]:g} Hz"
+        )
+    return np.asarray(np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz))
+
+
+def _check(data: WeightedResponses, start: StateSpace) -> None:
+    lines, outputs, inputs = data.value.shape
+    n = start.a.shape[0]
+    shapes = ((n, n), (n, inputs), (outputs, n), (outputs, inputs))
+    for name, part, shape in zip("abcd", start, shapes, strict=True):
+        if part.shape != shape:
+            raise IdentificationError(f"start: {name} has shape {part.shape}, needs {shape}")
+    if (radius := spectral_radius(start.a)) >= 1.0:
+        raise IdentificationError(f"start: has an eigenvalue of magnitude {radius:.6g}, allowed is below 1 (stable)")
+    free = n * (outputs + inputs) + outputs * inputs
+    if 2 * lines * outputs * inputs < free:
+        raise IdentificationError(
+            f"frequency_hz: {lines} lines are too few for the {free} free parameters of {n} states, needs "
+            f"{-(-free // (2 * outputs * inputs))}; lower the order"
+        )
+
+
+def _whitened(whitening: Complex, values: Complex) -> Float:
+    """Real and imaginary parts, one after the other, of W times all paths; further axes stay behind."""
+    lines, paths = whitening.shape[:2]
+    product = whitening @ values.reshape(lines, paths, -1)
+    stacked = np.concatenate([product.real, product.imag]).reshape(2 * lines * paths, -1)
+    return stacked[:, 0] if values.ndim == 3 else stacked
+
+
+def _moved(model: StateSpace, step: Float) -> StateSpace:
+    """The model with ``step`` added to its entries, in the order of `response_jacobian`."""
+    edges = np.cumsum([part.size for part in model])[:-1]
+    return StateSpace(*(p + s.reshape(p.shape) for p, s in zip(model, np.split(step, edges), strict=True)))
+
+
+def _residual(data: WeightedResponses, cost: float, free: int) -> float:
+    if data.covariance is None:
+        return float("nan")
+    whitening = data.whitening
+    expected = np.einsum("kij,kjl,kil->", whitening, data.covariance, np.conj(whitening)).real
+    freedom = max(1.0 - 0.5 * free / data.value.size, 1e-3)
+    return float(np.sqrt(cost * data.value.size / (expected * freedom)))

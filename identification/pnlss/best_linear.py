@@ -1,0 +1,134 @@
+"""Best linear approximation of experiments, where the identification of a nonlinear state-space model begins.
+
+Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 3 and 4; the estimate itself is
+that of `identification.multisine.best_linear_approximation`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.multisine.best_linear_approximation import best_linear_approximation
+from identification.multisine.spectra import PeriodicSpectra
+from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.periods import periodic_ones
+
+__all__ = ["best_linear_responses"]
+
+Complex = NDArray[np.complex128]
+
+_EXCITED = 1e-2
+"""Amplitude of a line, relative to the strongest of the same input, from which on it counts as excited."""
+
+
+def best_linear_responses(
+    experiments: Sequence[Experiment], *, band_hz: tuple[float, float] | None = None
+) -> FrequencyResponseMatrix:
+    """Frequency responses ``H = sum_r Y_r U_r^H (sum_r U_r U_r^H)^-1`` of the periodic experiments, with their covariance.
+
+    Every experiment is a realisation; over its counted periods the mean is taken. Levels may be mixed: each experiment counts
+    with its power and its weight, as it does in the fit over time. For one level alone hand in its experiments alone. Those
+    that are not periodic take no part.
+
+    Parameters
+    ----------
+    experiments
+        Of the same channels, one periodic at least; with several inputs as many as inputs, neighbours of one block
+        (orthogonal multisines) following each other.
+    band_hz
+        Lowest and highest line; None for every line below half the sample rate where all inputs have a hundredth of the
+        amplitude of their strongest line.
+
+    Returns
+    -------
+    FrequencyResponseMatrix
+        At the excited lines. The total covariance needs two realisations per input, that of noise two periods; what is
+        unknown is said in its notes.
+
+    Raises
+    ------
+    IdentificationError
+        Where none is periodic, where one is not what it claims, on fewer realisations than inputs, inputs that do not move
+        independently, or no excited line.
+    """
+    same_channels(experiments)
+    chosen, notes = periodic_ones(experiments)
+    first = chosen[0]
+    inputs, outputs = first.input_channels, first.output_channels
+    if len(chosen) < len(inputs):
+        raise IdentificationError(
+            f"experiments: {len(chosen)} periodic for {len(inputs)} inputs, needs one for each at least, with other phases "
+            "at every input"
+        )
+    extra = len(chosen) % len(inputs)
+    if extra:
+        notes = (*notes, f"last {extra} of {len(chosen)} realisations left out: blocks are of {len(inputs)}")
+        chosen = chosen[: len(chosen) - extra]
+    spectra = _spectra(chosen)
+    frequency_hz = np.arange(spectra.shape[-1]) * first.sample_rate_hz / first.period_samples
+    lines = _excited(spectra[:, :, : len(inputs)], frequency_hz, band_hz)
+    # Any channel may be an input or an output here: roles are given for the estimate alone.
+    roles = [Channel(f"input {i + 1}", "force", "N") for i in range(len(inputs))]
+    roles += [Channel(f"output {o + 1}", "response", "m") for o in range(len(outputs))]
+    found = best_linear_approximation(
+        PeriodicSpectra(
+            channels=tuple(roles),
+            frequency_hz=frequency_hz[lines],
+            excited=np.ones(np.count_nonzero(lines), dtype=np.bool_),
+            spectra=spectra[..., lines],
+        ),
+        estimator="H1",
+    )
+    if len(chosen) < 2 * len(inputs):
+        notes = (*notes, "too few realisations for a covariance with nonlinear distortion")
+    return replace(
+        found,
+        inputs=inputs,
+        outputs=outputs,
+        specimen=first.specimen,
+        notes=(*notes, *found.notes),
+    )
+
+
+def _spectra(experiments: Sequence[Experiment]) -> Complex:
+    """complex[n_realisations, n_periods, n_inputs + n_outputs, n_lines], peak amplitudes times the root of the weight.
+
+    Where experiments have different numbers of periods, the last of each are taken.
+    """
+    n = experiments[0].period_samples
+    periods = min(experiment.counted // n for experiment in experiments)
+    found = []
+    for experiment in experiments:
+        signals = np.vstack([experiment.counted_inputs, experiment.counted_outputs])[:, -periods * n :]
+        lines = np.fft.rfft(signals.reshape(len(signals), periods, n), axis=-1) * (2.0 / n)
+        found.append(np.sqrt(experiment.weight) * np.moveaxis(lines, 0, 1))
+    return np.array(found)
+
+
+def _excited(
+    inputs: Complex, frequency_hz: NDArray[np.float64], band_hz: tuple[float, float] | None
+) -> NDArray[np.bool_]:
+    """bool[n_lines], from complex[n_realisations, n_periods, n_inputs, n_lines]; neither 0 Hz nor half the sample rate."""
+    inner = (np.arange(frequency_hz.size) > 0) & (frequency_hz < frequency_hz[-1] * (1.0 - 1e-9))
+    if band_hz is not None:
+        lowest, highest = band_hz
+        if not 0.0 <= lowest < highest:
+            raise IdentificationError(f"band_hz: is {lowest:g} to {highest:g}, needs two rising values from zero on")
+        inner &= (frequency_hz >= lowest * (1.0 - 1e-9)) & (frequency_hz <= highest * (1.0 + 1e-9))
+    if not inner.any():
+        raise IdentificationError(
+            f"band_hz: no line in {band_hz}, they are {frequency_hz[1]:g} Hz apart up to {frequency_hz[-1]:g} Hz"
+        )
+    amplitude = np.sqrt(np.mean(np.abs(inputs.mean(axis=1)) ** 2, axis=0)) * inner
+    largest = amplitude.max(axis=1)
+    if np.any(largest == 0.0):
+        raise IdentificationError(f"inputs: input {int(np.argmin(largest)) + 1} is zero at all lines (dead channel)")
+    lines = np.all(amplitude >= _EXCITED * largest[:, None], axis=0)
+    if not lines.any():
+        raise IdentificationError("inputs: no line is excited at all of them; excite them at the same lines")
+    return np.asarray(lines)
