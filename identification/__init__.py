@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from identification.prediction.predictions import Predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
+    from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun, error_spectra, simulated_run
     from identification.prediction.steady_prediction import SteadyPrediction
     from identification.prediction.sweep_inputs import VoltageSweep
     from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
@@ -84,6 +85,7 @@ __all__ = [
     "ConstantForceCurve",
     "ContinuousBackbone",
     "DistortionLevels",
+    "ErrorSpectra",
     "ErrorTable",
     "Exciter",
     "Experiment",
@@ -121,6 +123,7 @@ __all__ = [
     "ResponseBand",
     "ResponseMatrixMapping",
     "ShortPoint",
+    "SimulatedRun",
     "Simulation",
     "SlowFlow",
     "StabilisationDiagram",
@@ -141,6 +144,7 @@ __all__ = [
     "decimated",
     "demodulate",
     "distortion_levels",
+    "error_spectra",
     "error_table",
     "estimated_initial_state",
     "extrapolated_to_zero",
@@ -170,6 +174,7 @@ __all__ = [
     "repeatability",
     "response_band",
     "short_point",
+    "simulated_run",
     "single_point_mode",
     "slow_flow",
     "stabilisation",
@@ -188,6 +193,7 @@ _MODULE_OF = {
     "ConstantForceCurve": "response_control.curves",
     "ContinuousBackbone": "slow_flows.continuous",
     "DistortionLevels": "multisine.distortion",
+    "ErrorSpectra": "prediction.simulated_runs",
     "ErrorTable": "pnlss.error_table",
     "Exciter": "prediction.exciter",
     "Experiment": "pnlss.experiment",
@@ -225,6 +231,7 @@ _MODULE_OF = {
     "ResponseBand": "prediction.uncertainty",
     "ResponseMatrixMapping": "mapping.response_matrix",
     "ShortPoint": "slow_flows.short_points",
+    "SimulatedRun": "prediction.simulated_runs",
     "Simulation": "pnlss.simulation",
     "SlowFlow": "slow_flows.slow_flow",
     "StabilisationDiagram": "linear.stabilisation",
@@ -245,6 +252,7 @@ _MODULE_OF = {
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
+    "error_spectra": "prediction.simulated_runs",
     "error_table": "prediction.comparison",
     "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
@@ -274,6 +282,7 @@ _MODULE_OF = {
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",
     "short_point": "slow_flows.short_points",
+    "simulated_run": "prediction.simulated_runs",
     "single_point_mode": "nonlinear.single_points",
     "slow_flow": "slow_flows.slow_flow",
     "stabilisation": "linear.stabilisation",

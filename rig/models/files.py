@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from identification import LinearModes, ModalAnalysis
+from identification import LinearModes, ModalAnalysis, PnlssFit, PnlssModel
 from rig.errors import RecordingError
 from rig.models.exciter import EXCITER
 from rig.models.force_surface import FORCE_SURFACE
@@ -12,6 +12,7 @@ from rig.models.kind import Kind
 from rig.models.linear_modes import LINEAR_MODES
 from rig.models.measured_backbone import MEASURED_BACKBONE
 from rig.models.nonlinear_mode import NONLINEAR_MODE
+from rig.models.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.predictions import PREDICTIONS
 from rig.models.response_matrix import RESPONSE_MATRIX
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
@@ -22,6 +23,7 @@ _ALL = (
     NONLINEAR_MODE,
     LINEAR_MODES,
     EXCITER,
+    PNLSS,
     FORCE_SURFACE,
     FREQUENCY_RESPONSES,
     RESPONSE_MATRIX,
@@ -33,8 +35,16 @@ KINDS = {kind.name: kind for kind in _ALL}
 
 
 def save(thing: Any, path: Path) -> None:
-    """Write a model, a prediction or an imported measurement, whole or not at all; linear modes alone as a modal analysis."""
-    thing = ModalAnalysis(thing) if isinstance(thing, LinearModes) else thing
+    """Write a model, a prediction or an imported measurement, whole or not at all.
+
+    Linear modes alone are written as a modal analysis, a fit or a model alone as an identified PNLSS model.
+    """
+    if isinstance(thing, LinearModes):
+        thing = ModalAnalysis(thing)
+    elif isinstance(thing, PnlssFit):
+        thing = IdentifiedPnlss(model=thing.model, fit=thing)
+    elif isinstance(thing, PnlssModel):
+        thing = IdentifiedPnlss(model=thing)
     kind = next((kind for kind in KINDS.values() if isinstance(thing, kind.holds)), None)
     if kind is None:
         raise RecordingError(f"{path}: a {type(thing).__name__} has no file of its own; known are {', '.join(KINDS)}")
