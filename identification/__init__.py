@@ -44,6 +44,13 @@ if TYPE_CHECKING:
     from identification.pnlss.features import Features
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.simulation import Simulation
+    from identification.pnlss.steady.response import (
+        PnlssResponse,
+        pnlss_frequency_response,
+        pnlss_response,
+        pnlss_steady_state,
+    )
+    from identification.pnlss.steady.states import SteadyStates
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
@@ -98,6 +105,7 @@ __all__ = [
     "PeriodicSpectra",
     "PeriodicVibration",
     "PnlssModel",
+    "PnlssResponse",
     "PredictionError",
     "Predictions",
     "Repeatability",
@@ -109,6 +117,7 @@ __all__ = [
     "StabilisationDiagram",
     "StateSpace",
     "SteadyPrediction",
+    "SteadyStates",
     "SweepPrediction",
     "Transient",
     "VoltagePath",
@@ -140,6 +149,9 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "pnlss_frequency_response",
+    "pnlss_response",
+    "pnlss_steady_state",
     "predict_sweep",
     "recorded_force_response",
     "repeatability",
@@ -186,6 +198,7 @@ _MODULE_OF = {
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
     "PnlssModel": "pnlss.model",
+    "PnlssResponse": "pnlss.steady.response",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
@@ -197,6 +210,7 @@ _MODULE_OF = {
     "StabilisationDiagram": "linear.stabilisation",
     "StateSpace": "linear.subspace",
     "SteadyPrediction": "prediction.steady_prediction",
+    "SteadyStates": "pnlss.steady.states",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
     "VoltagePath": "prediction.exciter",
@@ -228,6 +242,9 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "pnlss_frequency_response": "pnlss.steady.response",
+    "pnlss_response": "pnlss.steady.response",
+    "pnlss_steady_state": "pnlss.steady.response",
     "predict_sweep": "prediction.sweeps",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
