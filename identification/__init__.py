@@ -52,6 +52,13 @@ if TYPE_CHECKING:
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
+    from identification.pnlss.steady.response import (
+        PnlssResponse,
+        pnlss_frequency_response,
+        pnlss_response,
+        pnlss_steady_state,
+    )
+    from identification.pnlss.steady.states import SteadyStates
     from identification.pnlss.study import IdentifiedModel, identify_many
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
@@ -117,6 +124,7 @@ __all__ = [
     "PnlssErrors",
     "PnlssFit",
     "PnlssModel",
+    "PnlssResponse",
     "PredictionError",
     "Predictions",
     "Repeatability",
@@ -130,6 +138,7 @@ __all__ = [
     "StateSpace",
     "StateSpaceFit",
     "SteadyPrediction",
+    "SteadyStates",
     "SweepPrediction",
     "Transient",
     "VoltagePath",
@@ -168,6 +177,9 @@ __all__ = [
     "periodic_spectra",
     "periodic_vibration",
     "pnlss_errors",
+    "pnlss_frequency_response",
+    "pnlss_response",
+    "pnlss_steady_state",
     "predict_sweep",
     "realisation_combinations",
     "recorded_force_response",
@@ -225,6 +237,7 @@ _MODULE_OF = {
     "PnlssErrors": "pnlss.errors",
     "PnlssFit": "pnlss.fitting.result",
     "PnlssModel": "pnlss.model",
+    "PnlssResponse": "pnlss.steady.response",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
@@ -238,6 +251,7 @@ _MODULE_OF = {
     "StateSpace": "linear.subspace",
     "StateSpaceFit": "linear.state_space_fit",
     "SteadyPrediction": "prediction.steady_prediction",
+    "SteadyStates": "pnlss.steady.states",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
     "VoltagePath": "prediction.exciter",
@@ -276,6 +290,9 @@ _MODULE_OF = {
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
     "pnlss_errors": "pnlss.errors",
+    "pnlss_frequency_response": "pnlss.steady.response",
+    "pnlss_response": "pnlss.steady.response",
+    "pnlss_steady_state": "pnlss.steady.response",
     "predict_sweep": "prediction.sweeps",
     "realisation_combinations": "pnlss.model_jobs",
     "recorded_force_response": "prediction.recorded_force",
