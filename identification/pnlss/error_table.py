@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from identification.errors import IdentificationError
+from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.model_jobs import ModelJob
 
-__all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest", "simulation_error"]
+__all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest"]
 
 SAME_LEVEL = "same level"
 """Test on the realisations that a model's own training set left out."""
@@ -136,8 +137,8 @@ class ErrorTable:
             if job.name not in models:
                 continue
             for test, experiments in ((SAME_LEVEL, job.left_out), *levels.items()):
-                unseen = [one for one in experiments if test == SAME_LEVEL or not job.seen(one)]
-                tests += [_test(models[job.name], job, test, one, index) for one in unseen if test != job.training_set]
+                unseen = [one for one in experiments if test != job.training_set and not job.seen(one)]
+                tests += _tests(models[job.name], job, test, unseen, index)
         return cls(
             output=names[index],
             levels=tuple(levels),
@@ -199,29 +200,23 @@ class ErrorTable:
         return rows
 
 
-def simulation_error(model: PnlssModel, experiment: Experiment, output: int = 0) -> tuple[float, float]:
-    """Relative RMS error of an output over the samples that count (Scheel et al., Section 3.3), and the range used.
-
-    Simulated from rest with the experiment's own input. The error of an unbounded run is inf.
-    """
-    simulation = model.simulate(experiment.inputs)
-    if not simulation.bounded:
-        return float("inf"), float("inf")
-    measured = experiment.counted_outputs[output]
-    difference = simulation.outputs[output, experiment.counted_from :] - measured
-    return float(np.linalg.norm(difference) / np.linalg.norm(measured)), simulation.range_use
-
-
-def _test(model: PnlssModel, job: ModelJob, test: str, experiment: Experiment, output: int) -> ModelTest:
-    error, range_use = simulation_error(model, experiment, output)
-    return ModelTest(
-        model=job.name,
-        training_set=job.training_set,
-        test=test,
-        experiment=experiment.name,
-        error=error,
-        range_use=range_use,
-    )
+def _tests(
+    model: PnlssModel, job: ModelJob, test: str, experiments: Sequence[Experiment], output: int
+) -> list[ModelTest]:
+    if not experiments:
+        return []
+    errors = pnlss_errors(model, experiments)
+    return [
+        ModelTest(
+            model=job.name,
+            training_set=job.training_set,
+            test=test,
+            experiment=name,
+            error=float(error),
+            range_use=float(range_use),
+        )
+        for name, error, range_use in zip(errors.names, errors.relative[:, output], errors.range_use, strict=True)
+    ]
 
 
 def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

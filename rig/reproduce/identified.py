@@ -17,7 +17,9 @@ from identification import (
     identify_pnlss,
     realisation_combinations,
 )
-from rig.models.files import load, save
+from rig.errors import RecordingError
+from rig.models.files import load_as, save
+from rig.models.pnlss import PNLSS, IdentifiedPnlss
 from rig.reproduce.options import Options
 
 __all__ = ["Models", "identify_all"]
@@ -66,7 +68,7 @@ def identify_all(
     """Identify what is not in the folder yet. `KeyboardInterrupt` leaves there what was finished."""
     jobs = realisation_combinations(levels, models=options.counts, mixed=options.mixed, beside=beside)
     files = {job.name: _file(options, job.name) for job in jobs}
-    fits: dict[str, PnlssFit] = {name: load(path) for name, path in files.items() if path.exists()}
+    fits: dict[str, PnlssFit] = {name: _kept(path) for name, path in files.items() if path.exists()}
     failures: dict[str, str] = {}
     specimen = options.specimen
     identify = partial(
@@ -82,7 +84,7 @@ def identify_all(
             failures[found.name] = found.reason
         else:
             fits[found.name] = found.fit
-            save(found.fit, files[found.name])
+            save(IdentifiedPnlss(model=found.fit.model, fit=found.fit, seconds=found.seconds), files[found.name])
         count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
         say(f"{count}  {_outcome(found.fit, found.reason)}  {found.seconds:.1f} s")
     return Models(jobs, fits, failures)
@@ -93,6 +95,13 @@ def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment
     fit = identify_pnlss(training, validation=validation, **how)
     if fit.interrupted:
         raise KeyboardInterrupt
+    return fit
+
+
+def _kept(path: Path) -> PnlssFit:
+    fit = load_as(PNLSS, path).fit
+    if fit is None:
+        raise RecordingError(f"{path}: holds a model without its fit; remove the file, and it is identified again")
     return fit
 
 
