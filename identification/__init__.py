@@ -42,8 +42,13 @@ if TYPE_CHECKING:
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.pnlss.best_linear import best_linear_responses
+    from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
+    from identification.pnlss.fitting.fit import fit_pnlss
+    from identification.pnlss.fitting.result import FitHistory, PnlssFit
+    from identification.pnlss.fitting.settings import FitProgress, FitSettings
+    from identification.pnlss.identify import identify_pnlss, linear_pnlss
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.simulation import Simulation
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
@@ -81,6 +86,9 @@ __all__ = [
     "Experiment",
     "ExtrapolationError",
     "Features",
+    "FitHistory",
+    "FitProgress",
+    "FitSettings",
     "ForceDropOut",
     "ForceSurface",
     "FrequencyResponse",
@@ -99,6 +107,8 @@ __all__ = [
     "NonlinearModeMapping",
     "PeriodicSpectra",
     "PeriodicVibration",
+    "PnlssErrors",
+    "PnlssFit",
     "PnlssModel",
     "PredictionError",
     "Predictions",
@@ -127,13 +137,17 @@ __all__ = [
     "demodulate",
     "distortion_levels",
     "error_table",
+    "estimated_initial_state",
     "extrapolated_to_zero",
+    "fit_pnlss",
     "fit_state_space",
     "force_drop_out",
     "force_surface",
     "frequency_response",
     "identify_exciter",
+    "identify_pnlss",
     "linear_modes",
+    "linear_pnlss",
     "mac",
     "mac_matrix",
     "map_backbone",
@@ -145,6 +159,7 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "pnlss_errors",
     "predict_sweep",
     "recorded_force_response",
     "repeatability",
@@ -172,6 +187,9 @@ _MODULE_OF = {
     "Experiment": "pnlss.experiment",
     "ExtrapolationError": "prediction.properties",
     "Features": "pnlss.features",
+    "FitHistory": "pnlss.fitting.result",
+    "FitProgress": "pnlss.fitting.settings",
+    "FitSettings": "pnlss.fitting.settings",
     "ForceDropOut": "signals.sweeps",
     "ForceSurface": "response_control.force_surface",
     "FrequencyResponse": "frequency_responses",
@@ -190,6 +208,8 @@ _MODULE_OF = {
     "NonlinearModeMapping": "mapping.nonlinear_mode",
     "PeriodicSpectra": "multisine.spectra",
     "PeriodicVibration": "measurements",
+    "PnlssErrors": "pnlss.errors",
+    "PnlssFit": "pnlss.fitting.result",
     "PnlssModel": "pnlss.model",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
@@ -218,13 +238,17 @@ _MODULE_OF = {
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
     "error_table": "prediction.comparison",
+    "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
+    "fit_pnlss": "pnlss.fitting.fit",
     "fit_state_space": "linear.state_space_fit",
     "force_drop_out": "signals.sweeps",
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
     "identify_exciter": "prediction.exciter_fit",
+    "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
+    "linear_pnlss": "pnlss.identify",
     "mac": "nonlinear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",
@@ -236,6 +260,7 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "pnlss_errors": "pnlss.errors",
     "predict_sweep": "prediction.sweeps",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",

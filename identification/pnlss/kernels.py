@@ -10,11 +10,13 @@ __all__ = [
     "Matrices",
     "Table",
     "Workspace",
+    "add_derivatives",
     "feature_derivatives",
     "feature_values",
     "outputs_at",
     "simulate",
     "state_after",
+    "within_limits",
     "workspace",
 ]
 
@@ -23,7 +25,7 @@ class Table(NamedTuple):
     """Features ``phi(v)`` of ``v = (x, u)`` as arrays; see `identification.pnlss.features.Features`."""
 
     factors: np.ndarray
-    """int[n_monomials, degree], variables that are multiplied; -1 for none."""
+    """int[n_monomials, degree], variables that are multiplied; -1 for none, after those."""
     limits: np.ndarray
     """float[n_variables], magnitude beyond which a variable counts as that much in monomials; inf for none."""
     weights: np.ndarray
@@ -61,15 +63,26 @@ def workspace(m: Matrices) -> Workspace:
 
 
 @kernel
+def within_limits(table: Table, v: np.ndarray) -> bool:
+    """Whether no variable is beyond its limit, as almost always: then nothing has to be held."""
+    for j in range(v.size):  # noqa: SIM110 (numba compiles no generators)
+        if abs(v[j]) > table.limits[j]:
+            return False
+    return True
+
+
+@kernel
 def feature_values(table: Table, v: np.ndarray, phi: np.ndarray) -> None:
     """Write the features of ``v`` (float[n_variables]) to ``phi`` (float[n_features])."""
     count, degree = table.factors.shape
+    free = within_limits(table, v)
     for i in range(count):
         product = 1.0
         for position in range(degree):
             j = table.factors[i, position]
-            if j >= 0:
-                product *= min(max(v[j], -table.limits[j]), table.limits[j])
+            if j < 0:
+                break
+            product *= v[j] if free else min(max(v[j], -table.limits[j]), table.limits[j])
         phi[i] = product
     for i in range(table.weights.shape[0]):
         total = table.weights[i, v.size]
@@ -108,6 +121,47 @@ def feature_derivatives(table: Table, v: np.ndarray, slope: np.ndarray, steep: n
         steep[i, 1] = 1.0 - np.tanh(bias) ** 2
         for j in range(v.size):
             slope[count + i, j] = steep[i, 0] * table.weights[i, j]
+
+
+@kernel
+def add_derivatives(
+    table: Table, v: np.ndarray, coefficients: np.ndarray, offset: int, steep: np.ndarray, total: np.ndarray
+) -> None:
+    """Add the derivatives of ``coefficients . phi`` with respect to the first variables to ``total``.
+
+    The coefficients are those from column ``offset`` on of float[n_rows, offset + n_features]; ``total`` is
+    float[n_rows, n_first_variables]. Monomials have few factors, so this is much less than ``coefficients . slope``.
+    ``steep`` as in `feature_derivatives`.
+    """
+    count, degree = table.factors.shape
+    rows, columns = total.shape
+    free = within_limits(table, v)
+    for f in range(count):
+        for position in range(degree):
+            j = table.factors[f, position]
+            if j < 0:
+                break
+            if j >= columns or abs(v[j]) > table.limits[j]:
+                continue
+            product = 1.0
+            for other in range(degree):
+                k = table.factors[f, other]
+                if k < 0:
+                    break
+                if other != position:
+                    product *= v[k] if free else min(max(v[k], -table.limits[k]), table.limits[k])
+            for i in range(rows):
+                total[i, j] += coefficients[i, offset + f] * product
+    for f in range(table.weights.shape[0]):
+        bias = table.weights[f, v.size]
+        argument = bias
+        for j in range(v.size):
+            argument += table.weights[f, j] * v[j]
+        steep[f, 0] = 1.0 - np.tanh(argument) ** 2
+        steep[f, 1] = 1.0 - np.tanh(bias) ** 2
+        for i in range(rows):
+            for j in range(columns):
+                total[i, j] += coefficients[i, offset + count + f] * steep[f, 0] * table.weights[f, j]
 
 
 @kernel

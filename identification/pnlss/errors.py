@@ -1,0 +1,128 @@
+"""How far simulations of a model are from experiments, and whether it was asked beyond what it knows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.fitting.checks import belongs
+from identification.pnlss.fitting.initial_states import SAMPLES, fitted_initial_state
+from identification.pnlss.fitting.parameters import Parameters
+from identification.pnlss.fitting.records import records_of
+from identification.pnlss.model import PnlssModel
+from identification.validation import read_only
+
+__all__ = ["PnlssErrors", "estimated_initial_state", "pnlss_errors"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PnlssErrors:
+    """Errors of one model on experiments.
+
+    Parameters
+    ----------
+    relative
+        float[n_experiments, n_outputs], RMS of simulated less measured output over the RMS of the measured one, over the
+        samples that count (Scheel et al., the relative error of Section 3.3); inf for an unbounded run.
+    rms
+        float[n_experiments, n_outputs], the same in the units of the outputs.
+    bounded
+        bool[n_experiments].
+    range_use
+        float[n_experiments], largest state or input over the largest in the training data; inf for an unbounded run, NaN
+        where unknown.
+    names
+        One per experiment.
+    levels
+        float[n_experiments].
+    """
+
+    relative: Float
+    rms: Float
+    bounded: NDArray[np.bool_]
+    range_use: Float
+    names: tuple[str, ...]
+    levels: Float
+
+    def __post_init__(self) -> None:
+        for name in ("relative", "rms", "range_use", "levels"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+        object.__setattr__(self, "bounded", read_only(self.bounded, np.bool_))
+
+    @property
+    def overall(self) -> Float:
+        """float[n_experiments], root of the mean over outputs of squared relative errors."""
+        return np.asarray(np.sqrt(np.mean(self.relative**2, axis=1)))
+
+    @property
+    def unbounded(self) -> int:
+        """Number of unbounded runs."""
+        return int(np.count_nonzero(~self.bounded))
+
+
+def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, samples: int = SAMPLES) -> PnlssErrors:
+    """Simulate each experiment and compare; initial states that are to be estimated are so from the first ``samples``.
+
+    Raises `IdentificationError` on experiments of other channels or another sample rate, none at all, an output that is zero
+    where it counts.
+    """
+    if not experiments:
+        raise IdentificationError("experiments: none given, needs one at least")
+    relative, rms = np.full((2, len(experiments), len(model.outputs)), np.inf)
+    bounded, use = np.zeros(len(experiments), dtype=bool), np.full(len(experiments), np.inf)
+    for index, experiment in enumerate(experiments):
+        what = f"experiments[{index}]{f' ({experiment.name})' if experiment.name else ''}"
+        belongs(model, experiment, what)
+        scale = np.max(np.abs(experiment.counted_outputs), axis=1)
+        if not np.all(scale > 0.0):
+            dead = experiment.output_channels[int(np.argmin(scale))].name
+            raise IdentificationError(
+                f"{what}: output '{dead}' is zero where it counts, and errors relative to it have no meaning"
+            )
+        begin = None
+        if experiment.initial_state == "estimated":
+            begin = estimated_initial_state(model, experiment, samples=samples)
+        run = model.simulate(experiment.inputs, initial_state=begin)
+        bounded[index], use[index] = run.bounded, run.range_use
+        if run.bounded:
+            with np.errstate(over="ignore"):
+                errors = (run.outputs[:, experiment.counted_from :] - experiment.counted_outputs) / scale[:, None]
+                rms[index] = scale * np.sqrt(np.mean(errors**2, axis=1))
+            relative[index] = rms[index] / (
+                scale * np.sqrt(np.mean((experiment.counted_outputs / scale[:, None]) ** 2, axis=1))
+            )
+    return PnlssErrors(
+        relative=relative,
+        rms=rms,
+        bounded=bounded,
+        range_use=use,
+        names=tuple(e.name or f"experiment {index + 1}" for index, e in enumerate(experiments)),
+        levels=np.array([e.level for e in experiments]),
+    )
+
+
+def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, samples: int = SAMPLES) -> Float:
+    """float[n_states] before the first sample, by least squares on the first ``samples`` that count, each output over its RMS.
+
+    Raises `IdentificationError` on other channels, another sample rate, too few samples.
+    """
+    belongs(model, experiment, f"experiment{f' ({experiment.name})' if experiment.name else ''}")
+    if not samples * len(model.outputs) >= model.states:
+        raise IdentificationError(f"samples: is {samples}, too few for {model.states} states")
+    part = replace(experiment, period_samples=0)
+    inputs, outputs = (np.sqrt(np.mean(values**2, axis=1)) for values in (part.inputs, part.counted_outputs))
+    states = np.where(np.isfinite(model.state_range) & (model.state_range > 0.0), model.state_range, np.nan)
+    if np.any(np.isnan(states)):
+        run = model.simulate(part.inputs)
+        states = np.sqrt(np.mean(run.states**2, axis=1)) if run.bounded else np.ones(model.states)
+    inputs, outputs, states = (np.where(values > 0.0, values, 1.0) for values in (inputs, outputs, states))
+    scaled = model.scaled(states=states, inputs=inputs, outputs=outputs)
+    parameters = Parameters(scaled)
+    system = parameters.system(parameters.vector(scaled, np.zeros((0, model.states))))
+    (record,) = records_of([part], inputs, outputs)
+    return states * fitted_initial_state(system, record, np.ones(len(outputs)), samples)

@@ -1,0 +1,79 @@
+"""What a fit refuses, before it begins."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.fitting.result import PnlssFit
+from identification.pnlss.model import PnlssModel
+
+__all__ = ["belongs", "check_data", "check_resumed"]
+
+
+def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
+    """Raise `IdentificationError` unless the experiment has the channels and the sample rate of the model."""
+    if abs(experiment.sample_rate_hz / model.sample_rate_hz - 1.0) > 1e-9:
+        raise IdentificationError(
+            f"{what}: sampled at {experiment.sample_rate_hz:g} Hz, the model is of {model.sample_rate_hz:g} Hz; resample one"
+        )
+    for name, mine, theirs in (
+        ("inputs", model.inputs, experiment.input_channels),
+        ("outputs", model.outputs, experiment.output_channels),
+    ):
+        if [c.name for c in mine] != [c.name for c in theirs]:
+            have, need = (", ".join(c.name for c in channels) for channels in (theirs, mine))
+            raise IdentificationError(f"{what}: {name} are {have}, the model has {need}")
+
+
+def check_data(
+    start: PnlssModel, experiments: Sequence[Experiment], validation: Sequence[Experiment], parameters: int
+) -> None:
+    """Raise `IdentificationError` where data and model do not go together or the data cannot tell the parameters."""
+    same_channels(experiments)
+    for kind, group in (("experiments", experiments), ("validation", validation)):
+        for index, experiment in enumerate(group):
+            belongs(start, experiment, f"{kind}[{index}]{f' ({experiment.name})' if experiment.name else ''}")
+    values = sum(e.counted for e in experiments) * len(start.outputs)
+    if values < parameters:
+        raise IdentificationError(
+            f"experiments: {values} values of outputs count, fewer than the {parameters} parameters; "
+            "give more data, or take fewer features or states"
+        )
+    inputs = np.concatenate([e.inputs for e in experiments], axis=1)
+    outputs = np.concatenate([e.counted_outputs for e in experiments], axis=1)
+    for name, rows, channels in (("input", inputs, start.inputs), ("output", outputs, start.outputs)):
+        for row, channel in zip(rows, channels, strict=True):
+            if not np.any(row):
+                raise IdentificationError(
+                    f"{name} '{channel.name}': is zero throughout the training data; leave it out"
+                )
+    unit = inputs / np.max(np.abs(inputs), axis=1, keepdims=True)
+    values_of = np.linalg.eigvalsh(unit @ unit.T)
+    if values_of[0] < 1e-12 * values_of[-1]:
+        names = ", ".join(c.name for c in start.inputs)
+        raise IdentificationError(
+            f"inputs {names}: one is a combination of the others throughout the training data, so that their effects "
+            "cannot be told apart; leave one out, or add experiments that drive them differently"
+        )
+
+
+def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int) -> None:
+    """Raise `IdentificationError` unless a fit of just this structure can go on from ``resume``."""
+    for name in ("a", "b", "c", "e", "f"):
+        mine, theirs = getattr(start, name).shape, getattr(resume.last, name).shape
+        if mine != theirs:
+            raise IdentificationError(
+                f"resume: its {name} has shape {theirs}, that of the start {mine}; give the same start"
+            )
+    for name in ("state_features", "output_features"):
+        if not np.array_equal(getattr(start, name).exponents, getattr(resume.last, name).exponents):
+            raise IdentificationError(
+                f"resume: its {name} are other monomials than those of the start; give the same start"
+            )
+    if len(resume.last_initial_states) != estimated:
+        raise IdentificationError(
+            f"resume: has {len(resume.last_initial_states)} estimated initial states, the experiments {estimated}; "
+            "give the same experiments"
+        )

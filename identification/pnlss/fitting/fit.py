@@ -1,0 +1,169 @@
+"""Levenberg-Marquardt fit of all parameters of a nonlinear state-space model to experiments, in the time domain.
+
+Cost and its gradient as in Paduart et al., Automatica 46, 2010, Section 4.3 (weighted squared simulation errors,
+sensitivities by recursion); the damping after Marquardt, J. SIAM 11, 1963.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.fitting.checks import check_data, check_resumed
+from identification.pnlss.fitting.initial_states import fitted_initial_state
+from identification.pnlss.fitting.levenberg_marquardt import Iterates, iterate
+from identification.pnlss.fitting.parameters import Parameters
+from identification.pnlss.fitting.problem import Problem, Scales, scales_of
+from identification.pnlss.fitting.result import PnlssFit
+from identification.pnlss.fitting.settings import FitProgress, FitSettings
+from identification.pnlss.model import PnlssModel
+
+__all__ = ["fit_pnlss"]
+
+Float = NDArray[np.float64]
+
+_HOPELESS = 1e3
+"""A start whose outputs are so many times those measured is no start."""
+
+
+def fit_pnlss(
+    start: PnlssModel,
+    experiments: Sequence[Experiment],
+    *,
+    validation: Sequence[Experiment] = (),
+    settings: FitSettings | None = None,
+    progress: Callable[[FitProgress], None] | None = None,
+    resume: PnlssFit | None = None,
+) -> PnlssFit:
+    """Fit all coefficients of ``start``, the weights in its features, and initial states where those are estimated.
+
+    Parameters
+    ----------
+    start
+        Where to begin, mostly a linear model `with_features`. Its simulation must stay bounded.
+    experiments
+        Training data.
+    validation
+        Data on which the iterate is chosen; never part of the fit.
+    settings
+        `FitSettings`; None for the usual ones.
+    progress
+        Called after each iteration.
+    resume
+        A fit to go on from, of the same start, experiments and settings: it goes on as if it had never stopped. More
+        iterations, or another tolerance or patience, make one go on that had ended.
+
+    Returns
+    -------
+    PnlssFit
+        Also after Ctrl-C: then with all that was reached, and ``interrupted``.
+
+    Raises
+    ------
+    IdentificationError
+        On data and models that do not go together, data that cannot tell the parameters, a start that is not bounded.
+    """
+    settings = FitSettings() if settings is None else settings
+    estimated = sum(e.initial_state == "estimated" for e in experiments)
+    parameters = Parameters(start, estimated)
+    check_data(start, experiments, validation, parameters.count)
+    if resume is not None:
+        check_resumed(start, resume, estimated)
+    scales = scales_of(experiments, _state_scale(start, experiments) if resume is None else resume.state_scale)
+    parameters = Parameters(scales.model(start if resume is None else resume.last), estimated)
+    problem = Problem(parameters, scales, experiments, validation, settings)
+    iterates = _begin(problem) if resume is None else _resumed(problem, scales, resume)
+    stopped, interrupted = iterate(problem, iterates, progress)
+
+    def physical(vector: Float) -> tuple[PnlssModel, Float]:
+        begins = parameters.initial_states(vector) * scales.states
+        return _trained(scales.physical(parameters.model(vector)), experiments, begins), begins
+
+    (model, begins), (last, last_begins) = physical(iterates.best), physical(iterates.vector)
+    return PnlssFit(
+        model=model,
+        last=last,
+        linear=_linear_part(start) if resume is None else resume.linear,
+        history=iterates.history,
+        chosen=iterates.history.best,
+        initial_states=begins,
+        last_initial_states=last_begins,
+        state_scale=scales.states,
+        settings=settings,
+        stopped=stopped,
+        interrupted=interrupted,
+    )
+
+
+def _state_scale(start: PnlssModel, experiments: Sequence[Experiment]) -> Float:
+    """RMS of each state when the start is simulated; raises `IdentificationError` if that gets out of hand."""
+    total, samples = np.zeros(start.states), 0
+    for index, experiment in enumerate(experiments):
+        run = start.simulate(experiment.inputs)
+        what = f"experiments[{index}]{f' ({experiment.name})' if experiment.name else ''}"
+        if run.unbounded_at is not None:
+            raise IdentificationError(
+                f"start: leaves all bounds at sample {run.unbounded_at} of {what}; needs a model that is stable there"
+            )
+        largest, measured = (float(np.max(np.abs(y))) for y in (run.outputs, experiment.outputs))
+        if not largest <= _HOPELESS * max(measured, 1e-300):
+            raise IdentificationError(
+                f"start: its outputs reach {largest / max(measured, 1e-300):.3g} times those of {what}; needs a model "
+                "that is stable and in the units of the channels"
+            )
+        total += np.sum(run.states**2, axis=1)
+        samples += run.states.shape[1]
+    rms = np.sqrt(total / samples)
+    return np.where(rms > 0.0, rms, np.max(rms) if np.any(rms > 0.0) else 1.0)
+
+
+def _begin(problem: Problem) -> Iterates:
+    """The start, with initial states from the first samples."""
+    parameters = problem.parameters
+    rest = np.zeros((parameters.estimated, parameters.start.states))
+    system = parameters.system(parameters.vector(parameters.start, rest))
+    begins = [fitted_initial_state(system, r, problem.weights) for r in problem.training if r.place is not None]
+    vector = parameters.vector(parameters.start, np.array(begins).reshape(rest.shape))
+    return Iterates.begin(problem, vector)
+
+
+def _resumed(problem: Problem, scales: Scales, resume: PnlssFit) -> Iterates:
+    """Where a fit stopped."""
+    pairs = ((resume.last, resume.last_initial_states), (resume.model, resume.initial_states))
+    last, best = (problem.parameters.vector(scales.model(m), begins / scales.states) for m, begins in pairs)
+    return Iterates.resumed(last, best, resume.history)
+
+
+def _trained(model: PnlssModel, experiments: Sequence[Experiment], begins: Float) -> PnlssModel:
+    """The model with the range of its training data, and their names."""
+    states, place = np.zeros(model.states), 0
+    free = replace(model, state_range=np.full(model.states, np.nan))
+    for experiment in experiments:
+        begin = None
+        if experiment.initial_state == "estimated":
+            begin, place = begins[place], place + 1
+        run = free.simulate(experiment.inputs, initial_state=begin)
+        states = np.fmax(states, np.max(np.abs(run.states), axis=1))
+    return replace(
+        model,
+        state_range=states,
+        input_range=np.max([np.max(np.abs(e.inputs), axis=1) for e in experiments], axis=0),
+        training=tuple(e.name or f"experiment {index + 1}" for index, e in enumerate(experiments)),
+        specimen=model.specimen or experiments[0].specimen,
+    )
+
+
+def _linear_part(start: PnlssModel) -> PnlssModel | None:
+    if np.any(start.e) or np.any(start.f):
+        return None
+    return PnlssModel.linear(
+        start.linear_part,
+        sample_rate_hz=start.sample_rate_hz,
+        inputs=start.inputs,
+        outputs=start.outputs,
+        specimen=start.specimen,
+        notes=start.notes,
+    )

@@ -1,0 +1,69 @@
+"""The initial state of a run, from its first samples."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.pnlss.fitting.kernels import System, room, sensitivities
+from identification.pnlss.fitting.records import BOUND, Record, simulated
+
+__all__ = ["SAMPLES", "fitted_initial_state"]
+
+Float = NDArray[np.float64]
+
+SAMPLES = 600
+"""Samples from which an initial state is estimated: some decay times of lightly damped structures, as they are sampled."""
+_ITERATIONS = 20
+
+
+def fitted_initial_state(system: System, record: Record, weights: Float, samples: int = SAMPLES) -> Float:
+    """float[n_states] that fits the first ``samples`` counted outputs best, by least squares (Levenberg-Marquardt) from rest.
+
+    Rest, where the run from there leaves all bounds.
+    """
+    n, outputs = len(system.state), len(weights)
+    first, end = record.counted_from, min(record.counted_from + samples, len(record.u))
+    u, y = record.u[:end], record.y[:end]
+    jacobian, rows = (
+        np.zeros((outputs, end - first, n + _inner(system))),
+        np.zeros((end - first, system.output.shape[1] + outputs)),
+    )
+
+    def error(x: Float) -> float:
+        run = simulated(system, u, x)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2))
+
+    x, damping = np.zeros(n), 1e-6
+    best = error(x)
+    for _ in range(_ITERATIONS):
+        r = room(system, n)
+        r.x[:] = x
+        r.s[0] = np.eye(n)
+        done = sensitivities(system, u[:first], y[:first], BOUND, weights, 0, False, r, jacobian, rows)
+        done += sensitivities(system, u[first:], y[first:], BOUND, weights, 0, True, r, jacobian, rows)
+        stacked = jacobian[:, :, :n].reshape(-1, n)
+        if done < end or not np.all(np.isfinite(stacked)):
+            break
+        scale = np.linalg.norm(stacked, axis=0)
+        scale[scale == 0.0] = 1.0
+        left, values, right = np.linalg.svd(stacked / scale, full_matrices=False)
+        along = left.T @ rows[:, -outputs:].T.ravel()
+        before = best
+        while damping < 1e6:
+            step = (
+                -(right.T @ (along * values / (values**2 + damping * values[0] ** 2))) / scale
+                if values[0] > 0.0
+                else 0.0 * x
+            )
+            tried = error(x + step)
+            if tried < best:
+                x, best, damping = x + step, tried, damping / 100.0
+                break
+            damping *= 10.0
+        if best > before * (1.0 - 1e-10):
+            break
+    return x
+
+
+def _inner(system: System) -> int:
+    return int(system.output_table.weights.size)

@@ -1,0 +1,147 @@
+"""Iterations of a fit: which damping, when to stop, what is kept."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.pnlss.fitting.problem import Problem
+from identification.pnlss.fitting.result import FitHistory
+from identification.pnlss.fitting.settings import FitProgress, FitSettings
+from identification.pnlss.fitting.steps import Steps
+
+__all__ = ["Iterates", "iterate"]
+
+Float = NDArray[np.float64]
+
+_FACTOR = 10.0
+_SMALLEST, _LARGEST = 1e-16, 1e8
+"""Dampings worth trying."""
+_STALLED = 5
+"""Iterations on end without a gain worth the name, after which a fit ends."""
+
+
+@dataclass(eq=False)
+class Iterates:
+    """The last iterate and the best, and the way there."""
+
+    vector: Float
+    best: Float
+    damping: float
+    training: list[float]
+    validation: list[float]
+    dampings: list[float]
+    seconds: list[float]
+    began: float = field(default_factory=time.perf_counter)
+
+    @classmethod
+    def begin(cls, problem: Problem, vector: Float) -> "Iterates":
+        """At a start."""
+        damping = problem.settings.damping
+        errors = problem.training_error(vector), problem.validation_error(vector)
+        return cls(vector, vector, damping, [errors[0]], [errors[1]], [damping], [0.0])
+
+    @classmethod
+    def resumed(cls, last: Float, best: Float, history: FitHistory) -> "Iterates":
+        """Where another left off."""
+        lists = (history.training_error, history.validation_error, history.damping, history.seconds)
+        training, validation, dampings, seconds = (list(map(float, values)) for values in lists)
+        began = time.perf_counter() - seconds[-1]
+        return cls(last, best, dampings[-1], training, validation, dampings, seconds, began)
+
+    @property
+    def history(self) -> FitHistory:
+        """As the result holds it."""
+        return FitHistory(
+            training_error=np.array(self.training),
+            validation_error=np.array(self.validation),
+            damping=np.array(self.dampings),
+            seconds=np.array(self.seconds),
+        )
+
+    def add(self, problem: Problem, vector: Float, training: float, damping: float) -> None:
+        """One more iterate."""
+        validation = problem.validation_error(vector)
+        self.vector, self.damping = vector, damping
+        self.training.append(training)
+        self.validation.append(validation)
+        self.dampings.append(damping)
+        self.seconds.append(time.perf_counter() - self.began)
+        if self.history.best == len(self.training) - 1:
+            self.best = vector
+
+
+def iterate(problem: Problem, iterates: Iterates, progress: Callable[[FitProgress], None] | None) -> tuple[str, bool]:
+    """Go on until there is a reason to stop; that reason, and whether it was an interrupt."""
+    settings = problem.settings
+    try:
+        while (reason := _reason(iterates, settings)) is None:
+            equations = problem.equations(iterates.vector)
+            if not (np.all(np.isfinite(equations.hessian)) and np.all(np.isfinite(equations.gradient))):
+                return "the sensitivities of the last iterate leave all bounds", False
+            found = _descend(problem, Steps(equations, settings.truncation), iterates)
+            if found is None:
+                return "no step of any damping fits better", False
+            iterates.add(problem, *found)
+            if progress is not None:
+                progress(_told(iterates, settings))
+    except KeyboardInterrupt:
+        return "interrupted", True
+    except np.linalg.LinAlgError:
+        return "the normal equations of the last iterate could not be decomposed", False
+    return reason, False
+
+
+def _reason(iterates: Iterates, settings: FitSettings) -> str | None:
+    done = len(iterates.training) - 1
+    if done >= settings.iterations:
+        return f"{done} iterations"
+    since = done - iterates.history.best
+    if settings.patience and since >= settings.patience and not np.isnan(iterates.validation[-1]):
+        return f"{since} iterations without a smaller validation error"
+    errors = np.array(iterates.training[-_STALLED - 1 :])
+    if errors[-1] <= 0.0:
+        return "no error is left"
+    if errors.size > _STALLED and np.all(np.diff(errors) > -settings.tolerance * errors[:-1]):
+        return f"{_STALLED} iterations whose gain was below {settings.tolerance:g}"
+    return None
+
+
+def _descend(problem: Problem, steps: Steps, iterates: Iterates) -> tuple[Float, float, float] | None:
+    """The parameters, their training error and the damping of a step that fits better; None if none does.
+
+    A simulation costs far less than sensitivities, so dampings are simply tried: downwards as long as that is better, and
+    upwards where nothing was.
+    """
+
+    def tried(damping: float) -> tuple[float, Float, float]:
+        vector = iterates.vector + steps.at(damping)
+        error = problem.training_error(vector)
+        return problem.cost(vector, error), vector, error
+
+    before = problem.cost(iterates.vector, iterates.training[-1])
+    damping = max(iterates.damping / _FACTOR, _SMALLEST)
+    best = tried(damping)
+    if best[0] < before:
+        while damping > _SMALLEST and (other := tried(damping / _FACTOR))[0] < best[0]:
+            best, damping = other, damping / _FACTOR
+        return best[1], best[2], damping
+    while damping < _LARGEST:
+        damping *= _FACTOR
+        best = tried(damping)
+        if best[0] < before:
+            return best[1], best[2], damping
+    return None
+
+
+def _told(iterates: Iterates, settings: FitSettings) -> FitProgress:
+    return FitProgress(
+        iteration=len(iterates.training) - 1,
+        iterations=settings.iterations,
+        training_error=iterates.training[-1],
+        validation_error=iterates.validation[-1],
+        damping=iterates.damping,
+        seconds=iterates.seconds[-1],
+    )

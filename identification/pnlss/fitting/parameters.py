@@ -1,0 +1,138 @@
+"""All parameters of a model as one vector, and back."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.pnlss.fitting.kernels import System
+from identification.pnlss.kernels import Matrices, Table
+from identification.pnlss.model import PnlssModel
+
+__all__ = ["Parameters", "matrices_of"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Where each parameter stands: first those that all outputs share, then those of each output by itself.
+
+    Shared are [A B E] row by row, the weights of saturating state features row by row, those of saturating output features,
+    and the initial states of the experiments that have theirs estimated; own are [C D F] row by row.
+
+    Parameters
+    ----------
+    start
+        A model of the structure in question; all but what is listed above is taken from it.
+    estimated
+        Number of experiments with an estimated initial state.
+    """
+
+    start: PnlssModel
+    estimated: int = 0
+
+    @cached_property
+    def tables(self) -> tuple[Table, Table]:
+        """Features of states and outputs; their weights are parameters."""
+        return self.start.state_features.table, self.start.output_features.table
+
+    @cached_property
+    def ends(self) -> list[int]:
+        """Where [A B E], the weights of state and output features, the initial states and [C D F] end."""
+        start, n, variables = self.start, self.start.states, self.start.state_features.variables
+        sizes = [
+            n * (variables + start.state_features.count),
+            start.state_features.parameters,
+            start.output_features.parameters,
+            n * self.estimated,
+            len(start.outputs) * (variables + start.output_features.count),
+        ]
+        return [int(end) for end in np.cumsum(sizes)]
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+        return self.ends[-1]
+
+    @property
+    def linear(self) -> int:
+        """Number of elements of [A B E]."""
+        return self.ends[0]
+
+    @property
+    def shared(self) -> int:
+        """Number of parameters that all outputs share."""
+        return self.ends[3]
+
+    @cached_property
+    def nonlinear(self) -> Float:
+        """float[count], 1 for elements of E and F, else 0."""
+        marks = np.zeros(self.count)
+        variables = self.start.state_features.variables
+        marks[: self.linear].reshape(self.start.states, -1)[:, variables:] = 1.0
+        marks[self.shared :].reshape(len(self.start.outputs), -1)[:, variables:] = 1.0
+        return marks
+
+    def columns(self, place: int | None) -> NDArray[np.int64]:
+        """Which parameter each column of an experiment's Jacobian belongs to, for its shared part.
+
+        ``place`` is that of the experiment among those with an estimated initial state, None if it is none of them.
+        """
+        linear, inner_state, inner_output, _ = (np.arange(self.ends[i - 1] if i else 0, self.ends[i]) for i in range(4))
+        n = self.start.states
+        begin = np.arange(0) if place is None else self.ends[2] + np.arange(place * n, (place + 1) * n)
+        return np.concatenate([linear, inner_state, begin, inner_output])
+
+    def own(self, output: int) -> slice:
+        """Parameters of one output."""
+        width = (self.count - self.shared) // len(self.start.outputs)
+        return slice(self.shared + output * width, self.shared + (output + 1) * width)
+
+    def vector(self, model: PnlssModel, initial_states: Float) -> Float:
+        """float[count] of a model of this structure and initial states float[estimated, n_states]."""
+        parts = (
+            np.hstack([model.a, model.b, model.e]),
+            model.state_features.weights,
+            model.output_features.weights,
+            initial_states,
+            np.hstack([model.c, model.d, model.f]),
+        )
+        return np.concatenate([np.ravel(part) for part in parts])
+
+    def system(self, vector: Float) -> System:
+        """The same as kernels take it."""
+        linear, inner_state, inner_output, _, own = np.split(vector, self.ends[:-1])
+        state, output = self.tables
+        return System(
+            linear.reshape(self.start.states, -1),
+            own.reshape(len(self.start.outputs), -1),
+            state._replace(weights=inner_state.reshape(state.weights.shape)),
+            output._replace(weights=inner_output.reshape(output.weights.shape)),
+        )
+
+    def initial_states(self, vector: Float) -> Float:
+        """float[estimated, n_states]."""
+        return vector[self.ends[2] : self.ends[3]].reshape(-1, self.start.states)
+
+    def model(self, vector: Float) -> PnlssModel:
+        """The model with these parameters."""
+        system, start = self.system(vector), self.start
+        return replace(
+            start,
+            **matrices_of(system)._asdict(),
+            state_features=replace(start.state_features, weights=system.state_table.weights),
+            output_features=replace(start.output_features, weights=system.output_table.weights),
+        )
+
+
+def matrices_of(system: System) -> Matrices:
+    """A, B, E, C, D and F by themselves."""
+    n, variables = system.state.shape[0], system.state_table.limits.size
+    parts = [
+        m[:, begin:end]
+        for m in (system.state, system.output)
+        for begin, end in ((0, n), (n, variables), (variables, None))
+    ]
+    return Matrices(*(np.ascontiguousarray(part) for part in parts))

@@ -1,0 +1,124 @@
+"""A fit in scaled variables: its cost at any parameters, and its normal equations there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.fitting.frequency_lines import with_lines
+from identification.pnlss.fitting.initial_states import fitted_initial_state
+from identification.pnlss.fitting.kernels import System
+from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
+from identification.pnlss.fitting.parameters import Parameters
+from identification.pnlss.fitting.records import Record, records_of, simulated
+from identification.pnlss.fitting.settings import FitSettings
+from identification.pnlss.model import PnlssModel
+
+__all__ = ["Problem", "Scales", "scales_of"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """RMS of states in the start, and of inputs and outputs in the training data."""
+
+    states: Float
+    inputs: Float
+    outputs: Float
+
+    def model(self, model: PnlssModel) -> PnlssModel:
+        """A model in these units."""
+        return model.scaled(states=self.states, inputs=self.inputs, outputs=self.outputs)
+
+    def physical(self, model: PnlssModel) -> PnlssModel:
+        """Inverse of `model`."""
+        return model.scaled(states=1.0 / self.states, inputs=1.0 / self.inputs, outputs=1.0 / self.outputs)
+
+
+def scales_of(experiments: Sequence[Experiment], states: Float) -> Scales:
+    """Scales of the counted parts of experiments, with those of the states given."""
+    inputs = np.concatenate([e.counted_inputs for e in experiments], axis=1)
+    outputs = np.concatenate([e.counted_outputs for e in experiments], axis=1)
+    return Scales(states, _rms(inputs), _rms(outputs))
+
+
+def _rms(rows: Float) -> Float:
+    largest = np.max(np.abs(rows), axis=1, keepdims=True)
+    scale = np.where(largest > 0.0, largest, 1.0)
+    return np.asarray(scale[:, 0] * np.sqrt(np.mean((rows / scale) ** 2, axis=1)))
+
+
+class Problem:
+    """Training and validation data, and what is to be made small.
+
+    That is the sum over experiments, outputs and samples (or lines) of weighted squared errors over that of the squared
+    outputs, to which a ridge adds.
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        scales: Scales,
+        experiments: Sequence[Experiment],
+        validation: Sequence[Experiment],
+        settings: FitSettings,
+    ) -> None:
+        rate_hz = experiments[0].sample_rate_hz
+        self.parameters, self.settings = parameters, settings
+        both = (scales.inputs, scales.outputs)
+        self.training = with_lines(records_of(experiments, *both), settings, rate_hz)
+        self.validation = with_lines(records_of(validation, *both, "validation"), settings, rate_hz)
+        rms = settings.outputs == "rms"
+        self.weights = np.ones_like(scales.outputs) if rms else scales.outputs / np.max(scales.outputs)
+        self._total = self._measured(self.training)
+        self._validation_total = self._measured(self.validation)
+
+    def _measured(self, records: list[Record]) -> float:
+        return sum(record.weight * float(self.weights**2 @ record.squares(record.y)) for record in records)
+
+    def _squares(self, system: System, record: Record, begin: Float) -> float:
+        run = simulated(system, record.u, begin)
+        if run is None:
+            return float(np.inf)
+        squares = record.weight * float(self.weights**2 @ record.squares(run[1] - record.y))
+        return squares if np.isfinite(squares) else float(np.inf)
+
+    def training_error(self, vector: Float) -> float:
+        """Relative RMS error over all training data; inf where a run leaves all bounds."""
+        if not np.all(np.isfinite(vector)):
+            return float(np.inf)
+        system, begins = self.parameters.system(vector), self.parameters.initial_states(vector)
+        rest, total = np.zeros(len(system.state)), 0.0
+        for record in self.training:
+            total += self._squares(system, record, rest if record.place is None else begins[record.place])
+            if not np.isfinite(total):
+                return float(np.inf)
+        return float(np.sqrt(total / self._total))
+
+    def validation_error(self, vector: Float) -> float:
+        """The same of validation data, initial states estimated for just this model; NaN without such data."""
+        if not self.validation:
+            return float(np.nan)
+        system, total = self.parameters.system(vector), 0.0
+        for record in self.validation:
+            rest = np.zeros(len(system.state))
+            begin = rest if record.place is None else fitted_initial_state(system, record, self.weights)
+            total += self._squares(system, record, begin)
+        return float(np.sqrt(total / self._validation_total))
+
+    def cost(self, vector: Float, error: float) -> float:
+        """Squared relative error and ridge."""
+        if not np.isfinite(error):
+            return float(np.inf)
+        return error**2 + self.settings.ridge * float(self.parameters.nonlinear @ vector**2)
+
+    def equations(self, vector: Float) -> NormalEquations:
+        """Normal equations of half of `cost`."""
+        found = normal_equations(self.parameters, vector, self.training, self.weights)
+        ridge = self.settings.ridge * self.parameters.nonlinear
+        return NormalEquations(
+            found.hessian / self._total + np.diag(ridge), found.gradient / self._total + ridge * vector
+        )

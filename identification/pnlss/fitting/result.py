@@ -1,0 +1,151 @@
+"""What a fit gives: the chosen model, the last iterate, and how it got there."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.pnlss.fitting.settings import FitSettings
+from identification.pnlss.model import PnlssModel
+from identification.validation import read_only
+
+__all__ = ["FitHistory", "PnlssFit"]
+
+Float = NDArray[np.float64]
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FitHistory:
+    """Errors over the iterations, the start first.
+
+    Parameters
+    ----------
+    training_error, validation_error
+        float[n], relative RMS errors over all outputs; validation NaN without data, inf for an unbounded run.
+    damping
+        float[n], of the step that led there; of the start that of the settings.
+    seconds
+        float[n], since the fit began.
+    """
+
+    training_error: Float
+    validation_error: Float
+    damping: Float
+    seconds: Float
+
+    def __post_init__(self) -> None:
+        for name in ("training_error", "validation_error", "damping", "seconds"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations after the start."""
+        return int(self.training_error.size) - 1
+
+    @property
+    def best(self) -> int:
+        """Iteration with the smallest validation error, or training error where there are no validation data."""
+        validated = not bool(np.all(np.isnan(self.validation_error)))
+        return int(np.argmin(self.validation_error if validated else self.training_error))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PnlssFit:
+    """A fitted model.
+
+    Parameters
+    ----------
+    model
+        The best iterate: on validation data where given, else on training data.
+    last
+        The last iterate, from which a resumed fit goes on.
+    linear
+        The linear model that it began with; None if it began with a nonlinear one.
+    history
+        Errors over the iterations.
+    chosen
+        Iteration that ``model`` is.
+    initial_states, last_initial_states
+        float[n_estimated, n_states] of ``model`` and ``last``, of the experiments with an estimated one, in their order.
+    state_scale
+        float[n_states], RMS of the states in the start: the unit in which the fit saw them.
+    settings
+        As given.
+    stopped
+        Why it ended, in one line.
+    interrupted
+        Whether it was stopped from outside: all that was reached is there, and ``resume`` goes on.
+    """
+
+    model: PnlssModel
+    last: PnlssModel
+    linear: PnlssModel | None
+    history: FitHistory
+    chosen: int
+    initial_states: Float
+    last_initial_states: Float
+    state_scale: Float
+    settings: FitSettings
+    stopped: str
+    interrupted: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("initial_states", "last_initial_states", "state_scale"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+
+    @property
+    def training_error(self) -> float:
+        """Relative RMS error of ``model`` on the training data."""
+        return float(self.history.training_error[self.chosen])
+
+    @property
+    def validation_error(self) -> float:
+        """Relative RMS error of ``model`` on the validation data; NaN without."""
+        return float(self.history.validation_error[self.chosen])
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        arrays: dict[str, NDArray[Any]] = {f"history/{name}": value for name, value in vars(self.history).items()}
+        arrays |= {name: getattr(self, name) for name in ("initial_states", "last_initial_states", "state_scale")}
+        attributes: dict[str, Any] = {"chosen": self.chosen, "stopped": self.stopped, "interrupted": self.interrupted}
+        attributes["settings"] = {
+            key: [list(v) if isinstance(v, tuple) else v for v in value] if isinstance(value, tuple) else value
+            for key, value in asdict(self.settings).items()
+        }
+        for name in ("model", "last", "linear"):
+            model: PnlssModel | None = getattr(self, name)
+            inside, of_model = ({}, None) if model is None else model.to_arrays()
+            arrays |= {f"{name}/{key}": value for key, value in inside.items()}
+            attributes[name] = of_model
+        return arrays, attributes
+
+    @classmethod
+    def from_arrays(cls, arrays: Arrays, attributes: Mapping[str, Any]) -> "PnlssFit":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing or unknown."""
+        try:
+            models: dict[str, Any] = {}
+            for name in ("model", "last", "linear"):
+                inside = {k.removeprefix(f"{name}/"): v for k, v in arrays.items() if k.startswith(f"{name}/")}
+                of_model = attributes[name]
+                models[name] = None if of_model is None else PnlssModel.from_arrays(inside, of_model)
+            parts = {k.removeprefix("history/"): v for k, v in arrays.items() if k.startswith("history/")}
+            given = dict(attributes["settings"])
+            given["line_weights"] = tuple(tuple(row) for row in given["line_weights"])
+            given["band_hz"] = None if given["band_hz"] is None else tuple(given["band_hz"])
+            return cls(
+                **models,
+                history=FitHistory(**parts),
+                settings=FitSettings(**given),
+                chosen=int(attributes["chosen"]),
+                stopped=str(attributes["stopped"]),
+                interrupted=bool(attributes["interrupted"]),
+                initial_states=arrays["initial_states"],
+                last_initial_states=arrays["last_initial_states"],
+                state_scale=arrays["state_scale"],
+            )
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"PNLSS fit: {error} is missing or unknown") from None

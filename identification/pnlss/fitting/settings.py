@@ -1,0 +1,113 @@
+"""How a fit goes, and what it tells while it does."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, get_args
+
+from identification.errors import IdentificationError
+
+__all__ = ["FitProgress", "FitSettings", "OutputWeighting"]
+
+OutputWeighting = Literal["rms", "none"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitSettings:
+    """Settings of `fit_pnlss`.
+
+    Parameters
+    ----------
+    iterations
+        At most so many; those of a fit that is resumed are counted.
+    patience
+        Stop after so many iterations without a smaller validation error; 0 for never.
+    tolerance
+        Stop once the training error has fallen by less than this share in five iterations on end.
+    outputs
+        ``rms``: squared errors of each output relative to its mean square over the training data, so that outputs in any
+        unit count alike. ``none``: in the units of the channels, as the toolbox of the paper does.
+    ridge
+        This many times the sum of squares of E and F, in variables of unit RMS, is added to the squared relative error.
+    band_hz
+        Only frequencies from the first to the second count. Needs periodic experiments.
+    line_weights
+        Rows of a frequency in Hz and the weight of errors there, one for all outputs or one for each; linear in between and 0
+        beyond. Needs periodic experiments.
+    damping
+        Of the first step, relative to the largest eigenvalue of the scaled normal equations.
+    truncation
+        Directions whose eigenvalue is below this share of the largest are left alone: among them the changes of state
+        coordinates, which change no output.
+
+    Raises
+    ------
+    IdentificationError
+        On values out of range.
+    """
+
+    iterations: int = 100
+    patience: int = 30
+    tolerance: float = 1e-6
+    outputs: OutputWeighting = "rms"
+    ridge: float = 0.0
+    band_hz: tuple[float, float] | None = None
+    line_weights: tuple[tuple[float, ...], ...] = ()
+    damping: float = 1e-3
+    truncation: float = 1e-13
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "line_weights", tuple(tuple(map(float, row)) for row in self.line_weights))
+        for name, allowed, fine in (
+            ("iterations", "0 and above", self.iterations >= 0),
+            ("patience", "0 and above", self.patience >= 0),
+            ("tolerance", "0 and above, below 1", 0.0 <= self.tolerance < 1.0),
+            ("outputs", ", ".join(get_args(OutputWeighting)), self.outputs in get_args(OutputWeighting)),
+            ("ridge", "0 and above, finite", 0.0 <= self.ridge < float("inf")),
+            ("damping", "above 0, finite", 0.0 < self.damping < float("inf")),
+            ("truncation", "0 and above, below 1", 0.0 <= self.truncation < 1.0),
+        ):
+            if not fine:
+                raise IdentificationError(f"{name}: is {getattr(self, name)}, allowed are {allowed}")
+        if self.band_hz is not None:
+            low, high = (float(value) for value in self.band_hz)
+            object.__setattr__(self, "band_hz", (low, high))
+            if not 0.0 <= low < high:
+                raise IdentificationError(
+                    f"band_hz: is {low:g} to {high:g} Hz, needs 0 or above, the second the larger"
+                )
+        rows = self.line_weights
+        rising = all(later[0] > row[0] for row, later in pairwise(rows))
+        alike = all(len(row) == len(rows[0]) >= 2 and min(row) >= 0.0 and max(row) < float("inf") for row in rows)
+        if not (alike and rising):
+            raise IdentificationError(
+                "line_weights: need rows of a frequency and weights, all finite and not below 0, frequencies rising"
+            )
+
+    @property
+    def by_frequency(self) -> bool:
+        """Whether errors are weighted over frequency."""
+        return self.band_hz is not None or bool(self.line_weights)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitProgress:
+    """Where a fit is.
+
+    Parameters
+    ----------
+    iteration, iterations
+        Of how many at most.
+    training_error, validation_error
+        Relative RMS errors; NaN without validation data, inf for an unbounded run.
+    damping
+        Of the step that led here.
+    seconds
+        Since the fit began.
+    """
+
+    iteration: int
+    iterations: int
+    training_error: float
+    validation_error: float
+    damping: float
+    seconds: float
