@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from identification.pnlss.fitting.fit import fit_pnlss
     from identification.pnlss.fitting.result import FitHistory, PnlssFit
     from identification.pnlss.fitting.settings import FitProgress, FitSettings
+    from identification.pnlss.identify import identify_pnlss, linear_pnlss
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
@@ -164,7 +165,9 @@ __all__ = [
     "frequency_response",
     "identify_exciter",
     "identify_many",
+    "identify_pnlss",
     "linear_modes",
+    "linear_pnlss",
     "mac",
     "mac_matrix",
     "map_backbone",
@@ -277,7 +280,9 @@ _MODULE_OF = {
     "frequency_response": "prediction.frequency_response",
     "identify_exciter": "prediction.exciter_fit",
     "identify_many": "pnlss.study",
+    "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
+    "linear_pnlss": "pnlss.identify",
     "mac": "nonlinear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",
