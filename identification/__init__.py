@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from identification.pnlss.fitting.fit import fit_pnlss
     from identification.pnlss.fitting.result import FitHistory, PnlssFit
     from identification.pnlss.fitting.settings import FitProgress, FitSettings
+    from identification.pnlss.identify import identify_pnlss
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.simulation import Simulation
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
@@ -148,6 +149,7 @@ __all__ = [
     "force_surface",
     "frequency_response",
     "identify_exciter",
+    "identify_pnlss",
     "linear_modes",
     "mac",
     "mac_matrix",
@@ -251,6 +253,7 @@ _MODULE_OF = {
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
     "identify_exciter": "prediction.exciter_fit",
+    "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
     "mac": "nonlinear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",

@@ -17,7 +17,7 @@ from identification.linear.subspace import StateSpace
 from identification.pnlss.best_linear import best_linear_responses
 from identification.pnlss.experiment import Experiment, same_channels
 from identification.pnlss.features import Features
-from identification.pnlss.fitting.levenberg_marquardt import fit_pnlss
+from identification.pnlss.fitting.fit import fit_pnlss
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.linear_start import linear_start, with_independent_states
