@@ -51,6 +51,13 @@ if TYPE_CHECKING:
     from identification.pnlss.identify import identify_pnlss
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.simulation import Simulation
+    from identification.pnlss.steady.response import (
+        PnlssResponse,
+        pnlss_frequency_response,
+        pnlss_response,
+        pnlss_steady_state,
+    )
+    from identification.pnlss.steady.states import SteadyStates
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
@@ -112,6 +119,7 @@ __all__ = [
     "PnlssErrors",
     "PnlssFit",
     "PnlssModel",
+    "PnlssResponse",
     "PredictionError",
     "Predictions",
     "Repeatability",
@@ -125,6 +133,7 @@ __all__ = [
     "StateSpace",
     "StateSpaceFit",
     "SteadyPrediction",
+    "SteadyStates",
     "SweepPrediction",
     "Transient",
     "VoltagePath",
@@ -163,6 +172,9 @@ __all__ = [
     "periodic_spectra",
     "periodic_vibration",
     "pnlss_errors",
+    "pnlss_frequency_response",
+    "pnlss_response",
+    "pnlss_steady_state",
     "predict_sweep",
     "recorded_force_response",
     "repeatability",
@@ -216,6 +228,7 @@ _MODULE_OF = {
     "PnlssErrors": "pnlss.errors",
     "PnlssFit": "pnlss.fitting.result",
     "PnlssModel": "pnlss.model",
+    "PnlssResponse": "pnlss.steady.response",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
@@ -229,6 +242,7 @@ _MODULE_OF = {
     "StateSpace": "linear.subspace",
     "StateSpaceFit": "linear.state_space_fit",
     "SteadyPrediction": "prediction.steady_prediction",
+    "SteadyStates": "pnlss.steady.states",
     "SweepPrediction": "prediction.sweep_prediction",
     "Transient": "signals.transients",
     "VoltagePath": "prediction.exciter",
@@ -267,6 +281,9 @@ _MODULE_OF = {
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
     "pnlss_errors": "pnlss.errors",
+    "pnlss_frequency_response": "pnlss.steady.response",
+    "pnlss_response": "pnlss.steady.response",
+    "pnlss_steady_state": "pnlss.steady.response",
     "predict_sweep": "prediction.sweeps",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",

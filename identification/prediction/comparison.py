@@ -33,7 +33,8 @@ class PredictionError:
     envelope_error
         RMS of the difference of the amplitudes over the common part of both, over the reference's largest amplitude.
     range_use
-        Largest modal amplitude of the prediction over the largest that the model was identified with.
+        Largest modal amplitude of the prediction, or states, over the largest that the model was identified with; NaN
+        where that is unknown.
     notes
         What a user should know about this comparison, one line each.
     """
@@ -48,6 +49,8 @@ class PredictionError:
     @property
     def verdict(self) -> str:
         """Whether the model was asked about what it was identified with."""
+        if np.isnan(self.range_use):
+            return "identified range unknown"
         if self.range_use <= 1.0:
             return "inside the identified range"
         return "extrapolated" if self.range_use <= FLAGGED_BEYOND else "extrapolated far"

@@ -31,22 +31,25 @@ class SteadyPrediction:
     Parameters
     ----------
     force_n
-        Force held: peak of its fundamental (N), or its RMS (N) where ``force`` is ``rms``.
+        Force held: peak of its fundamental (N), or its RMS (N) where ``force`` is ``rms``; where it is ``voltage``, the
+        amplitude of the voltage (V).
     force
-        What is held: ``fundamental`` (its harmonics as recorded), ``rms`` (as recorded), ``pure-sine`` (no harmonics);
-        or ``recorded``: each point has the force that it had in a test, and ``force_n`` is their median.
+        What is held: ``fundamental`` (its harmonics as recorded, or as the exciter makes them), ``rms`` (likewise),
+        ``pure-sine`` (no harmonics), ``voltage`` (a sine of voltage); or ``recorded``: each point has the force that it had
+        in a test, and ``force_n`` is their median.
     channels
         Names of the points, the drive point first.
     frequency_hz, modal_amplitude, fundamental_n
-        float[n], frequency of the vibration, q (kg^1/2 m), peak of the fundamental of the force.
+        float[n], frequency of the vibration, q (kg^1/2 m; NaN where it is unknown), peak of the fundamental of the force.
     displacement_m
         complex[n, n_channels], fundamental of the displacement, peak, against the phase of the force.
     stable
-        bool[n], under constant force and frequency, by the eigenvalues of the slow flow.
+        bool[n], under constant force and frequency, by the eigenvalues of the slow flow, or of the disturbed vibration.
     branch
         int[n], 0 for the response that begins at rest, 1 and on for detached ones.
     range_use
-        float[n], modal amplitude over the largest identified.
+        float[n], modal amplitude over the largest identified, or states over the largest in the training data; NaN where
+        that is unknown.
     fold_frequency_hz, fold_amplitude_m, fold_modal_amplitude
         float[n_folds], points where the response turns back in frequency; amplitude of the drive point.
     notes
@@ -71,6 +74,8 @@ class SteadyPrediction:
     @property
     def name(self) -> str:
         """What was predicted, for tables."""
+        if self.force == "voltage":
+            return f"{self.force_n:g} V"
         kind = {"fundamental": "", "rms": " RMS", "pure-sine": " pure sine", "recorded": " recorded"}[self.force]
         return f"{self.force_n:g} N{kind}"
 

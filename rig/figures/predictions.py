@@ -86,8 +86,8 @@ def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, 
 
 def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> None:
     """The drive point's amplitude that the model was identified up to, where the curves come near it."""
-    highest = max(predictions.steady, key=lambda response: float(response.modal_amplitude.max()))
-    where = int(np.argmax(highest.modal_amplitude))
+    highest = max(predictions.steady, key=lambda response: float(response.range_use.max()))
+    where = int(np.argmax(highest.range_use))
     limit = scale * float(highest.amplitude_m()[where] / highest.range_use[where])
     if limit < _NEAR * top:
         size.axhline(limit, color=REJECTED, lw=0.8, ls="--", label="identified up to")

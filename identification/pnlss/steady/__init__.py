@@ -1,0 +1,1 @@
+"""Steady vibrations of nonlinear state-space models, by harmonic balance of the discrete map."""

@@ -1,0 +1,123 @@
+"""Solutions of a harmonic balance: one at a given frequency from rest, and all along a band."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.continuation import Path, Steps, continued, solved
+from identification.errors import IdentificationError
+from identification.pnlss.steady.balance import Balance
+
+__all__ = ["Followed", "followed", "from_rest", "sizes", "statically_stable"]
+
+Float = NDArray[np.float64]
+
+_FIRST_LEVEL = 0.02
+"""Share of the level at which the linear solution is a start for Newton's method."""
+_LEVELS = Steps(first=0.1, largest=0.5)
+_MOST_LEVELS = 300
+_BAND_UNITS = 4.0
+"""Lengths in a band: with the longest step of 0.1 a band takes 40 points, and a resonance in it many more."""
+
+
+class Followed(NamedTuple):
+    """A path, and what is to be said of its end; empty where it reached the far end of the band."""
+
+    path: Path
+    note: str
+
+
+def sizes(balance: Balance, frequency_hz: float) -> Float:
+    """Size of each unknown: that of the linear solution there, alike for all harmonics."""
+    linear = balance.linear(frequency_hz)
+    states = np.max(np.abs(balance.states(linear)), axis=0)
+    states = np.maximum(states, 1e-9 * np.max(states, initial=1e-300))
+    own = balance.own(linear)
+    if own.size > 2:  # the harmonics of a force, and the two parts of a voltage
+        own = np.concatenate([np.full(own.size - 2, np.linalg.norm(own[:2])), np.full(2, np.linalg.norm(own[-2:]))])
+    return np.concatenate([np.tile(states, balance.basis.size), np.abs(own)])
+
+
+def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf) -> Float | None:
+    """Unknowns of the vibration that is reached from rest as the level rises; None where the path does not get there."""
+    linear, scale = balance.linear(frequency_hz), sizes(balance, frequency_hz)
+    try:
+        path = continued(
+            balance.over_level(frequency_hz),
+            _FIRST_LEVEL * linear,
+            _FIRST_LEVEL,
+            scale=scale,
+            parameter_scale=0.5,
+            lowest=0.5 * _FIRST_LEVEL,
+            highest=1.0,
+            points=_MOST_LEVELS,
+            steps=_LEVELS,
+            stop=lambda z, level: _beyond(balance, z, largest_use),
+        )
+    except IdentificationError:
+        return None
+    return path.unknowns[-1] if path.ending == "range" and path.parameter[-1] == 1.0 else None
+
+
+def statically_stable(balance: Balance, z: Float, frequency_hz: float) -> bool:
+    """Whether a slow change can hold a solution: the determinant of its Jacobian has the sign that it has at rest."""
+    rest = _FIRST_LEVEL**2 * balance.linear(frequency_hz)
+    signs = [
+        np.linalg.slogdet(balance.evaluated(at, frequency_hz, level)[1])[0]
+        for at, level in ((z, 1.0), (rest, _FIRST_LEVEL**2))
+    ]
+    return bool(signs[0] == signs[1])
+
+
+def followed(
+    balance: Balance, begin_hz: float, end_hz: float, *, points: int, step: float, largest_use: float
+) -> Followed | None:
+    """The path from the vibration reached from rest at one end of a band to the other end; None if it has no start."""
+    start = from_rest(balance, begin_hz, largest_use)
+    if start is None:
+        return None
+    low, high = sorted((begin_hz, end_hz))
+    path = continued(
+        balance.over_frequency(),
+        start,
+        begin_hz,
+        scale=sizes(balance, begin_hz),
+        parameter_scale=(high - low) / _BAND_UNITS,
+        direction=end_hz - begin_hz,
+        lowest=low,
+        highest=high,
+        points=points,
+        steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step),
+        stop=lambda z, frequency_hz: _beyond(balance, z, largest_use),
+    )
+    return Followed(path, _note(path, begin_hz, end_hz))
+
+
+def polished(balance: Balance, z: Float, frequency_hz: float) -> Float | None:
+    """The solution near ``z`` at a frequency; None if there is none."""
+    return solved(balance.over_frequency(), z, frequency_hz, scale=sizes(balance, frequency_hz))
+
+
+def _beyond(balance: Balance, z: Float, largest_use: float) -> str:
+    """What to say of states that are far outside of the training data; empty where they are not."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        use = np.max(np.abs(balance.basis.to_time @ balance.states(z)), axis=0) / balance.model.state_range
+    if not np.any(use > largest_use):
+        return ""
+    return f"the states are beyond {largest_use:g} times those of the training data"
+
+
+def _note(path: Path, begin_hz: float, end_hz: float) -> str:
+    where = f"{path.parameter[-1]:.4g} Hz"
+    if path.ending == "range":
+        reached = path.parameter[-1] == end_hz
+        return "" if reached else f"the response from {begin_hz:.4g} Hz turned back and left the band where it began"
+    why = {
+        "stopped": path.reason,
+        "points": "it has all points that it may have",
+        "closed": "it closed on itself",
+        "step": "no solution was found farther on",
+        "size": "it is too large",
+    }[path.ending]
+    return f"the response from {begin_hz:.4g} Hz ends at {where}: {why}"

@@ -1,0 +1,173 @@
+"""Periodic vibrations of a nonlinear state-space model, with all their harmonics."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import MOTION_ORDER, Channel
+from identification.errors import IdentificationError
+from identification.pnlss.steady.balance import Balance
+from identification.pnlss.steady.basis import harmonics_of
+from identification.pnlss.steady.stability import Loss, loss_of_stability, multipliers
+
+__all__ = ["SteadyStates", "motion_rows", "steady_states"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_ARRAYS = (
+    "frequency_hz",
+    "states",
+    "inputs",
+    "outputs",
+    "voltage_v",
+    "multipliers",
+    "stable",
+    "state_use",
+    "input_use",
+)
+_FINE = 16
+"""Samples per harmonic by which the largest magnitude of a state is found, to 0.5 % of the highest harmonic."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SteadyStates:
+    """Periodic vibrations, one per point.
+
+    Parameters
+    ----------
+    frequency_hz
+        float[n].
+    states, inputs, outputs
+        complex[n, H + 1, n_states | n_inputs | n_outputs], harmonics ``y = Re sum Y_h exp(i h theta)``.
+    voltage_v
+        complex[n], amplitude of the voltage; NaN where there is none.
+    multipliers
+        complex[n, n_states], of a disturbance over one sample, under the inputs as they are.
+    stable
+        bool[n]. Under a given input: every multiplier below 1. Where a force is held: on a part of the curve that a slow
+        change of frequency can hold, and no multiplier above 1 but real ones, which belong to an input that is not held.
+    loss
+        How each is unstable: ``fold``, ``period doubling``, ``Neimark-Sacker``; empty for stable ones.
+    state_use, input_use
+        float[n, n_states], float[n, n_inputs], largest magnitude over the largest in the training data; NaN where unknown.
+    input_channels, output_channels
+        What goes in, and what comes out.
+    """
+
+    frequency_hz: Float
+    states: Complex
+    inputs: Complex
+    outputs: Complex
+    voltage_v: Complex
+    multipliers: Complex
+    stable: NDArray[np.bool_]
+    loss: tuple[Loss, ...]
+    state_use: Float
+    input_use: Float
+    input_channels: tuple[Channel, ...]
+    output_channels: tuple[Channel, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return int(self.frequency_hz.size)
+
+    @property
+    def range_use(self) -> float | Float:
+        """float[n]: largest use of the states' range; NaN where that is unknown."""
+        return largest_use(self.state_use)
+
+    @property
+    def force_n(self) -> Complex:
+        """complex[n, H + 1]: the force, an input or an output; raises `IdentificationError` if there is none."""
+        for channels, harmonics in ((self.input_channels, self.inputs), (self.output_channels, self.outputs)):
+            rows = [row for row, channel in enumerate(channels) if channel.role == "force"]
+            if rows:
+                return np.asarray(harmonics[:, :, rows[0]])
+        raise IdentificationError("model: has no force among its inputs and outputs")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the motions, the drive point first."""
+        return tuple(self.output_channels[row].name for row in motion_rows(self.output_channels))
+
+    @property
+    def displacement_m(self) -> Complex:
+        """complex[n, H + 1, n_channels]: displacements at `channels`, against the phase of the force; static ones are NaN
+        where a velocity or acceleration was modelled.
+        """  # noqa: D205
+        rows = motion_rows(self.output_channels)
+        order = np.array([MOTION_ORDER[self.output_channels[row].motion] for row in rows])
+        h = np.arange(self.outputs.shape[1])
+        s = (2j * np.pi * self.frequency_hz[:, None] * h)[:, :, None]
+        lead = np.exp(-1j * np.angle(self.force_n[:, 1])[:, None] * h)[:, :, None]
+        found = self.outputs[:, :, rows] * lead / np.where(s == 0.0, 1.0, s) ** order
+        found[:, 0, order > 0] = np.nan
+        return np.asarray(found)
+
+    def joined(self, other: "SteadyStates") -> "SteadyStates":
+        """The points of both, these first."""
+        arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _ARRAYS}
+        return replace(self, **arrays, loss=(*self.loss, *other.loss))
+
+
+def motion_rows(channels: tuple[Channel, ...]) -> list[int]:
+    """Rows of the motions, drive points first; raises `IdentificationError` if there is none."""
+    drive = [row for row, channel in enumerate(channels) if channel.role == "drive"]
+    others = [row for row, channel in enumerate(channels) if channel.role == "response"]
+    if not drive + others:
+        raise IdentificationError("model: no output is a motion, whose amplitude could be predicted")
+    return drive + others
+
+
+def largest_use(use: Float) -> Float:
+    """float[n] of float[n, k]: the largest known one; NaN where none is known."""
+    known = np.where(np.isfinite(use), use, -np.inf).max(axis=1, initial=-np.inf)
+    return np.where(np.isfinite(known), known, np.nan)
+
+
+def steady_states(
+    balance: Balance, unknowns: Float, frequency_hz: Float, statically_stable: NDArray[np.bool_]
+) -> SteadyStates:
+    """The vibrations that solutions (float[n, n_unknowns]) of a balance describe.
+
+    ``statically_stable`` (bool[n]) tells, where the force is held, those that a slow change can hold.
+    """
+    model, basis = balance.model, balance.basis
+    count, harmonics = frequency_hz.size, basis.harmonics + 1
+    sizes = {"states": model.states, "inputs": len(model.inputs), "outputs": len(model.outputs)}
+    series = {name: np.zeros((count, harmonics, size), dtype=complex) for name, size in sizes.items()}
+    found = np.zeros((count, model.states), dtype=complex)
+    stable, losses = np.zeros(count, dtype=bool), list[Loss]()
+    use: dict[str, list[Float]] = {"states": [], "inputs": []}
+    fine = basis.at(2.0 * np.pi * np.arange(_FINE * harmonics) / (_FINE * harmonics))
+    ranges = {"states": model.state_range, "inputs": model.input_range}
+    for k, (z, at_hz) in enumerate(zip(unknowns, frequency_hz.tolist(), strict=True)):
+        period, angle = balance.period(z), balance.angle(at_hz)
+        parts = {"states": balance.states(z), "inputs": period.inputs, "outputs": period.outputs}
+        for name, part in parts.items():
+            series[name][k] = harmonics_of(part)
+        for name, limit in ranges.items():
+            use[name].append(np.max(np.abs(fine @ parts[name]), axis=0) / limit)
+        found[k], low = multipliers(period.states_by[..., : model.states], basis.turned(angle)[0], basis)
+        if not balance.drive.size:
+            loss = loss_of_stability(low, angle)
+        else:
+            loss = loss_of_stability(low, angle, real=False) if statically_stable[k] else "fold"
+        stable[k] = not loss
+        losses.append(loss)
+    return SteadyStates(
+        frequency_hz=np.array(frequency_hz),
+        **series,
+        voltage_v=np.array([balance.drive.voltage(balance.own(z)) for z in unknowns], dtype=complex),
+        multipliers=found,
+        stable=stable,
+        loss=tuple(losses),
+        state_use=np.array(use["states"]).reshape(count, model.states),
+        input_use=np.array(use["inputs"]).reshape(count, len(model.inputs)),
+        input_channels=model.inputs,
+        output_channels=model.outputs,
+    )
