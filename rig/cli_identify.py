@@ -1,5 +1,6 @@
 """``rig identify`` and ``rig predict``: from recordings to models, from models to predictions."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +17,7 @@ def identify(
     ],
     output: Output,
     model: Annotated[
-        str, typer.Option(help="Kind of model: nonlinear-mode, linear, force-surface or exciter.")
+        str, typer.Option(help="Kind of model: nonlinear-mode, linear, force-surface, exciter or pnlss.")
     ] = "nonlinear-mode",
     modes: Annotated[Path | None, typer.Option(help="Linear model whose mode shapes the nonlinear mode uses.")] = None,
     estimator: Annotated[str, typer.Option(help="Of a linear model's responses: instrument, H1 or H2.")] = "instrument",
@@ -35,14 +36,52 @@ def identify(
     stinger_stiffness: Annotated[
         float | None, typer.Option(metavar="N_PER_M", help="Of the exciter's stinger (E A / l), if known.")
     ] = None,
+    states: Annotated[
+        int | None, typer.Option("--states", help="Of a PNLSS model: two per mode of vibration.", show_default="2")
+    ] = None,
+    degrees: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Degrees of a PNLSS model's monomials.", show_default="2,3")
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Sample rate of a PNLSS model; about 25 per period of the highest frequency."),
+    ] = None,
+    input_: Annotated[
+        str | None, typer.Option("--input", help="Of a PNLSS model: force or voltage.", show_default="force")
+    ] = None,
+    outputs: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Output channels of a PNLSS model; all motions if left out.")
+    ] = None,
+    no_output_polynomials: Annotated[
+        bool,
+        typer.Option("--no-output-polynomials", help="A PNLSS model whose outputs are linear in states and input."),
+    ] = False,
+    saturating: Annotated[
+        int | None, typer.Option(metavar="K", help="Saturating features (tanh) of a PNLSS model.")
+    ] = None,
+    iterations: Annotated[int | None, typer.Option(help="Most iterations of a PNLSS model's fit.")] = None,
+    validation: Annotated[
+        list[Path] | None,
+        typer.Option(help="Recording by which a PNLSS model's iterate is chosen; may be repeated."),
+    ] = None,
+    hold_out: Annotated[
+        int | None,
+        typer.Option("--hold-out", help="Realisations of each level that do this instead.", show_default="1"),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the PNLSS model in OUTPUT, from the same files.")
+    ] = False,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Turn recordings into a model."""
+    from rig.console import FitLines
     from rig.models.files import save
     from rig.models.identify import Request, identify_model
+    from rig.models.pnlss import IdentifiedPnlss
+    from rig.models.pnlss_request import PnlssOptions
 
-    keep_existing(files, output, overwrite)
+    keep_existing([*files, *(validation or ())], output, overwrite or resume)
     request = Request(
         kind=model,
         modes=modes,
@@ -52,9 +91,30 @@ def identify(
         resistance_ohm=resistance,
         amplifier_gain=amplifier_gain,
         stinger_stiffness_n_m=stinger_stiffness,
+        pnlss=PnlssOptions(
+            states=states,
+            degrees=degrees,
+            rate_hz=rate,
+            input=input_,
+            outputs=outputs,
+            output_polynomials=False if no_output_polynomials else None,
+            saturating=saturating,
+            iterations=iterations,
+            validation=tuple(validation or ()),
+            hold_out=hold_out,
+            resume=output if resume else None,
+        ),
     )
-    save(identify_model(files, request), output)
+    lines = FitLines()
+    try:
+        found = identify_model(files, request, progress=lines)
+    finally:
+        lines.close()
+    save(found, output)
     show_file(output, json)
+    if isinstance(found, IdentifiedPnlss) and found.fit is not None and found.fit.interrupted:
+        print(f"rig: interrupted; the best so far is in {output}, and --resume goes on", file=sys.stderr)
+        raise typer.Exit(1)
 
 
 def predict(

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
+    from identification import FitProgress
     from rig.campaigns.plan import Column
     from rig.tick.tick import Tick
 
-__all__ = ["RunProgress", "number", "print_json", "print_table"]
+__all__ = ["FitLines", "RunProgress", "number", "print_json", "print_table"]
 
 LOCK_WORDS = ("searching", "acquiring", "locked", "lost")
 
@@ -103,3 +104,39 @@ class RunProgress:
         self.close()
         with contextlib.suppress(OSError):
             print(line, file=sys.stderr, flush=True)
+
+
+class FitLines:
+    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration."""
+
+    _EVERY = 10
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._best = (float("inf"), 0)
+
+    def __call__(self, at: "FitProgress") -> None:
+        """Say where the fit is, and which iteration is the best so far."""
+        judged = at.training_error if at.validation_error != at.validation_error else at.validation_error
+        self._best = min(self._best, (judged, at.iteration))
+        line = (
+            f"iteration {at.iteration:>3}/{at.iterations}  training {_percent(at.training_error)}  "
+            f"validation {_percent(at.validation_error)}  best at {self._best[1]}  {at.seconds:.1f} s"
+        )
+        with contextlib.suppress(OSError):
+            if self._terminal:
+                sys.stderr.write(f"\r\x1b[2K{line}")
+                sys.stderr.flush()
+            elif at.iteration % self._EVERY == 0:
+                print(line, file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Clear the status line."""
+        if self._terminal:
+            with contextlib.suppress(OSError):
+                sys.stderr.write("\r\x1b[2K")
+                sys.stderr.flush()
+
+
+def _percent(error: float) -> str:
+    return "unbounded" if error == float("inf") else f"{number(error, '.4g', 100.0)} %"

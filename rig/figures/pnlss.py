@@ -1,6 +1,6 @@
 """Figure of a nonlinear state-space model: spectra of outputs and errors, course of the fit, errors and range by experiment."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -21,7 +21,7 @@ _FLOOR = 1e-6  # of the largest amplitude: what lies below is not shown
 
 def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
     """Spectra on the left, one panel an output; on the right the fit's history, and the range that each run uses."""
-    left, right = page.subfigures(1, 2, width_ratios=(1.5, 1.0))
+    left, right = cast(Any, page.subfigures(1, 2, width_ratios=(1.5, 1.0)))
     _spectra(left, found.spectra)
     history, runs = right.subplots(2, 1)
     _history(history, found.fit)

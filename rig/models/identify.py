@@ -9,6 +9,7 @@ from identification import (
     Backbone,
     ContinuousBackbone,
     Exciter,
+    FitProgress,
     FrequencyResponse,
     FrequencyResponseMatrix,
     IdentificationError,
@@ -39,6 +40,7 @@ from rig.measurements import (
 from rig.models.files import KINDS, load, load_as
 from rig.models.force_surface import MeasuredSurface
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
+from rig.models.identify_pnlss import identified_pnlss
 from rig.models.identify_request import Request
 from rig.models.linear_modes import LINEAR_MODES
 from rig.models.points_left_out import points_left_out
@@ -48,8 +50,10 @@ from rig.recording.reader import Recording
 __all__ = ["Request", "identify_model", "modes_in"]
 
 
-def identify_model(paths: Sequence[Path], request: Request) -> Any:
-    """The model in recordings or imported measurements.
+def identify_model(
+    paths: Sequence[Path], request: Request, *, progress: Callable[[FitProgress], None] | None = None
+) -> Any:
+    """The model in recordings or imported measurements; ``progress`` is called after every iteration of a PNLSS model's fit.
 
     Raises `RecordingError` for files that hold something else, `identification.IdentificationError` where the data does not
     allow it.
@@ -57,6 +61,8 @@ def identify_model(paths: Sequence[Path], request: Request) -> Any:
     for index, path in enumerate(paths):
         if any(path.exists() and other.exists() and path.samefile(other) for other in paths[:index]):
             raise ConfigurationError(f"{path}: is given twice; each file once")
+    if request.kind == "pnlss":
+        return identified_pnlss(paths, request.pnlss, progress)
     return _MODELS[request.kind](paths, request)
 
 

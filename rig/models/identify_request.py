@@ -1,12 +1,13 @@
 """What is to be identified, and how; options that mean nothing together are refused."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
+from rig.models.pnlss_request import PnlssOptions
 
 __all__ = ["Request"]
 
@@ -15,6 +16,7 @@ _OPTIONS: dict[str, tuple[str, ...]] = {
     "linear": ("--estimator", "--band", "--count"),
     "force-surface": (),
     "exciter": ("--band", "--resistance", "--amplifier-gain", "--stinger-stiffness"),
+    "pnlss": tuple(PnlssOptions().given()),
 }
 
 
@@ -23,7 +25,7 @@ class Request:
     """What is to be identified, and how."""
 
     kind: str = "nonlinear-mode"
-    """``nonlinear-mode``, ``linear``, ``force-surface`` or ``exciter``."""
+    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter`` or ``pnlss``."""
     modes: Path | None = None
     """Linear model whose mode shapes a nonlinear mode uses."""
     estimator: str = "instrument"
@@ -38,6 +40,8 @@ class Request:
     """Of its stinger, where it is known."""
     count: int | None = None
     """Number of modes of a linear model; found if None."""
+    pnlss: PnlssOptions = field(default_factory=PnlssOptions)
+    """Of a nonlinear state-space model."""
 
     def __post_init__(self) -> None:
         if self.kind not in _OPTIONS:
@@ -62,6 +66,7 @@ class Request:
             "--count": self.count is not None,
             "--estimator": self.estimator != "instrument",
             **{name: value is not None for name, value in numbers.items()},
+            **self.pnlss.given(),
         }
         for name in (name for name, is_given in given.items() if is_given):
             if name not in _OPTIONS[self.kind]:
