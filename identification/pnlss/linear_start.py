@@ -28,6 +28,10 @@ _DEPENDENT = 1e-12
 def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate_hz: float) -> StateSpaceFit:
     """Stable model of so many states: subspace with several numbers of block rows, each fitted, the best of them.
 
+    Weights are relative. The covariance over realisations is that of nonlinear distortion, which outputs have in common: where
+    it says that two outputs always go together, it weights what a linear model of few states cannot follow by its inverse,
+    and resonances of a nonlinear specimen are lost (virtual magnet beam at 2.6 N: misfit 0.94 against 0.08).
+
     An unstable subspace model has its eigenvalues reflected at the unit circle first. Raises `IdentificationError` where the
     lines are too few or too near to each other for so many states, or no candidate comes of it.
     """
@@ -38,7 +42,9 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
     for rows in _block_rows(responses, states, sample_rate_hz):
         try:
             begin = reflected(subspace(responses, states, sample_rate_hz=sample_rate_hz, block_rows=rows))
-            found = fit_state_space(responses, begin, sample_rate_hz=sample_rate_hz, iterations=_FIRST_ITERATIONS)
+            found = fit_state_space(
+                responses, begin, sample_rate_hz=sample_rate_hz, weighting="relative", iterations=_FIRST_ITERATIONS
+            )
         except (IdentificationError, np.linalg.LinAlgError) as error:
             refused = str(error)
             continue
@@ -46,7 +52,7 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
             best = found
     if best is None:
         raise IdentificationError(f"states: {states} cannot be had of these responses ({refused}); ask for fewer")
-    return fit_state_space(responses, best.model, sample_rate_hz=sample_rate_hz)
+    return fit_state_space(responses, best.model, sample_rate_hz=sample_rate_hz, weighting="relative")
 
 
 def _block_rows(responses: FrequencyResponseMatrix, states: int, sample_rate_hz: float) -> list[int]:

@@ -76,6 +76,7 @@ def identify_all(
         states=specimen.states,
         degrees=specimen.degrees,
         saturating=options.saturating,
+        band_hz=specimen.excited_hz,
         seed=options.seed,
         settings=FitSettings(iterations=options.iterations),
     )
@@ -92,7 +93,7 @@ def identify_all(
 
 def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment], **how: Any) -> PnlssFit:
     """One model; a fit that Ctrl-C has cut short is none."""
-    fit = identify_pnlss(training, validation=validation, **how)
+    fit: PnlssFit = identify_pnlss(training, validation=validation, **how)
     if fit.interrupted:
         raise KeyboardInterrupt
     return fit

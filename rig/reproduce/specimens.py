@@ -24,6 +24,8 @@ class Specimen:
     """Degrees of their monomials, in states and outputs."""
     rate_hz: float
     """Sample rate of the models."""
+    excited_hz: tuple[float, float]
+    """Band of the multisines. The force has distortion beyond it, which is no excitation for a linear start."""
     outputs: tuple[str, ...]
     """Motions that the models have as outputs, the drive point first."""
     band_hz: tuple[float, float]
@@ -46,6 +48,7 @@ SPECIMENS = {
         states=2,
         degrees=(2, 3),
         rate_hz=800.0,
+        excited_hz=(15.0, 35.0),
         # The paper has two accelerometers; with the true drive point for one of them an exciter can be coupled.
         outputs=("drive", "acc_magnet"),
         band_hz=(22.0, 27.0),
@@ -59,6 +62,7 @@ SPECIMENS = {
         states=4,
         degrees=(2, 3),
         rate_hz=5000.0,  # the paper has 6400 Hz: the bench records 5000
+        excited_hz=(75.0, 225.0),
         outputs=("drive", "acc_left", "acc_right"),  # the paper has one more
         band_hz=(145.0, 175.0),
         forces_n=(2.0, 5.0, 15.0),
