@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from identification.pnlss.fitting.kernels import System, room, sensitivities
 from identification.pnlss.fitting.records import BOUND, Record, simulated
+from identification.pnlss.fitting.slopes import slopes_of
 
 __all__ = ["SAMPLES", "fitted_initial_state"]
 
@@ -33,14 +34,15 @@ def fitted_initial_state(system: System, record: Record, weights: Float, samples
         with np.errstate(over="ignore", invalid="ignore"):
             return float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2))
 
+    slopes = slopes_of(system)
     x, damping = np.zeros(n), 1e-6
     best = error(x)
     for _ in range(_ITERATIONS):
-        r = room(system, n)
+        r = room(system, slopes, n)
         r.x[:] = x
         r.s[0] = np.eye(n)
-        done = sensitivities(system, u[:first], y[:first], BOUND, weights, 0, False, r, jacobian, rows)
-        done += sensitivities(system, u[first:], y[first:], BOUND, weights, 0, True, r, jacobian, rows)
+        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, False, r, jacobian, rows)
+        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, True, r, jacobian, rows)
         stacked = jacobian[:, :, :n].reshape(-1, n)
         if done < end or not np.all(np.isfinite(stacked)):
             break
