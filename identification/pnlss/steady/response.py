@@ -22,7 +22,7 @@ __all__ = ["PnlssResponse", "pnlss_frequency_response", "pnlss_response", "pnlss
 Float = NDArray[np.float64]
 
 _BAND = (0.85, 1.15)
-_STEP = 0.1
+_STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
