@@ -152,12 +152,12 @@ class Coupled:
         slope[1:, self.row, : coefficients - 1] = np.eye(coefficients - 1)
         return np.zeros((coefficients, self.n_inputs)), slope
 
-    def _factors(self, frequency_hz: float) -> tuple[complex, Complex]:
-        """Force per volt, and complex[H] force per drive output at each harmonic."""
+    def _factors(self, frequency_hz: Float) -> tuple[Complex, Complex]:
+        """complex[k], force per volt, and complex[k, H], force per drive output at each harmonic, at float[k]."""
         h = np.arange(1, self.coefficients // 2 + 1)
-        to_acceleration = (2j * np.pi * frequency_hz * h) ** (2 - self.order)
-        per_motion = self.exciter.force(0.0, 1.0, h * frequency_hz) * to_acceleration
-        return complex(self.exciter.force(1.0, 0.0, frequency_hz)), np.asarray(per_motion)
+        at_hz = frequency_hz[:, None] * h
+        per_motion = self.exciter.force(0.0, 1.0, at_hz) * (2j * np.pi * at_hz) ** (2 - self.order)
+        return self.exciter.force(1.0, 0.0, frequency_hz), np.asarray(per_motion)
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
         """``F_h = g V delta_h1 + r_h Y_h`` for each harmonic, then what is held, and the phase's reference."""
@@ -166,22 +166,17 @@ class Coupled:
         by_frequency, by_level = np.zeros(self.size), np.zeros(self.size)
         residual = np.empty(self.size)
 
-        def made(at_hz: float) -> tuple[Float, Float, Float]:
-            per_volt, per_motion = self._factors(at_hz)
-            volt, motion = complex_product(np.array(per_volt)), complex_product(per_motion)
-            force = np.einsum("hij,hj->hi", motion, outputs[1:, self.output].reshape(-1, 2)).ravel()
-            force[:2] += volt @ own[count:]
-            return force, volt, motion
-
-        force, volt, motion = made(frequency_hz)
-        residual[:count] = (own[:count] - force) / self.amplitude
-        by_own[:count, :count] = np.eye(count) / self.amplitude
-        by_own[:2, count:] = -volt / self.amplitude
-        for h in range(count // 2):
-            by_outputs[2 * h : 2 * h + 2, 2 * h + 1 : 2 * h + 3, self.output] = -motion[h] / self.amplitude
         nudge = _NUDGE * frequency_hz
-        change = made(frequency_hz + nudge)[0] - made(frequency_hz - nudge)[0]
-        by_frequency[:count] = -change / (2.0 * nudge * self.amplitude)
+        per_volt, per_motion = self._factors(frequency_hz + nudge * np.array([0.0, 1.0, -1.0]))
+        volt, motion = complex_product(per_volt), complex_product(per_motion)
+        force = (motion @ outputs[1:, self.output].reshape(-1, 2, 1)).reshape(3, count)
+        force[:, :2] += volt @ own[count:]
+        residual[:count] = (own[:count] - force[0]) / self.amplitude
+        by_own[:count, :count] = np.eye(count) / self.amplitude
+        by_own[:2, count:] = -volt[0] / self.amplitude
+        for h in range(count // 2):
+            by_outputs[2 * h : 2 * h + 2, 2 * h + 1 : 2 * h + 3, self.output] = -motion[0, h] / self.amplitude
+        by_frequency[:count] = -(force[1] - force[2]) / (2.0 * nudge * self.amplitude)
         if self.held == "voltage":
             residual[count:] = [own[count] / self.amplitude - level, own[count + 1] / self.amplitude]
             by_own[count:, count:] = np.eye(2) / self.amplitude
@@ -196,8 +191,8 @@ class Coupled:
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
         """A force without harmonics, and the voltage that it needs."""
-        per_volt, per_motion = self._factors(frequency_hz)
-        of_force = (1.0 - per_motion[0] * response[self.output]) / per_volt
+        per_volt, per_motion = self._factors(np.array([frequency_hz]))
+        of_force = complex((1.0 - per_motion[0, 0] * response[self.output]) / per_volt[0])
         if self.held == "voltage":
             voltage, force = complex(self.amplitude), self.amplitude / of_force
         else:

@@ -18,7 +18,7 @@ _FIRST_LEVEL = 0.02
 _LEVELS = Steps(first=0.1, largest=0.5)
 _MOST_LEVELS = 300
 _BAND_UNITS = 4.0
-"""Lengths in a band: with the longest step of 0.1 a band takes 40 points, and a resonance in it many more."""
+"""Lengths in a band: with the longest step of 0.05 a band takes 80 points, and a resonance in it many more."""
 
 
 class Followed(NamedTuple):

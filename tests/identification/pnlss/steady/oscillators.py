@@ -124,7 +124,7 @@ def phases(state: SteadyStates, point: int, count: int, rate_hz: float = RATE_HZ
 
 
 def settled(model: PnlssModel, state: SteadyStates, periods: int, start: Float | None = None) -> tuple[Complex, Float]:
-    """Outputs' harmonics in the last period of a long simulation under the inputs of a steady state, and what remains to settle.
+    """Outputs' harmonics in the last period of a long simulation under a state's inputs, and what remains to settle.
 
     A period must hold a whole number of samples.
     """
