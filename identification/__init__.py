@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from identification.pnlss.fitting.fit import fit_pnlss
     from identification.pnlss.fitting.result import FitHistory, PnlssFit
     from identification.pnlss.fitting.settings import FitProgress, FitSettings
-    from identification.pnlss.identify import identify_pnlss
+    from identification.pnlss.identify import identify_pnlss, linear_pnlss
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.simulation import Simulation
     from identification.pnlss.steady.response import (
@@ -160,6 +160,7 @@ __all__ = [
     "identify_exciter",
     "identify_pnlss",
     "linear_modes",
+    "linear_pnlss",
     "mac",
     "mac_matrix",
     "map_backbone",
@@ -269,6 +270,7 @@ _MODULE_OF = {
     "identify_exciter": "prediction.exciter_fit",
     "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
+    "linear_pnlss": "pnlss.identify",
     "mac": "nonlinear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",

@@ -14,6 +14,7 @@ from identification.errors import IdentificationError
 from identification.linear.state_space_fit import spectral_radius
 from identification.linear.subspace import StateSpace
 from identification.pnlss.best_linear import best_linear_responses
+from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment, same_channels
 from identification.pnlss.features import Features
 from identification.pnlss.fitting.fit import fit_pnlss
@@ -21,6 +22,7 @@ from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.linear_start import linear_start, with_independent_states
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.saturating_starts import STARTS, best_of_starts, random_start
 
 __all__ = ["identify_pnlss", "linear_pnlss"]
 
@@ -32,10 +34,10 @@ def identify_pnlss(
     experiments: Sequence[Experiment],
     *,
     states: int,
-    degrees: Iterable[int] = (2, 3),
+    degrees: Iterable[int] | None = None,
     output_degrees: Iterable[int] | None = None,
     variables: Variables = "all",
-    saturating: int = 0,
+    saturating: int | tuple[int, int] = 0,
     state_features: Features | None = None,
     output_features: Features | None = None,
     validation: Sequence[Experiment] = (),
@@ -52,16 +54,18 @@ def identify_pnlss(
     experiments
         Training data; what is periodic among it gives the linear start.
     states
-        Number of states: two per mode of vibration.
+        Number of states: two per mode of vibration, and more for what remembers (friction, hysteresis).
     degrees, output_degrees
-        Degrees of the monomials in the state and the output equation; of the outputs as of the states if None, ``()`` for
-        none.
+        Degrees of the monomials in the state and the output equation. None: 2 and 3, but none beside saturating features,
+        with which alone a model stays bounded; in the outputs as in the states. ``()`` for none.
     variables
         What the monomials are made of: ``all`` states and inputs, ``states`` alone, or the numbers of some (states first).
     saturating
-        Number of saturating features beside the monomials of the state equation.
+        Number of saturating features in the state equation, or numbers in the state and the output equation; 10 to 15 do
+        for a hysteresis. With one number the output equation has as many, unless all outputs are displacements or
+        velocities: forces do not act on those at once.
     state_features, output_features
-        Features of one's own, instead of those that the settings above describe.
+        Features of one's own, instead of those that the settings above describe; their coefficients begin at zero.
     validation
         Data that is not trained on and chooses the iterate.
     linear
@@ -70,31 +74,48 @@ def identify_pnlss(
     band_hz
         Band of the best linear approximation; None for all excited lines.
     settings
-        Of the fit over time.
+        Of the fit over time; None for the usual ones.
     seed
-        Of the random directions that saturating features begin with.
+        Of the random directions in which saturating features begin: eight starts, of which the better half goes on after
+        10, 20 and 40 iterations.
     progress
-        Called after every iteration of the fit over time.
+        Called after every iteration of the fit over time; not while starts are compared.
+
+    Returns
+    -------
+    PnlssFit
+        Notes of its model say what the linear start came to, over frequency and over time, and the nonlinear model.
 
     Raises
     ------
     IdentificationError
         Where the experiments cannot be used, or do not support so many states; see `best_linear_responses`, `fit_pnlss`.
     """
+    chosen = FitSettings() if settings is None else settings
     begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
-    chosen = _chosen(variables, states, len(begin.inputs))
-    phi = (
-        Features.monomials(states, len(begin.inputs), degrees, of=chosen) if state_features is None else state_features
+    counts = _saturating(saturating, begin)
+    of = _chosen(variables, states, len(begin.inputs))
+    powers = tuple((() if any(counts) else (2, 3)) if degrees is None else degrees)
+    of_output = powers if output_degrees is None else tuple(output_degrees)
+    given = (state_features, output_features)
+    phi, chi = (
+        Features.monomials(states, len(begin.inputs), which, of=of) if own is None else own
+        for own, which in zip(given, (powers, of_output), strict=True)
     )
-    if output_features is not None:
-        chi = output_features
+    if any(counts):
+        if any(own is not None and count for own, count in zip(given, counts, strict=True)):
+            raise IdentificationError("saturating: beside features of one's own; put saturating ones among those")
+        random = np.random.default_rng(seed)
+        starts = [random_start(begin, experiments, phi, chi, counts, random) for _ in range(STARTS)]
+        start, found = best_of_starts(starts, experiments, validation=validation, settings=chosen)
+        if not found.interrupted:
+            found = fit_pnlss(
+                start, experiments, validation=validation, settings=chosen, progress=progress, resume=found
+            )
     else:
-        chi = Features.monomials(
-            states, len(begin.inputs), degrees if output_degrees is None else output_degrees, of=chosen
-        )
-    start = begin.with_features(phi, chi)
-    found = fit_pnlss(start, experiments, validation=validation, settings=settings or FitSettings(), progress=progress)
-    return found
+        start = begin.with_features(phi, chi)
+        found = fit_pnlss(start, experiments, validation=validation, settings=chosen, progress=progress)
+    return _with_scores(found, begin, experiments)
 
 
 def linear_pnlss(
@@ -116,8 +137,8 @@ def linear_pnlss(
     found = linear_start(responses, states, sample_rate_hz=first.sample_rate_hz)
     low, high = responses.frequency_hz[[0, -1]]
     note = (
-        f"linear start: {responses.frequency_hz.size} lines in {low:g} to {high:g} Hz fitted to {100 * found.error.max():.2g} % "
-        f"with {found.weighting} weights"
+        f"linear start: misfit {100 * found.error.max():.2g} % of the responses at {responses.frequency_hz.size} lines in "
+        f"{low:g} to {high:g} Hz, {found.weighting} weights"
     )
     model = PnlssModel.linear(
         found.model,
@@ -151,6 +172,29 @@ def _given(linear: StateSpace | PnlssModel, first: Experiment, states: int) -> P
         specimen=first.specimen,
         notes=linear.notes if isinstance(linear, PnlssModel) else (),
     )
+
+
+def _saturating(saturating: int | tuple[int, int], model: PnlssModel) -> tuple[int, int]:
+    """Numbers in the state and in the output equation."""
+    if isinstance(saturating, tuple):
+        counts = saturating
+    else:
+        at_once = any(c.role not in ("drive", "response") or c.motion == "acceleration" for c in model.outputs)
+        counts = (saturating, saturating if at_once else 0)
+    if min(counts) < 0:
+        raise IdentificationError(f"saturating: is {saturating}, allowed is 0 and above")
+    return counts
+
+
+def _with_scores(found: PnlssFit, begin: PnlssModel, experiments: Sequence[Experiment]) -> PnlssFit:
+    """The fit with notes on its errors and with its linear start."""
+    error = float(np.max(pnlss_errors(begin, experiments).overall))
+    note = f"linear model: error {100 * error:.2g} % over time, in the worst training experiment"
+    score = f"nonlinear model: training error {100 * found.training_error:.2g} %"
+    if not np.isnan(found.validation_error):
+        score += f", validation error {100 * found.validation_error:.2g} %"
+    score += f", iteration {found.chosen} of {found.history.iterations} ({found.stopped})"
+    return replace(found, model=replace(found.model, notes=(*found.model.notes, note, score)), linear=begin)
 
 
 def _chosen(variables: Variables, states: int, inputs: int) -> list[int]:

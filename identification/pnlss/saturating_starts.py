@@ -1,0 +1,86 @@
+"""Where models with saturating features begin, whose weights no linear model tells: random directions, several tries.
+
+The fit is not convex in the weights. Starts end some dB apart from each other, one in ten far off, and which those are shows
+early: so several begin, and every few iterations the better half of them goes on (successive halving: Jamieson and Talwalkar,
+AISTATS 2016).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.features import Features
+from identification.pnlss.fitting.fit import fit_pnlss
+from identification.pnlss.fitting.result import PnlssFit
+from identification.pnlss.fitting.settings import FitSettings
+from identification.pnlss.model import PnlssModel
+
+__all__ = ["best_of_starts", "random_start"]
+
+Float = NDArray[np.float64]
+
+STARTS = 8
+_ROUNDS = (10, 20, 40)
+"""Iterations after which the better half of the starts goes on, counted from the beginning."""
+_COEFFICIENT = 0.03
+"""Of what is fed back, relative to the RMS of the state or output: near the linear model, but weights count from the first."""
+
+
+def random_start(
+    linear: PnlssModel,
+    experiments: Sequence[Experiment],
+    phi: Features,
+    chi: Features,
+    counts: tuple[int, int],
+    random: np.random.Generator,
+) -> PnlssModel:
+    """The linear model with the monomials of ``phi`` and ``chi`` and so many saturating features in each equation.
+
+    Weights and biases are normal, of deviation one for variables of RMS one. Coefficients of monomials are zero.
+    """
+    states = np.hstack([linear.simulate(e.inputs).states[:, e.counted_from :] for e in experiments])
+    inputs, outputs = (np.hstack([getattr(e, name) for e in experiments]) for name in ("inputs", "counted_outputs"))
+    size_x, size_u, size_y = (np.sqrt(np.mean(values**2, axis=1)) for values in (states, inputs, outputs))
+    size = np.concatenate([size_x, size_u, [1.0]])
+    weights = [random.normal(size=(count, size.size)) / size for count in counts]
+    start = linear.with_features(replace(phi, weights=weights[0]), replace(chi, weights=weights[1]))
+    e, f = np.array(start.e), np.array(start.f)
+    e[:, phi.count :] = _COEFFICIENT * size_x[:, None] * random.normal(size=(len(e), counts[0]))
+    f[:, chi.count :] = _COEFFICIENT * size_y[:, None] * random.normal(size=(len(f), counts[1]))
+    return replace(start, e=e, f=f)
+
+
+def best_of_starts(
+    starts: Sequence[PnlssModel],
+    experiments: Sequence[Experiment],
+    *,
+    validation: Sequence[Experiment],
+    settings: FitSettings,
+) -> tuple[PnlssModel, PnlssFit]:
+    """The start that is left when the worse half has been dropped several times, and its fit so far.
+
+    An interrupt ends it with the best so far.
+    """
+    fits: list[tuple[PnlssModel, PnlssFit | None]] = [(start, None) for start in starts]
+    best: tuple[PnlssModel, PnlssFit] | None = None
+    for iterations in _ROUNDS:
+        limits = replace(settings, iterations=min(settings.iterations, iterations), patience=0)
+        done: list[tuple[PnlssModel, PnlssFit]] = []
+        for start, so_far in fits:
+            found = fit_pnlss(start, experiments, validation=validation, settings=limits, resume=so_far)
+            done.append((start, found))
+            if found.interrupted:
+                rest = [(other, fit) for other, fit in fits[len(done) :] if fit is not None]
+                start, best_fit = min([*done, *rest], key=_error)
+                return start, replace(best_fit, interrupted=True, stopped=found.stopped)
+        done.sort(key=_error)
+        best, fits = done[0], [*done[: max(len(done) // 2, 1)]]
+    assert best is not None
+    return best
+
+
+def _error(found: tuple[PnlssModel, PnlssFit]) -> float:
+    return found[1].training_error if np.isnan(found[1].validation_error) else found[1].validation_error

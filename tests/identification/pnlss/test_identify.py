@@ -1,0 +1,147 @@
+"""From experiments to a model in one call, against systems that are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import (
+    Features,
+    FitSettings,
+    IdentificationError,
+    PnlssModel,
+    best_linear_responses,
+    identify_pnlss,
+    linear_pnlss,
+    pnlss_errors,
+)
+from identification.linear.state_space_fit import spectral_radius
+from identification.pnlss.linear_start import linear_start, reflected
+from tests.identification.pnlss.multisines import RATE_HZ, channels, linear_model, measured, multisine, oscillator
+
+
+def hardening(outputs: int = 1) -> PnlssModel:
+    """The oscillator with quadratic and cubic terms, which change its response by a third at an input of RMS one."""
+    linear = linear_model(oscillator(outputs=outputs))
+    model = linear.with_features(Features.monomials(2, 1, (2, 3), of=(0, 1)), Features.monomials(2, 1, (2,), of=(0,)))
+    e, f = np.array(model.e), np.array(model.f)
+    e[1, 0], e[1, 3], e[0, 3], f[0, 0] = 0.01, 0.01, -0.003, 0.02
+    return replace(model, e=e, f=f)
+
+
+def test_a_known_nonlinear_system_is_found_down_to_the_noise_in_one_call() -> None:
+    exact = hardening(outputs=2)
+    noise = 1e-3
+    training = [measured(exact, multisine(seed), noise=noise, seed=seed) for seed in range(2)]
+    found = identify_pnlss(training, states=2, validation=[measured(exact, multisine(8), noise=noise, seed=8)])
+    test = measured(exact, multisine(9))
+    linear, nonlinear = (pnlss_errors(m, [test]).overall[0] for m in (found.linear, found.model))
+    assert linear > 0.1
+    # 84 parameters of 4096 values: what noise leaves is a seventh of it.
+    assert nonlinear < 0.5 * noise
+    assert 0.7 * noise < found.training_error < 1.3 * noise
+    assert any("linear model: error" in note for note in found.model.notes)
+
+
+def test_saturating_features_find_a_saturating_system() -> None:
+    linear = linear_model(oscillator())
+    weights = np.array([[0.6, 0.2, 0.0, 0.3]])
+    exact = replace(linear.with_features(Features.saturating(weights)), e=np.array([[-0.1], [-0.05]]))
+    training = [measured(exact, multisine(seed)) for seed in range(2)]
+    found = identify_pnlss(training, states=2, saturating=(3, 0), settings=FitSettings(iterations=40))
+    test = pnlss_errors(found.model, [measured(exact, multisine(9))])
+    assert pnlss_errors(found.linear, [measured(exact, multisine(9))]).overall[0] > 0.03
+    assert test.overall[0] < 1e-3
+    assert found.model.state_features.weights.shape == (3, 4)
+    assert found.model.output_features.count == 0
+
+
+def test_two_states_in_a_narrow_band_are_found() -> None:
+    """A mode at 25 Hz, shaken from 15 to 35 Hz at 800 Hz: all lines lie within nine degrees of the circle."""
+    exact = linear_model(oscillator(frequency_hz=25.0, damping=0.005))
+    band = (15.0, 35.0)
+    experiments = [
+        measured(exact, multisine(seed, band_hz=band, samples=8192), noise=1e-3, seed=seed, settling=2)
+        for seed in range(2)
+    ]
+    found = linear_pnlss(experiments, states=2)
+    values, expected = np.linalg.eigvals(found.a), np.linalg.eigvals(exact.a)
+    assert np.max(np.abs(np.sort_complex(values) - np.sort_complex(expected))) < 2e-5
+    states = found.simulate(experiments[0].inputs).states[:, 8192:]
+    np.testing.assert_allclose(states @ states.T / 8192, np.eye(2), atol=0.2)
+
+
+def test_of_too_many_states_for_a_band_it_says_how_many_it_tells() -> None:
+    exact = linear_model(oscillator(frequency_hz=25.0))
+    experiments = [measured(exact, multisine(0, band_hz=(24.0, 26.0)))]
+    with pytest.raises(
+        IdentificationError, match=r"states: is 12, but 3 lines in 24\.2188 to 25\.7812 Hz at 800 Hz.*ask for fewer"
+    ):
+        identify_pnlss(experiments, states=12)
+
+
+def test_an_unstable_start_is_reflected_and_fitted() -> None:
+    stable = oscillator()
+    outside = stable._replace(a=stable.a * 1.05 / spectral_radius(stable.a))
+    inside = reflected(outside)
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(inside.a)),
+        np.sort_complex(1.0 / np.conj(np.linalg.eigvals(outside.a))),
+    )
+    assert reflected(stable) is stable
+    responses = best_linear_responses([measured(linear_model(stable), multisine(0), noise=0.15)])
+    assert spectral_radius(linear_start(responses, 8, sample_rate_hz=RATE_HZ).model.a) < 1.0
+
+
+def test_without_periodic_experiments_a_linear_model_has_to_be_given() -> None:
+    exact = hardening()
+    record = measured(exact, multisine(0))
+    segment = replace(record, period_samples=0, counted_from=1000)
+    with pytest.raises(IdentificationError, match="or give a linear model to begin from"):
+        identify_pnlss([segment], states=2)
+    found = identify_pnlss([segment], states=2, linear=oscillator())
+    assert found.training_error < 1e-3
+    np.testing.assert_array_equal(found.linear.a, oscillator().a)
+    assert identify_pnlss([segment], states=2, linear=linear_model(oscillator())).training_error < 1e-3
+
+
+def test_features_are_those_that_were_asked_for() -> None:
+    experiments, once = [measured(hardening(), multisine(0))], FitSettings(iterations=1)
+
+    def features(**asked: object) -> tuple[int, int, int, int]:
+        model = identify_pnlss(experiments, states=2, settings=once, **asked).model  # type: ignore[arg-type]
+        parts = (model.state_features, model.output_features)
+        return (*(len(p.exponents) for p in parts), *(len(p.weights) for p in parts))
+
+    assert features() == (16, 16, 0, 0)
+    assert features(degrees=(3,), output_degrees=()) == (10, 0, 0, 0)
+    assert features(variables="states") == (7, 7, 0, 0)
+    assert features(variables=(0,), output_degrees=(2,)) == (2, 1, 0, 0)
+    assert features(saturating=4) == (0, 0, 4, 4)  # the output is an acceleration
+    assert features(saturating=(4, 1), degrees=(2,), output_degrees=()) == (6, 0, 4, 1)
+    own = Features.monomials(2, 1, (5,), of=(1,))
+    assert features(state_features=own, output_features=Features.none(2, 1)) == (1, 0, 0, 0)
+
+
+def test_outputs_that_forces_do_not_act_on_at_once_have_no_saturating_features() -> None:
+    exact = hardening()
+    record = measured(exact, multisine(0))
+    moved = replace(record, output_channels=tuple(replace(c, unit="m") for c in channels(1, 1)[1]))
+    model = identify_pnlss([moved], states=2, saturating=3, settings=FitSettings(iterations=1)).model
+    assert (len(model.state_features.weights), len(model.output_features.weights)) == (3, 0)
+
+
+def test_what_cannot_be_is_named() -> None:
+    experiments = [measured(hardening(), multisine(0))]
+    with pytest.raises(IdentificationError, match="states: is 0, needs at least 1"):
+        identify_pnlss(experiments, states=0)
+    with pytest.raises(IdentificationError, match="variables: is 'inputs', allowed are all, states"):
+        identify_pnlss(experiments, states=2, variables="inputs")  # type: ignore[arg-type]
+    with pytest.raises(IdentificationError, match="saturating: is -1, allowed is 0 and above"):
+        identify_pnlss(experiments, states=2, saturating=-1)
+    with pytest.raises(IdentificationError, match="saturating: beside features of one's own"):
+        identify_pnlss(experiments, states=2, saturating=3, state_features=Features.none(2, 1))
+    with pytest.raises(IdentificationError, match=r"linear: a has shape \(2, 2\), needs \(4, 4\)"):
+        identify_pnlss(experiments, states=4, linear=oscillator())
+    with pytest.raises(IdentificationError, match="linear: has an eigenvalue of magnitude 2"):
+        identify_pnlss(experiments, states=2, linear=oscillator()._replace(a=2.0 * np.eye(2)))
