@@ -118,24 +118,36 @@ def identify(
 
 
 def predict(
-    model: Annotated[Path, typer.Argument(help="Nonlinear mode or force surface.")],
+    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model or force surface.")],
     output: Output,
     frequency_response: Annotated[
         list[float] | None,
         typer.Option(metavar="FORCE_N", help="Predict the frequency response at this constant force; may be repeated."),
     ] = None,
     force: Annotated[
-        str, typer.Option(help="What is constant: fundamental (peak), rms, or pure-sine.")
-    ] = "fundamental",
+        str | None,
+        typer.Option(
+            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; pure-sine of a PNLSS model "
+            "that is driven by a force, without an exciter."
+        ),
+    ] = None,
     sweep: Annotated[
         list[Path] | None, typer.Option(help="Predict the sweeps of this recording; may be repeated.")
+    ] = None,
+    multisine: Annotated[
+        list[Path] | None,
+        typer.Option(help="Simulate the realisations of this recording with a PNLSS model; may be repeated."),
     ] = None,
     planned_sweep: Annotated[
         list[str] | None,
         typer.Option(metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."),
     ] = None,
     exciter: Annotated[
-        Path | None, typer.Option(help="Exciter model: sweeps are predicted from the voltage, not from the force.")
+        Path | None,
+        typer.Option(
+            help="Exciter model: sweeps are predicted from the voltage, not from the force; "
+            "a PNLSS model's frequency responses with the harmonics of its force."
+        ),
     ] = None,
     zero_crossings: Annotated[
         str | None,
@@ -167,12 +179,13 @@ def predict(
     from rig.models.files import save
     from rig.models.predict import PredictionRequest, predict_vibrations
 
-    given = [path for path in (model, exciter, modes, *(sweep or ()), *(reference or ())) if path is not None]
-    keep_existing(given, output, overwrite)
+    given = (model, exciter, modes, *(sweep or ()), *(multisine or ()), *(reference or ()))
+    keep_existing([path for path in given if path is not None], output, overwrite)
     request = PredictionRequest(
         forces_n=tuple(frequency_response or ()),
         held=force,
         sweeps=tuple(sweep or ()),
+        multisines=tuple(multisine or ()),
         planned=tuple(planned_sweep or ()),
         exciter=exciter,
         zero_crossings=zero_crossings,

@@ -119,7 +119,7 @@ class Features:
         for row, powers in zip(factors, self.exponents, strict=True):
             used = np.repeat(np.arange(self.variables), powers)
             row[: used.size] = used
-        return Table(factors, np.array(self.limits), np.array(self.weights))
+        return Table(factors, np.array(self.limits), np.array(self.weights), np.tanh(self.weights[:, -1]))
 
     def names(self, states: int) -> tuple[str, ...]:
         """One per feature: ``x1^2 x2``, ``u1 x1``, ``tanh 1``."""

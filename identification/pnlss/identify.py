@@ -5,7 +5,6 @@ time: the way of Paduart et al., Automatica 46, 2010, and of Scheel et al., Sect
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -77,8 +76,8 @@ def identify_pnlss(
     settings
         Of the fit over time; None for the usual ones.
     seed
-        Of the random directions in which saturating features begin: several starts, of which the best after twenty
-        iterations is gone on with.
+        Of the random directions in which saturating features begin: eight starts, of which the better half goes on after
+        10, 20 and 40 iterations.
     progress
         Called after every iteration of the fit over time; not while starts are compared.
 

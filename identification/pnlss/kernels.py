@@ -10,7 +10,6 @@ __all__ = [
     "Matrices",
     "Table",
     "Workspace",
-    "add_derivatives",
     "feature_derivatives",
     "feature_values",
     "outputs_at",
@@ -30,6 +29,8 @@ class Table(NamedTuple):
     """float[n_variables], magnitude beyond which a variable counts as that much in monomials; inf for none."""
     weights: np.ndarray
     """float[n_saturating, n_variables + 1], ``tanh(w . v + b) - tanh(b)``; b in the last column."""
+    at_rest: np.ndarray
+    """float[n_saturating], ``tanh(b)``."""
 
 
 class Matrices(NamedTuple):
@@ -88,7 +89,7 @@ def feature_values(table: Table, v: np.ndarray, phi: np.ndarray) -> None:
         total = table.weights[i, v.size]
         for j in range(v.size):
             total += table.weights[i, j] * v[j]
-        phi[count + i] = np.tanh(total) - np.tanh(table.weights[i, v.size])
+        phi[count + i] = np.tanh(total) - table.at_rest[i]
 
 
 @kernel
@@ -113,55 +114,13 @@ def feature_derivatives(table: Table, v: np.ndarray, slope: np.ndarray, steep: n
                     product *= min(max(v[k], -table.limits[k]), table.limits[k])
             slope[i, j] += product
     for i in range(table.weights.shape[0]):
-        bias = table.weights[i, v.size]
-        total = bias
+        total = table.weights[i, v.size]
         for j in range(v.size):
             total += table.weights[i, j] * v[j]
         steep[i, 0] = 1.0 - np.tanh(total) ** 2
-        steep[i, 1] = 1.0 - np.tanh(bias) ** 2
+        steep[i, 1] = 1.0 - table.at_rest[i] ** 2
         for j in range(v.size):
             slope[count + i, j] = steep[i, 0] * table.weights[i, j]
-
-
-@kernel
-def add_derivatives(
-    table: Table, v: np.ndarray, coefficients: np.ndarray, offset: int, steep: np.ndarray, total: np.ndarray
-) -> None:
-    """Add the derivatives of ``coefficients . phi`` with respect to the first variables to ``total``.
-
-    The coefficients are those from column ``offset`` on of float[n_rows, offset + n_features]; ``total`` is
-    float[n_rows, n_first_variables]. Monomials have few factors, so this is much less than ``coefficients . slope``.
-    ``steep`` as in `feature_derivatives`.
-    """
-    count, degree = table.factors.shape
-    rows, columns = total.shape
-    free = within_limits(table, v)
-    for f in range(count):
-        for position in range(degree):
-            j = table.factors[f, position]
-            if j < 0:
-                break
-            if j >= columns or abs(v[j]) > table.limits[j]:
-                continue
-            product = 1.0
-            for other in range(degree):
-                k = table.factors[f, other]
-                if k < 0:
-                    break
-                if other != position:
-                    product *= v[k] if free else min(max(v[k], -table.limits[k]), table.limits[k])
-            for i in range(rows):
-                total[i, j] += coefficients[i, offset + f] * product
-    for f in range(table.weights.shape[0]):
-        bias = table.weights[f, v.size]
-        argument = bias
-        for j in range(v.size):
-            argument += table.weights[f, j] * v[j]
-        steep[f, 0] = 1.0 - np.tanh(argument) ** 2
-        steep[f, 1] = 1.0 - np.tanh(bias) ** 2
-        for i in range(rows):
-            for j in range(columns):
-                total[i, j] += coefficients[i, offset + count + f] * steep[f, 0] * table.weights[f, j]
 
 
 @kernel

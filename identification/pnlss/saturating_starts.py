@@ -1,7 +1,8 @@
 """Where models with saturating features begin, whose weights no linear model tells: random directions, several tries.
 
-The fit is not convex in the weights. Of four starts, most end within 2 dB of each other and one in ten far off; which ones is
-clear after some twenty iterations, so that a few starts compared there cost less than any careful choice of one.
+The fit is not convex in the weights. Starts end some dB apart from each other, one in ten far off, and which those are shows
+early: so several begin, and every few iterations the better half of them goes on (successive halving: Jamieson and Talwalkar,
+AISTATS 2016).
 """
 
 from collections.abc import Sequence
@@ -21,8 +22,9 @@ __all__ = ["best_of_starts", "random_start"]
 
 Float = NDArray[np.float64]
 
-STARTS = 4
-TRIAL_ITERATIONS = 20
+STARTS = 8
+_ROUNDS = (10, 20, 40)
+"""Iterations after which the better half of the starts goes on, counted from the beginning."""
 _COEFFICIENT = 0.03
 """Of what is fed back, relative to the RMS of the state or output: near the linear model, but weights count from the first."""
 
@@ -58,18 +60,27 @@ def best_of_starts(
     validation: Sequence[Experiment],
     settings: FitSettings,
 ) -> tuple[PnlssModel, PnlssFit]:
-    """The start whose error is smallest after some iterations, and its fit so far."""
-    trial = replace(settings, iterations=min(settings.iterations, TRIAL_ITERATIONS), patience=0)
+    """The start that is left when the worse half has been dropped several times, and its fit so far.
+
+    An interrupt ends it with the best so far.
+    """
+    fits: list[tuple[PnlssModel, PnlssFit | None]] = [(start, None) for start in starts]
     best: tuple[PnlssModel, PnlssFit] | None = None
-    for start in starts:
-        found = fit_pnlss(start, experiments, validation=validation, settings=trial)
-        if best is None or _error(found) < _error(best[1]):
-            best = (start, found)
-        if found.interrupted:
-            return best[0], replace(best[1], interrupted=True, stopped=found.stopped)
+    for iterations in _ROUNDS:
+        limits = replace(settings, iterations=min(settings.iterations, iterations), patience=0)
+        done: list[tuple[PnlssModel, PnlssFit]] = []
+        for start, so_far in fits:
+            found = fit_pnlss(start, experiments, validation=validation, settings=limits, resume=so_far)
+            done.append((start, found))
+            if found.interrupted:
+                rest = [(other, fit) for other, fit in fits[len(done) :] if fit is not None]
+                start, best_fit = min([*done, *rest], key=_error)
+                return start, replace(best_fit, interrupted=True, stopped=found.stopped)
+        done.sort(key=_error)
+        best, fits = done[0], [*done[: max(len(done) // 2, 1)]]
     assert best is not None
     return best
 
 
-def _error(found: PnlssFit) -> float:
-    return found.training_error if np.isnan(found.validation_error) else found.validation_error
+def _error(found: tuple[PnlssModel, PnlssFit]) -> float:
+    return found[1].training_error if np.isnan(found[1].validation_error) else found[1].validation_error

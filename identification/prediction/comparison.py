@@ -51,6 +51,8 @@ class PredictionError:
         """Whether the model was asked about what it was identified with."""
         if np.isnan(self.range_use):
             return "identified range unknown"
+        if self.range_use == np.inf:
+            return "unbounded"
         if self.range_use <= 1.0:
             return "inside the identified range"
         return "extrapolated" if self.range_use <= FLAGGED_BEYOND else "extrapolated far"

@@ -10,6 +10,7 @@ from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.packing import pack_all, unpack_all
 from identification.prediction.comparison import PredictionError
+from identification.prediction.simulated_runs import SimulatedRun
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.prediction.sweep_prediction import SweepPrediction
 from identification.prediction.uncertainty import ResponseBand
@@ -25,7 +26,10 @@ _PARTS: dict[str, type] = {
     "sweeps": SweepPrediction,
     "sweep_references": Transient,
     "sweep_errors": PredictionError,
+    "runs": SimulatedRun,
 }
+_LATER = ("runs",)
+"""What earlier files do not have."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,6 +44,8 @@ class Predictions:
         Their uncertainty where it is known; empty for none at all.
     sweeps, sweep_references, sweep_errors
         Predicted sweeps; for each the recorded one and its errors.
+    runs
+        Recorded experiments that a nonlinear state-space model simulated.
     specimen
         Name of what was tested.
     notes
@@ -58,6 +64,7 @@ class Predictions:
     sweeps: tuple[SweepPrediction, ...] = ()
     sweep_references: tuple[Transient | None, ...] = ()
     sweep_errors: tuple[PredictionError | None, ...] = ()
+    runs: tuple[SimulatedRun, ...] = ()
     specimen: str = ""
     notes: tuple[str, ...] = ()
 
@@ -92,5 +99,6 @@ class Predictions:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Predictions":
         """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
-        parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in _PARTS.items()}
+        present = {name: kind for name, kind in _PARTS.items() if name in attributes or name not in _LATER}
+        parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in present.items()}
         return cls(**parts, specimen=str(attributes.get("specimen", "")), notes=tuple(attributes.get("notes", ())))

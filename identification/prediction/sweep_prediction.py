@@ -20,6 +20,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _ARRAYS = ("time_s", "frequency_hz", "modal_amplitude", "drive_m", "drive_m_s", "drive_m_s2", "force")
+_ATTRIBUTES = ("largest_identified", "window_periods", "origin", "simulated_range_use", "unbounded_at_s")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -45,6 +46,11 @@ class SweepPrediction:
         What was imposed.
     notes
         What a user should know about this prediction, one line each.
+    simulated_range_use
+        Of a nonlinear state-space model, whose modal amplitude is NaN: largest state or input over the largest in its
+        training data; inf for an unbounded run. None for nonlinear modes.
+    unbounded_at_s
+        When the simulated run left all bounds, before which the prediction ends; None if it never did.
     """
 
     time_s: Float
@@ -58,6 +64,8 @@ class SweepPrediction:
     window_periods: int
     origin: str
     notes: tuple[str, ...] = ()
+    simulated_range_use: float | None = None
+    unbounded_at_s: float | None = None
 
     @classmethod
     def of_modal_amplitude(
@@ -101,7 +109,9 @@ class SweepPrediction:
 
     @property
     def range_use(self) -> float:
-        """Largest modal amplitude over the largest identified."""
+        """Largest modal amplitude over the largest identified, or ``simulated_range_use``."""
+        if self.simulated_range_use is not None:
+            return self.simulated_range_use
         return float(np.max(np.abs(self.modal_amplitude))) / self.largest_identified
 
     def peak(self, sweep: Transient | None = None) -> tuple[float, float]:
@@ -120,7 +130,7 @@ class SweepPrediction:
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Arrays by name, and the attributes (ready for JSON) that go with them."""
-        attributes = {name: getattr(self, name) for name in ("largest_identified", "window_periods", "origin")}
+        attributes = {name: getattr(self, name) for name in _ATTRIBUTES}
         return {name: getattr(self, name) for name in _ARRAYS}, {**attributes, "notes": list(self.notes)}
 
     @classmethod
@@ -171,8 +181,14 @@ def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = 
     sweep's peak. Where the force is by zero crossings, frequency and phase jump: there the predicted displacement is taken
     as it is, and the sweep's own frequency at the instant of its peak.
 
-    Raises `IdentificationError` where they have no time in common, or the recording no drive channel.
+    Errors of an unbounded run are NaN. Raises `IdentificationError` where they have no time in common, or the recording no
+    drive channel.
     """
+    if prediction.unbounded_at_s is not None:
+        nothing = float("nan")
+        return PredictionError(
+            name or prediction.origin, nothing, nothing, nothing, prediction.range_use, prediction.notes
+        )
     measured, predicted, _ = as_recorded(prediction, sweep)
     common = (sweep.time_s >= prediction.time_s[0]) & (sweep.time_s <= prediction.time_s[-1])
     if not common.any():

@@ -20,7 +20,7 @@ from rig.experiments.signals import Signals
 from rig.measurements import bench_of_recording, point_rows
 from rig.recording.reader import Recording
 
-__all__ = ["KINDS", "default_rate_hz", "experiments"]
+__all__ = ["KINDS", "default_rate_hz", "experiments", "rows_from_rest"]
 
 SETTLED = ("backbone", "stepped-phase", "stepped-sine", "response-controlled")
 KINDS = ("multisine", "sweep", *SETTLED)
@@ -119,7 +119,7 @@ def _records(
         rows, name = point_rows(recording, point["number"]), _called(recording.path.stem, point)
         if recording.kind == "sweep":
             start_hz = float(recording.configuration["plan"]["start_hz"])
-            lead = _from_rest(recording, point["number"], Fraction(rate_hz / signals.bench.sample_rate_hz))
+            lead = rows_from_rest(recording, point["number"], Fraction(rate_hz / signals.bench.sample_rate_hz))
             rows = np.concatenate([lead, rows])
             yield from sweep_pieces(signals, point, rows, lead.size, start_hz=start_hz, rate_hz=rate_hz, name=name)
         else:
@@ -129,7 +129,7 @@ def _records(
                 yield found
 
 
-def _from_rest(recording: Recording, number: int, ratio: Fraction) -> np.ndarray:
+def rows_from_rest(recording: Recording, number: int, ratio: Fraction) -> np.ndarray:
     """The rows before a point from the last one without an output on: how it was brought to where it begins.
 
     With as many more as it takes for a sample at the new rate to fall on the point's first.

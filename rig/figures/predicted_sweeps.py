@@ -11,6 +11,7 @@ from rig.figures.style import MAIN, REJECTED, SECOND, engineering
 __all__ = ["draw_sweeps"]
 
 _MOST_SWEEPS = 4
+_MOST_SHOWN = 2.0  # times the recording, of what a run reaches that is lost
 
 
 def draw_sweeps(area: Any, predictions: Predictions) -> None:
@@ -42,10 +43,18 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
         axes[1].plot(recorded.frequency_hz, np.abs(recorded.force), color=REJECTED, lw=2.4)
     axes[0].plot(sweep.frequency_hz, scale * amplitude, color=MAIN, lw=1.0, label=_origin(sweep.origin))
     axes[1].plot(sweep.frequency_hz, force, color=MAIN, lw=1.0)
-    limit = scale * top / sweep.range_use
-    axes[0].axhline(limit, color=SECOND, lw=0.7, ls="--", label="identified up to")
+    if np.isfinite(sweep.range_use):
+        limit = scale * top / sweep.range_use
+        axes[0].axhline(limit, color=SECOND, lw=0.7, ls="--", label="identified up to")
+    if sweep.unbounded_at_s is not None:
+        axes[0].axvline(sweep.frequency_hz[-1], color=SECOND, lw=0.7, ls=":", label="unbounded from here on")
+        top = top if recorded is None else min(top, _MOST_SHOWN * float(measured.max()))
+    largest = float(force.max())
+    if recorded is not None:
+        measured_n = float(np.abs(recorded.force).max())
+        largest = max(min(largest, _MOST_SHOWN * measured_n), measured_n)
     axes[0].set_ylim(0.0, 1.08 * scale * top)
-    axes[1].set_ylim(0.0, 1.08 * max(float(force.max()), 0.0 if recorded is None else np.abs(recorded.force).max()))
+    axes[1].set_ylim(0.0, 1.08 * largest)
     axes[0].set(ylabel=f"displacement, {unit}")
     axes[1].set(ylabel="force, N")
     axes[0].set_title(_heading(predictions, index), fontsize=8, loc="left")
@@ -58,6 +67,9 @@ def _origin(origin: str) -> str:
 def _heading(predictions: Predictions, index: int) -> str:
     """Name of the sweep, its error or how much of the identified range it uses."""
     sweep, error = predictions.sweeps[index], predictions.sweep_errors[index]
+    name = sweep.origin.removeprefix("planned ") if error is None else error.name
+    if sweep.unbounded_at_s is not None:
+        return f"{name}: unbounded after {sweep.unbounded_at_s:.2f} s"
     if error is not None:
         return f"{error.name}: peak {100 * error.peak_error:+.2f} %, range use {error.range_use:.2f}"
-    return f"{sweep.origin.removeprefix('planned ')}, range use {sweep.range_use:.2f}"
+    return f"{name}, range use {sweep.range_use:.2f}"

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import Predictions, ResponseBand, SteadyPrediction
+from rig.figures.predicted_runs import draw_runs
 from rig.figures.predicted_sweeps import draw_sweeps
 from rig.figures.style import REJECTED, engineering, title
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_predictions"]
 
 _BEYOND = 1.0
+_WIDTHS = {"steady": 1.2, "sweeps": 1.2, "runs": 0.6}
 _MOST_NAMED = 12
 _NEAR = 1.3
 _MARGIN = 0.15
@@ -22,13 +24,18 @@ _MARGIN = 0.15
 
 def draw_predictions(page: "Figure", predictions: Predictions) -> None:
     """Frequency responses on the left, sweeps on the right, whatever there is."""
-    kinds = [kind for kind in ("steady", "sweeps") if getattr(predictions, kind)]
-    areas = np.atleast_1d(np.asarray(page.subfigures(1, len(kinds)), dtype=object))
+    panels = {"steady": _steady_on, "sweeps": draw_sweeps, "runs": draw_runs}
+    kinds = [kind for kind in panels if getattr(predictions, kind)]
+    areas = np.atleast_1d(
+        np.asarray(page.subfigures(1, len(kinds), width_ratios=[_WIDTHS[kind] for kind in kinds]), dtype=object)
+    )
     for kind, area in zip(kinds, areas, strict=True):
-        _steady_on(area, predictions) if kind == "steady" else draw_sweeps(area, predictions)
-    steady, sweeps = len(predictions.steady), len(predictions.sweeps)
+        panels[kind](area, predictions)
+    steady, sweeps, runs = len(predictions.steady), len(predictions.sweeps), len(predictions.runs)
     counts = [
-        f"{n} {name}{'s' if n > 1 else ''}" for n, name in ((steady, "frequency response"), (sweeps, "sweep")) if n
+        f"{n} {name}{'s' if n > 1 else ''}"
+        for n, name in ((steady, "frequency response"), (sweeps, "sweep"), (runs, "multisine"))
+        if n
     ]
     title(page, f"{predictions.specimen or 'specimen'}: predicted, {', '.join(counts)}")
 

@@ -33,6 +33,8 @@ from rig.models.force_surface import FORCE_SURFACE
 from rig.models.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.identify import modes_in
 from rig.models.nonlinear_mode import NONLINEAR_MODE
+from rig.models.pnlss import PNLSS
+from rig.models.predict_pnlss import pnlss_predictions
 from rig.models.predict_surface import surface_predictions
 from rig.models.predict_sweeps import CROSSINGS, SweepModels, Swept, planned_sweeps, recorded_sweeps
 from rig.recording.arrays import kind_of
@@ -52,10 +54,12 @@ class PredictionRequest:
 
     forces_n: tuple[float, ...] = ()
     """Constant forces of frequency responses."""
-    held: str = "fundamental"
-    """What of the force is constant: ``fundamental``, ``rms`` or ``pure-sine``."""
+    held: str | None = None
+    """What of the force is constant: ``fundamental``, ``rms`` or ``pure-sine``; if not given, the first that the model can."""
     sweeps: tuple[Path, ...] = ()
     """Recordings whose sweeps are predicted."""
+    multisines: tuple[Path, ...] = ()
+    """Recordings whose realisations a PNLSS model simulates."""
     planned: tuple[str, ...] = ()
     """Plans of sweeps that are yet to be made, by name or file."""
     zero_crossings: str | None = None
@@ -72,12 +76,12 @@ class PredictionRequest:
     """Whether to answer beyond twice the largest modal amplitude identified."""
 
     def __post_init__(self) -> None:
-        if not (self.forces_n or self.sweeps or self.planned or self.references):
+        if not (self.forces_n or self.sweeps or self.multisines or self.planned or self.references):
             raise ConfigurationError(
-                "nothing to predict: give --frequency-response, --sweep, --planned-sweep or --reference"
+                "nothing to predict: give --frequency-response, --sweep, --planned-sweep, --multisine or --reference"
             )
         for name, value, allowed in (
-            ("--force", self.held, get_args(HeldForce)),
+            ("--force", self.held, (None, *get_args(HeldForce))),
             ("--over", self.over, (None, *get_args(Over))),
             ("--zero-crossings", self.zero_crossings, (None, *CROSSINGS)),
         ):
@@ -89,16 +93,12 @@ class PredictionRequest:
             )
         if self.zero_crossings is not None and not self.sweeps:
             raise ConfigurationError("--zero-crossings: is for recorded sweeps; add --sweep, or leave it out")
-        if self.exciter is not None and not (self.sweeps or self.planned):
-            raise ConfigurationError(
-                "--exciter: is for sweeps, and none is given; add --sweep or --planned-sweep, or leave it out"
-            )
         if self.exciter is None and self.planned:
             raise ConfigurationError("--planned-sweep: gives a voltage, which needs an exciter; add --exciter")
 
 
 def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
-    """Predictions of a nonlinear mode or a force surface, and their errors where there is something to compare with.
+    """Predictions of a nonlinear mode, PNLSS model or force surface, with errors where there is something to compare with.
 
     Raises `RecordingError` for files that hold something else, `ConfigurationError` for plans that cannot be predicted,
     `identification.IdentificationError` where the model cannot answer, in particular beyond twice the largest amplitude
@@ -107,6 +107,11 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     if kind_of(model) == FORCE_SURFACE.name:
         references = [measured for path in request.references for measured in _stepped_sines(path)]
         return surface_predictions(load_as(FORCE_SURFACE, model), request, references)
+    if kind_of(model) == PNLSS.name:
+        return pnlss_predictions(
+            model, request, [(one, _over(one, request)) for path in request.references for one in _stepped_sines(path)]
+        )
+    _check_mode(request)
     mode = cast(NonlinearMode, load_as(NONLINEAR_MODE, model))
     modes = None if request.modes is None else modes_in(request.modes)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
@@ -129,6 +134,16 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     )
 
 
+def _check_mode(request: PredictionRequest) -> None:
+    """Refuse what is asked of other models than a nonlinear mode."""
+    if request.exciter is not None and not (request.sweeps or request.planned):
+        raise ConfigurationError(
+            "--exciter: is for sweeps, and none is given; add --sweep or --planned-sweep, or leave it out"
+        )
+    if request.multisines:
+        raise ConfigurationError("--multisine: means nothing to a nonlinear mode; a PNLSS model simulates multisines")
+
+
 def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:
     """References of another specimen."""
     others = {item[1].specimen for item in steady if item[1] is not None} - {"", mode.specimen}
@@ -144,13 +159,13 @@ def _alone(mode: NonlinearMode, force_n: float, modes: LinearModes | None, reque
 def _steady(
     mode: NonlinearMode, force_n: float, modes: LinearModes | None, request: PredictionRequest
 ) -> SteadyPrediction:
-    held = cast(HeldForce, request.held)
+    held = cast(HeldForce, request.held or "fundamental")
     return frequency_response(mode, force_n, force=held, modes=modes, allow_extrapolation=request.allow_extrapolation)
 
 
 def _band(mode: NonlinearMode, force_n: float, request: PredictionRequest) -> ResponseBand | None:
     """What the model's standard errors make of a response; None where they are unknown, or a draw leaves the range."""
-    held = cast(HeldForce, request.held)
+    held = cast(HeldForce, request.held or "fundamental")
     try:
         if _steady(mode, force_n, None, request).range_use.max() > FLAGGED_BEYOND:
             return None  # what the extrapolation may be off by is not in the errors
@@ -171,8 +186,12 @@ def _compared(
             recorded_force_response(mode, measured, modes=modes, allow_extrapolation=request.allow_extrapolation),
             None,
         )
-    over = request.over or ("phase" if _turns_back(measured.frequency_hz) else "frequency")
-    return predicted, measured, compare(predicted, measured, over=cast(Over, over)).error, band
+    return predicted, measured, compare(predicted, measured, over=_over(measured, request)).error, band
+
+
+def _over(measured: FrequencyResponse, request: PredictionRequest) -> Over:
+    """What a reference is compared over."""
+    return cast(Over, request.over or ("phase" if _turns_back(measured.frequency_hz) else "frequency"))
 
 
 def _turns_back(frequency_hz: np.ndarray) -> bool:

@@ -64,8 +64,9 @@ def surface_predictions(
 def _check(request: "PredictionRequest") -> None:
     """Refuse what is asked of a nonlinear mode alone."""
     given = {
-        "--force": request.held != "fundamental",
+        "--force": request.held not in (None, "fundamental"),
         "--sweep": bool(request.sweeps),
+        "--multisine": bool(request.multisines),
         "--planned-sweep": bool(request.planned),
         "--exciter": request.exciter is not None,
         "--modes": request.modes is not None,

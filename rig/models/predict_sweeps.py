@@ -25,7 +25,7 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.recording.reader import Recording
 
-__all__ = ["CROSSINGS", "SweepModels", "Swept", "planned_sweeps", "recorded_sweeps"]
+__all__ = ["CROSSINGS", "SweepModels", "Swept", "force_and_drive", "planned_sweeps", "recorded_sweeps"]
 
 CROSSINGS = ("half-periods", "periods")
 """Between which zero crossings a force can be read: all of them, or those in the same direction."""
@@ -85,7 +85,7 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
             name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
             which = models.zero_crossings
             predicted = models.predict(sweep if which is None else _between_crossings(recording, number, which))
-            yield Swept(predicted, _force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), notes)
+            yield Swept(predicted, force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), notes)
 
 
 def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
@@ -127,7 +127,7 @@ def _between_crossings(recording: Recording, number: int, which: str) -> HalfPer
     return zero_crossings(force, sample_rate_hz=bench.sample_rate_hz, whole_periods=which == "periods")
 
 
-def _force_and_drive(sweep: Transient) -> Transient:
+def force_and_drive(sweep: Transient) -> Transient:
     """What a comparison shows of a sweep."""
     rows = [row for row, channel in enumerate(sweep.channels) if channel.role in ("force", "drive")]
     return replace(sweep, channels=tuple(sweep.channels[row] for row in rows), fundamentals=sweep.fundamentals[rows])

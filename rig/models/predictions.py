@@ -41,6 +41,8 @@ def _sweep(sweep: SweepPrediction, recorded: Transient | None, name: str) -> dic
         "peak_frequency_hz": peak_hz,
         "smallest_force_n": float(np.abs(sweep.force).min()),
         "range_use": sweep.range_use,
+        "unbounded": sweep.unbounded_at_s is not None,
+        "unbounded_at_s": sweep.unbounded_at_s,
         "notes": list(sweep.notes),
     }
 
@@ -53,6 +55,7 @@ def _summarise(predictions: Predictions) -> dict[str, Any]:
         "specimen": predictions.specimen,
         "frequency_responses": [_steady(*each) for each in steady],
         "sweeps": [_sweep(*each) for each in zip(predictions.sweeps, predictions.sweep_references, names, strict=True)],
+        "multisines": [run.row() for run in predictions.runs],
         "errors": [error.row() for error in predictions.errors],
         "notes": list(predictions.notes),
     }
@@ -89,11 +92,29 @@ def _say(summary: dict[str, Any]) -> None:
                     number(s["peak_m"], ".5f", 1e3),
                     number(s["peak_frequency_hz"], ".3f"),
                     number(s["smallest_force_n"], ".4f"),
-                    number(s["range_use"], ".2f"),
+                    "unbounded" if s["unbounded"] else number(s["range_use"], ".2f"),
                 )
                 for s in summary["sweeps"]
             ],
         )
+    if summary["multisines"]:
+        print("multisines: relative errors, %")
+        names = list(summary["multisines"][0]["errors"])
+        print_table(
+            ("realisation", "use", *names, "range use"),
+            [
+                (
+                    r["name"],
+                    r["use"],
+                    *("-" if r["unbounded"] else number(r["errors"].get(name), ".3f", 100.0) for name in names),
+                    "unbounded" if r["unbounded"] else number(r["range_use"], ".2f"),
+                )
+                for r in summary["multisines"]
+            ],
+        )
+        lost = sum(r["unbounded"] for r in summary["multisines"])
+        if lost:
+            print(f"{lost} of {len(summary['multisines'])} runs unbounded")
     if summary["errors"]:
         print("errors: predicted over reference, minus one")
         print_table(
@@ -104,7 +125,7 @@ def _say(summary: dict[str, Any]) -> None:
                     number(e["peak_error"], "+.2f", 100.0),
                     number(e["peak_frequency_error"], "+.3f", 100.0),
                     number(e["envelope_error"], ".2f", 100.0),
-                    number(e["range_use"], ".2f"),
+                    "-" if e["verdict"] == "unbounded" else number(e["range_use"], ".2f"),
                     e["verdict"],
                 )
                 for e in summary["errors"]

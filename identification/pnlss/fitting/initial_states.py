@@ -5,13 +5,17 @@ from numpy.typing import NDArray
 
 from identification.pnlss.fitting.kernels import System, room, sensitivities
 from identification.pnlss.fitting.records import BOUND, Record, simulated
+from identification.pnlss.fitting.slopes import slopes_of
 
-__all__ = ["SAMPLES", "fitted_initial_state"]
+__all__ = ["PRIOR", "SAMPLES", "fitted_initial_state"]
 
 Float = NDArray[np.float64]
 
 SAMPLES = 600
 """Samples from which an initial state is estimated: some decay times of lightly damped structures, as they are sampled."""
+PRIOR = 1e-6
+"""Share of the squares of an initial state, in states of unit RMS, beside the squared errors of outputs of unit RMS: nothing,
+unless the outputs do not tell of a state at all."""
 _ITERATIONS = 20
 
 
@@ -31,30 +35,27 @@ def fitted_initial_state(system: System, record: Record, weights: Float, samples
     def error(x: Float) -> float:
         run = simulated(system, u, x)
         with np.errstate(over="ignore", invalid="ignore"):
-            return float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2))
+            return (
+                float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2) + PRIOR * x @ x)
+            )
 
+    slopes = slopes_of(system)
     x, damping = np.zeros(n), 1e-6
     best = error(x)
     for _ in range(_ITERATIONS):
-        r = room(system, n)
+        r = room(system, slopes, n)
         r.x[:] = x
         r.s[0] = np.eye(n)
-        done = sensitivities(system, u[:first], y[:first], BOUND, weights, 0, False, r, jacobian, rows)
-        done += sensitivities(system, u[first:], y[first:], BOUND, weights, 0, True, r, jacobian, rows)
+        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, False, r, jacobian, rows)
+        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, True, r, jacobian, rows)
         stacked = jacobian[:, :, :n].reshape(-1, n)
         if done < end or not np.all(np.isfinite(stacked)):
             break
-        scale = np.linalg.norm(stacked, axis=0)
-        scale[scale == 0.0] = 1.0
-        left, values, right = np.linalg.svd(stacked / scale, full_matrices=False)
-        along = left.T @ rows[:, -outputs:].T.ravel()
+        values, vectors = np.linalg.eigh(stacked.T @ stacked + PRIOR * np.eye(n))
+        along = vectors.T @ (stacked.T @ rows[:, -outputs:].T.ravel() + PRIOR * x)
         before = best
         while damping < 1e6:
-            step = (
-                -(right.T @ (along * values / (values**2 + damping * values[0] ** 2))) / scale
-                if values[0] > 0.0
-                else 0.0 * x
-            )
+            step = -vectors @ (along / (values + damping * values[-1]))
             tried = error(x + step)
             if tried < best:
                 x, best, damping = x + step, tried, damping / 100.0

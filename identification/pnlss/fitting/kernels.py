@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.pnlss.kernels import Table, add_derivatives, feature_values
+from identification.pnlss.kernels import Table, feature_values
 from vibrolock.compiled import kernel
 
-__all__ = ["Room", "System", "combine_rows", "room", "sensitivities"]
+__all__ = ["Room", "Slopes", "System", "combine_rows", "effective_matrices", "room", "sensitivities"]
 
 
 class System(NamedTuple):
@@ -21,6 +21,15 @@ class System(NamedTuple):
     output_table: Table
 
 
+class Slopes(NamedTuple):
+    """Derivatives of the monomials of a system, which are a few monomials themselves."""
+
+    table: Table
+    """Monomials that occur in derivatives, of degree one and above."""
+    coefficients: np.ndarray
+    """float[n_monomials, (n_states + n_outputs) * n_states]: their shares in ``E d phi / d x`` and ``F d chi / d x``."""
+
+
 class Room(NamedTuple):
     """What the recursion carries from sample to sample, and where it works."""
 
@@ -30,15 +39,15 @@ class Room(NamedTuple):
     """float[2, n_states, n_columns], its sensitivities, first of the two between calls."""
     z: np.ndarray
     q: np.ndarray
-    of_state: np.ndarray
-    """float[n_states, n_states], ``A + E d phi / d x``."""
-    of_output: np.ndarray
-    """float[n_outputs, n_states], ``C + F d chi / d x``."""
+    slopes: np.ndarray
+    """float[n_slopes], the monomials in derivatives."""
+    effective: np.ndarray
+    """float[(n_states + n_outputs) * n_states], ``A + E d phi / d x`` above ``C + F d chi / d x``."""
     state_steep: np.ndarray
     output_steep: np.ndarray
 
 
-def room(system: System, columns: int) -> Room:
+def room(system: System, slopes: Slopes, columns: int) -> Room:
     """Room for a recursion with so many columns of sensitivities."""
     n, outputs = system.state.shape[0], system.output.shape[0]
     return Room(
@@ -46,8 +55,8 @@ def room(system: System, columns: int) -> Room:
         np.zeros((2, n, columns)),
         np.zeros(system.state.shape[1]),
         np.zeros(system.output.shape[1]),
-        np.zeros((n, n)),
-        np.zeros((outputs, n)),
+        np.zeros(len(slopes.coefficients)),
+        np.zeros((n + outputs) * n),
         np.zeros((system.state_table.weights.shape[0], 2)),
         np.zeros((system.output_table.weights.shape[0], 2)),
     )
@@ -55,28 +64,66 @@ def room(system: System, columns: int) -> Room:
 
 @kernel
 def combine_rows(factors: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """Write ``factors . rows`` to the first elements of ``out``, two rows at a time along contiguous columns."""
+    """Write ``factors . rows`` to the first elements of ``out``, several rows at a time along contiguous columns."""
     count, width = rows.shape
-    done = 1
-    if count == 1:
+    if count >= 4:
+        f, g, h, q = factors[0], factors[1], factors[2], factors[3]
         for c in range(width):
-            out[c] = factors[0] * rows[0, c]
-    else:
+            out[c] = f * rows[0, c] + g * rows[1, c] + h * rows[2, c] + q * rows[3, c]
+        done = 4
+    elif count >= 2:
+        f, g = factors[0], factors[1]
         for c in range(width):
-            out[c] = factors[0] * rows[0, c] + factors[1] * rows[1, c]
+            out[c] = f * rows[0, c] + g * rows[1, c]
         done = 2
-    while done + 1 < count:
+    else:
+        f = factors[0]
         for c in range(width):
-            out[c] += factors[done] * rows[done, c] + factors[done + 1] * rows[done + 1, c]
-        done += 2
-    if done < count:
+            out[c] = f * rows[0, c]
+        done = 1
+    for j in range(done, count):
+        f = factors[j]
         for c in range(width):
-            out[c] += factors[done] * rows[done, c]
+            out[c] += f * rows[j, c]
+
+
+@kernel
+def effective_matrices(system: System, slopes: Slopes, v: np.ndarray, r: Room) -> None:
+    """Linearise at ``v``, whose features are in ``r.z`` and ``r.q``."""
+    n, outputs = system.state.shape[0], system.output.shape[0]
+    if r.slopes.size:
+        feature_values(slopes.table, v, r.slopes)
+        combine_rows(r.slopes, slopes.coefficients, r.effective)
+    else:
+        for i in range(r.effective.size):
+            r.effective[i] = 0.0
+    for j in range(n):
+        held = abs(v[j]) > slopes.table.limits[j]
+        for i in range(n + outputs):
+            linear = system.state[i, j] if i < n else system.output[i - n, j]
+            r.effective[i * n + j] = linear if held else r.effective[i * n + j] + linear
+    _add_saturating(system.state_table, system.state, n, r.z, r.state_steep, r.effective[: n * n])
+    _add_saturating(system.output_table, system.output, n, r.q, r.output_steep, r.effective[n * n :])
+
+
+@kernel
+def _add_saturating(
+    table: Table, matrix: np.ndarray, n: int, features: np.ndarray, steep: np.ndarray, effective: np.ndarray
+) -> None:
+    first = table.limits.size + table.factors.shape[0]
+    for f in range(table.weights.shape[0]):
+        steep[f, 0] = 1.0 - (features[first + f] + table.at_rest[f]) ** 2
+        steep[f, 1] = 1.0 - table.at_rest[f] ** 2
+        for i in range(matrix.shape[0]):
+            factor = matrix[i, first + f] * steep[f, 0]
+            for j in range(n):
+                effective[i * n + j] += factor * table.weights[f, j]
 
 
 @kernel
 def sensitivities(
     system: System,
+    slopes: Slopes,
     u: np.ndarray,
     y: np.ndarray,
     bound: float,
@@ -112,33 +159,25 @@ def sensitivities(
             r.z[j] = u[k, j - n]
             r.q[j] = u[k, j - n]
         v = r.z[:variables]
+        feature_values(system.state_table, v, r.z[variables:])
+        feature_values(system.output_table, v, r.q[variables:])
+        effective_matrices(system, slopes, v, r)
         if counted:
-            feature_values(system.output_table, v, r.q[variables:])
             for o in range(outputs):
                 total = 0.0
                 for j in range(own):
                     total += system.output[o, j] * r.q[j]
                 rows[k, own + o] = weight[o] * (total - y[k, o])
+                at = (n + o) * n
                 for i in range(n):
-                    r.of_output[o, i] = system.output[o, i]
+                    r.effective[at + i] *= weight[o]
+                combine_rows(r.effective[at : at + n], r.s[here], jacobian[o, k])
+                _output_weights(system, o, v, weight[o], r.output_steep, columns, jacobian[o, k])
             for j in range(own):
                 rows[k, j] = r.q[j]
-            add_derivatives(system.output_table, v, system.output, variables, r.output_steep, r.of_output)
-            for o in range(outputs):
-                for i in range(n):
-                    r.of_output[o, i] *= weight[o]
-            for o in range(outputs):
-                combine_rows(r.of_output[o], r.s[here], jacobian[o, k])
-                _output_weights(system, o, v, weight[o], r.output_steep, columns, jacobian[o, k])
-        feature_values(system.state_table, v, r.z[variables:])
-        for i in range(n):
-            for j in range(n):
-                r.of_state[i, j] = system.state[i, j]
-        add_derivatives(system.state_table, v, system.state, variables, r.state_steep, r.of_state)
         after = r.s[1 - here]
         for i in range(n):
-            combine_rows(r.of_state[i], r.s[here], after[i])
-        for i in range(n):
+            combine_rows(r.effective[i * n : (i + 1) * n], r.s[here], after[i])
             total = 0.0
             for j in range(wide):
                 total += system.state[i, j] * r.z[j]

@@ -16,6 +16,7 @@ from identification.pnlss.fitting.frequency_lines import transformed
 from identification.pnlss.fitting.kernels import System, room, sensitivities
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import BOUND, Record
+from identification.pnlss.fitting.slopes import slopes_of
 
 __all__ = ["NormalEquations", "blocks", "jacobian", "normal_equations"]
 
@@ -44,7 +45,8 @@ def blocks(
     n, outputs = system.state.shape[0], len(weights)
     recursion = parameters.ends[1] + (0 if record.place is None else n)
     inner = parameters.ends[2] - parameters.ends[1]
-    r = room(system, recursion)
+    slopes = slopes_of(system)
+    r = room(system, slopes, recursion)
     r.x[:] = initial_state
     if record.place is not None:
         r.s[0, :, parameters.ends[1] :] = np.eye(n)
@@ -56,7 +58,7 @@ def blocks(
         if end - begin != filled.shape[1] and counted:
             filled, rows = np.zeros((outputs, end - begin, filled.shape[2])), np.zeros((end - begin, rows.shape[1]))
         u, y = record.u[begin:end], record.y[begin:end]
-        done = sensitivities(system, u, y, BOUND, weights, parameters.linear, counted, r, filled, rows)
+        done = sensitivities(system, slopes, u, y, BOUND, weights, parameters.linear, counted, r, filled, rows)
         if done < end - begin:
             filled[:] = np.nan
             yield filled, rows

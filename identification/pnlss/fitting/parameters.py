@@ -108,8 +108,8 @@ class Parameters:
         return System(
             linear.reshape(self.start.states, -1),
             own.reshape(len(self.start.outputs), -1),
-            state._replace(weights=inner_state.reshape(state.weights.shape)),
-            output._replace(weights=inner_output.reshape(output.weights.shape)),
+            _weighted(state, inner_state),
+            _weighted(output, inner_output),
         )
 
     def initial_states(self, vector: Float) -> Float:
@@ -125,6 +125,11 @@ class Parameters:
             state_features=replace(start.state_features, weights=system.state_table.weights),
             output_features=replace(start.output_features, weights=system.output_table.weights),
         )
+
+
+def _weighted(table: Table, weights: Float) -> Table:
+    rows = weights.reshape(table.weights.shape)
+    return table._replace(weights=rows, at_rest=np.tanh(rows[:, -1]))
 
 
 def matrices_of(system: System) -> Matrices:

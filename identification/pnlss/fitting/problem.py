@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.frequency_lines import with_lines
-from identification.pnlss.fitting.initial_states import fitted_initial_state
+from identification.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
 from identification.pnlss.fitting.kernels import System
 from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
@@ -74,6 +74,8 @@ class Problem:
         rms = settings.outputs == "rms"
         self.weights = np.ones_like(scales.outputs) if rms else scales.outputs / np.max(scales.outputs)
         self._total = self._measured(self.training)
+        self._penalty = settings.ridge * parameters.nonlinear
+        self._penalty[parameters.ends[2] : parameters.ends[3]] = PRIOR / self._total
         self._validation_total = self._measured(self.validation)
 
     def _measured(self, records: list[Record]) -> float:
@@ -110,15 +112,13 @@ class Problem:
         return float(np.sqrt(total / self._validation_total))
 
     def cost(self, vector: Float, error: float) -> float:
-        """Squared relative error and ridge."""
+        """Squared relative error, ridge, and what keeps initial states near those that occur."""
         if not np.isfinite(error):
             return float(np.inf)
-        return error**2 + self.settings.ridge * float(self.parameters.nonlinear @ vector**2)
+        return error**2 + float(self._penalty @ vector**2)
 
     def equations(self, vector: Float) -> NormalEquations:
         """Normal equations of half of `cost`."""
         found = normal_equations(self.parameters, vector, self.training, self.weights)
-        ridge = self.settings.ridge * self.parameters.nonlinear
-        return NormalEquations(
-            found.hessian / self._total + np.diag(ridge), found.gradient / self._total + ridge * vector
-        )
+        hessian, gradient = found.hessian / self._total, found.gradient / self._total
+        return NormalEquations(hessian + np.diag(self._penalty), gradient + self._penalty * vector)

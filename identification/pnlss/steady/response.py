@@ -187,17 +187,18 @@ def pnlss_steady_state(
     harmonics: int = 7,
     samples: int | None = None,
     near: SteadyStates | None = None,
+    largest_range_use: float = 3.0,
 ) -> SteadyStates:
     """The periodic vibration at one force and frequency: that which rest leads to as the force rises, or one ``near`` another.
 
-    Parameters are those of `pnlss_response`; of ``near`` the first point is the start of Newton's method. Raises
-    `IdentificationError` if it finds none.
+    Parameters are those of `pnlss_response`; of ``near`` the first point is the start of Newton's method, which may leave the
+    range. Raises `IdentificationError` if it finds none.
     """
     at_hz = positive("frequency_hz", frequency_hz, "Hz")
     held, _ = _fitting(model, harmonics, at_hz)
     balance = _balance(model, force_n, force, exciter, held, samples)
     if near is None:
-        z = from_rest(balance, at_hz)
+        z = from_rest(balance, at_hz, largest_range_use)
     else:
         z = polished(balance, _unknowns(balance, near), at_hz)
     if z is None:

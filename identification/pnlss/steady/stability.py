@@ -2,8 +2,9 @@
 
 A disturbance ``p(theta_k) mu^k`` of a vibration obeys ``mu R p = T^+ f' T p``: its multipliers over one sample are eigenvalues
 of ``R^-1 T^+ f' T``, each of them many times over, turned by whole multiples of ``W T_s``. Those whose eigenvectors lie
-about the static harmonic suffer least from truncation; as many as there are states are kept, those of the lowest centroid
-(Lazarus and Thomas, C. R. Mecanique 338, 2010; Bayer and Leine, Nonlinear Dyn. 111, 2023, on sorting).
+about the static harmonic suffer least from truncation; as many as there are states are kept, those of the lowest centroid,
+no two of them copies (a real negative multiplier over one period has two copies that lie equally low;
+Lazarus and Thomas, C. R. Mecanique 338, 2010; Bayer and Leine, Nonlinear Dyn. 111, 2023, on sorting).
 """
 
 from typing import Literal
@@ -19,15 +20,15 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 Loss = Literal["", "fold", "period doubling", "Neimark-Sacker"]
 
-_AS_LOW = 0.05
-"""Eigenvalues with a centroid this near the highest one kept are copies as good as it."""
+_SAME = 1e-6
+"""Relative difference, over one period, up to which two eigenvalues are copies of one multiplier."""
 _REAL_RAD = 1e-3
 """Angle of a multiplier over one period within which it counts as real."""
 _MARGIN = 1e-9
 
 
-def multipliers(states_by: Float, turn: Float, basis: Basis) -> tuple[Complex, Complex]:
-    """Multipliers over one sample: complex[n_states] of the lowest centroids, and all that lie as low.
+def multipliers(states_by: Float, turn: Float, basis: Basis, angle_rad: float) -> Complex:
+    """complex[n_states]: multipliers over one sample, in the order of their centroids.
 
     Parameters
     ----------
@@ -37,6 +38,8 @@ def multipliers(states_by: Float, turn: Float, basis: Basis) -> tuple[Complex, C
         float[size, size], R.
     basis
         The series.
+    angle_rad
+        Turn of the phase in one sample.
     """
     size, n = states_by.shape[:2]
     matrix = np.tensordot(turn.T, states_by, axes=1).reshape(size * n, size * n)  # R is orthogonal
@@ -49,8 +52,19 @@ def multipliers(states_by: Float, turn: Float, basis: Basis) -> tuple[Complex, C
     h = np.arange(1, basis.harmonics + 1)
     centroid = np.abs(h @ (forward - backward)) / weight
     order = np.argsort(centroid, kind="stable")
-    low = centroid[order] <= centroid[order[n - 1]] + _AS_LOW
-    return np.asarray(values[order[:n]]), np.asarray(values[order[low]])
+    return _distinct(values[order], n, 2.0 * np.pi / angle_rad)
+
+
+def _distinct(values: Complex, count: int, samples: float) -> Complex:
+    """The first ``count`` values of which none is a copy of one before; where there are too few, the first copies too."""
+    with np.errstate(under="ignore"):
+        over_period = values**samples
+    kept: list[int] = []
+    for k, value in enumerate(over_period[: 4 * count]):
+        if len(kept) < count and np.all(np.abs(over_period[kept] - value) > _SAME * np.abs(value)):
+            kept.append(k)
+    kept += [k for k in range(values.size) if k not in kept][: count - len(kept)]
+    return np.asarray(values[kept])
 
 
 def loss_of_stability(values: Complex, angle_rad: float, *, real: bool = True) -> Loss:

@@ -152,11 +152,11 @@ def steady_states(
             series[name][k] = harmonics_of(part)
         for name, limit in ranges.items():
             use[name].append(np.max(np.abs(fine @ parts[name]), axis=0) / limit)
-        found[k], low = multipliers(period.states_by[..., : model.states], basis.turned(angle)[0], basis)
+        found[k] = multipliers(period.states_by[..., : model.states], basis.turned(angle)[0], basis, angle)
         if not balance.drive.size:
-            loss = loss_of_stability(low, angle)
+            loss = loss_of_stability(found[k], angle)
         else:
-            loss = loss_of_stability(low, angle, real=False) if statically_stable[k] else "fold"
+            loss = loss_of_stability(found[k], angle, real=False) if statically_stable[k] else "fold"
         stable[k] = not loss
         losses.append(loss)
     return SteadyStates(

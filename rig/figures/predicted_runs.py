@@ -1,0 +1,35 @@
+"""Figure of simulated multisines: errors of every output over the range that a run uses."""
+
+from typing import Any
+
+import numpy as np
+
+from identification import Predictions
+from rig.figures.style import REJECTED, say_why_empty
+
+__all__ = ["draw_runs"]
+
+
+def draw_runs(area: Any, predictions: Predictions) -> None:
+    """One mark per realisation and output; unbounded runs are counted, for they have no error."""
+    from matplotlib import colormaps
+
+    axis = area.subplots()
+    bounded = [run for run in predictions.runs if run.bounded]
+    lost = len(predictions.runs) - len(bounded)
+    heading = f"{lost} of {len(predictions.runs)} multisines unbounded" if lost else f"{len(bounded)} multisines"
+    axis.set_title(heading, fontsize=8, loc="left")
+    if not bounded:
+        say_why_empty(axis, "no run stayed bounded")
+        return
+    names = bounded[0].outputs
+    use = np.array([run.range_use for run in bounded])
+    known = np.isfinite(use).all()
+    across = use if known else np.arange(1, len(bounded) + 1)
+    for row, name in enumerate(names):
+        colour = colormaps["viridis"](0.85 * row / max(1, len(names) - 1))
+        axis.semilogy(across, [100.0 * run.error[row] for run in bounded], "o", ms=4, color=colour, label=name)
+    if known:
+        axis.axvline(1.0, color=REJECTED, lw=0.8, ls="--")
+    axis.set(xlabel="range use (1: the training data's)" if known else "run", ylabel="relative error, %")
+    axis.legend(fontsize=7)
