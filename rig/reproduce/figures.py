@@ -8,6 +8,7 @@ import numpy as np
 from identification.pnlss.error_table import SAME_LEVEL
 from rig.errors import RecordingError
 from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, title
+from rig.reproduce.steady import Steady
 from rig.reproduce.study import Study
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def _steady(page: "Figure", study: Study) -> None:
     """One panel per force: selected models, the rig at constant fundamental, and its peak under a pure sine."""
     forces = sorted({one.force_n for one in study.steady})
     axes = page.subplots(1, len(forces), squeeze=False)[0]
-    colours = _colours(study)
+    colours, by_force = _colours(study), study.options.input == "force"
     for axis, force_n in zip(axes, forces, strict=True):
         truth = study.truth[force_n]
         axis.plot(
@@ -81,20 +82,23 @@ def _steady(page: "Figure", study: Study) -> None:
             if one.held == "pure-sine":
                 axis.plot(one.truth_hz, 1e3 * one.truth_m, "k+", ms=8)
             if one.prediction is not None:
-                dashed = one.held == "fundamental" and study.options.input == "force"
-                axis.plot(
-                    one.prediction.frequency_hz,
-                    1e3 * one.prediction.amplitude_m(),
-                    "--" if dashed else "-",
-                    color=colours[one.training_set],
-                    lw=1.0,
-                    label=None if dashed else one.training_set,
-                )
+                _curve(axis, one, colours[one.training_set], dashed=one.held == "fundamental" and by_force)
         _around(axis, truth.frequency_hz, 1e3 * truth.amplitude_m)
         axis.set(xlabel="frequency, Hz", title=f"{force_n:g} N")
     axes[0].set_ylabel("displacement of the drive point, mm")
     axes[0].legend(fontsize=7)
     title(page, f"{study.options.specimen.name}: steady responses; dashed: exciter coupled; +: rig, pure sine")
+
+
+def _curve(axis: Any, one: Steady, colour: Any, *, dashed: bool) -> None:
+    """Branch by branch: nothing is known between them."""
+    assert one.prediction is not None
+    amplitude = 1e3 * one.prediction.amplitude_m()
+    for branch in np.unique(one.prediction.branch):
+        on = one.prediction.branch == branch
+        label = None if dashed or branch else one.training_set
+        line = "--" if dashed else "-"
+        axis.plot(one.prediction.frequency_hz[on], amplitude[on], line, color=colour, lw=1.0, label=label)
 
 
 def _sweeps(page: "Figure", study: Study) -> None:

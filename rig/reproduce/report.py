@@ -108,7 +108,7 @@ def _say_steady(study: Study) -> None:
                 number(row["error"], "+.1f", 100.0),
                 number(row.get("frequency_error"), "+.3f", 100.0),
                 number(row["range_use"], ".2f"),
-                "" if row["error"] is not None else row["notes"][0],
+                "" if row["complete"] else row["notes"][-1],
             )
         )
     print_table(("trained at", "force", "", "rig mm", "model mm", "error %", "frequency %", "range use", ""), rows)

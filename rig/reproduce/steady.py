@@ -47,6 +47,11 @@ class Steady:
     truth_hz: float
     """Where."""
 
+    @property
+    def complete(self) -> bool:
+        """Whether the response is one from the lowest frequency to the highest: else its largest amplitude is no peak."""
+        return self.prediction is not None and not np.any(self.prediction.branch)
+
     def row(self) -> dict[str, Any]:
         """Numbers for tables and JSON."""
         head = {
@@ -58,7 +63,15 @@ class Steady:
             "truth_hz": self.truth_hz,
         }
         if self.prediction is None:
-            return {**head, "peak_m": None, "peak_hz": None, "error": None, "range_use": None, "notes": [self.reason]}
+            return {
+                **head,
+                "peak_m": None,
+                "peak_hz": None,
+                "error": None,
+                "range_use": None,
+                "complete": False,
+                "notes": [self.reason],
+            }
         peak = self.prediction.peak()
         return {
             **head,
@@ -67,6 +80,7 @@ class Steady:
             "error": peak.amplitude_m / self.truth_m - 1.0,
             "frequency_error": peak.frequency_hz / self.truth_hz - 1.0,
             "range_use": float(np.max(self.prediction.range_use)),
+            "complete": self.complete,
             "notes": list(self.prediction.notes),
         }
 

@@ -84,7 +84,10 @@ def _simulated(
     there = experiment.counted_outputs[drive]
     here = run.outputs[drive, experiment.counted_from :]
     at = None if run.unbounded_at is None else (run.unbounded_at - experiment.counted_from) / experiment.sample_rate_hz
-    width = max(1, there.size // _BINS)
+    least = int(
+        np.ceil(experiment.sample_rate_hz / min(plan.start_hz, plan.stop_hz))
+    )  # a period, or an envelope is none
+    width = max(least, there.size // _BINS)
     seconds = (np.arange(there.size // width) + 0.5) * width / experiment.sample_rate_hz
     swept = max(0.0, experiment.counted / experiment.sample_rate_hz - plan.duration_s)
     share = np.clip((seconds - swept) / plan.duration_s, 0.0, 1.0)
