@@ -86,6 +86,17 @@ def test_normal_equations_are_products_of_the_jacobian_whatever_the_block() -> N
     np.testing.assert_allclose(found.gradient, gradient, rtol=0.0, atol=1e-12 * np.max(np.abs(gradient)))
 
 
+def test_each_third_sample_makes_the_hessian_and_all_make_the_gradient() -> None:
+    system = nonlinear_system(2, 1, 2, saturating=1)
+    records = records_of([replace(experiment(system, 500, noise=0.1), counted_from=31)], np.ones(1), np.ones(2))
+    parameters, weights = Parameters(system), np.array([1.0, 2.0])
+    vector = parameters.vector(system, np.zeros((0, 2)))
+    rows = jacobian(parameters, vector, records[0], weights)[:, ::3].reshape(-1, parameters.count)
+    whole, thinned = (normal_equations(parameters, vector, records, weights, every) for every in (1, 3))
+    np.testing.assert_allclose(thinned.hessian, 3.0 * rows.T @ rows, rtol=0.0, atol=1e-12 * np.max(whole.hessian))
+    np.testing.assert_array_equal(thinned.gradient, whole.gradient)
+
+
 def test_lines_of_all_frequencies_make_the_same_normal_equations_as_samples() -> None:
     system = nonlinear_system(2, 1, 2)
     weights, rate_hz = np.array([1.0, 0.5]), system.sample_rate_hz
@@ -98,6 +109,21 @@ def test_lines_of_all_frequencies_make_the_same_normal_equations_as_samples() ->
     size = np.max(np.abs(in_time.gradient))
     np.testing.assert_allclose(in_lines.gradient, in_time.gradient, rtol=0.0, atol=1e-8 * size)
     np.testing.assert_allclose(by_lines[0].squares(records[0].y), records[0].squares(records[0].y), rtol=1e-8)
+
+
+def test_line_weights_count_by_output_and_frequency() -> None:
+    system = nonlinear_system(2, 1, 2)
+    rate_hz = system.sample_rate_hz
+    records = records_of([periodic_experiment(system, 600)], np.ones(1), np.ones(2))
+    rows = ((0.0, 2.0, 0.0), (20.0, 2.0, 1.0))
+    (one,) = with_lines(records, FitSettings(line_weights=rows), rate_hz)
+    spectra = np.fft.rfft(records[0].y[-600:], axis=0).T
+    frequencies_hz = np.fft.rfftfreq(600, 1.0 / rate_hz)
+    inside = (frequencies_hz > 0.0) & (frequencies_hz <= 20.0)
+    ramps = np.stack([np.full(frequencies_hz.size, 2.0), frequencies_hz / 20.0])
+    by_hand = 2.0 * 2.0 / 600.0 * np.sum(np.abs(ramps * spectra)[:, inside] ** 2, axis=1)  # two periods, both sides
+    by_hand += [2.0 / 600.0 * np.abs(2.0 * spectra[0, 0]) ** 2, 0.0]
+    np.testing.assert_allclose(one.squares(records[0].y), by_hand, rtol=1e-6)
 
 
 def test_a_run_that_leaves_all_bounds_gives_no_finite_equations() -> None:
