@@ -79,7 +79,7 @@ def identify_pnlss(
         Of the fit over time; None for the usual ones.
     seed
         Of the random directions in which saturating features begin: eight starts, of which the better half goes on after
-        10, 20 and 40 iterations.
+        10, 20 and 60 iterations.
     progress
         Called after every iteration of the fit over time; not while starts are compared.
 
