@@ -9,7 +9,7 @@ from identification.continuation import Path, Steps, continued, solved
 from identification.errors import IdentificationError
 from identification.pnlss.steady.balance import Balance
 
-__all__ = ["Followed", "followed", "from_rest", "sizes", "statically_stable"]
+__all__ = ["Followed", "followed", "from_rest", "polished", "sizes", "statically_stable"]
 
 Float = NDArray[np.float64]
 

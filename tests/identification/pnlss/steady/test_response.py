@@ -122,6 +122,13 @@ def test_a_model_without_a_periodic_vibration_is_reported_in_one_line() -> None:
     assert softening.points.frequency_hz[-1] == pytest.approx(1.15 * HZ)
 
 
+def test_a_band_beside_the_resonance_is_said_to_miss_it() -> None:
+    missed = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", lowest_hz=20.0, highest_hz=23.0)
+    assert "the largest amplitude is at an end of the band: widen it" in missed.notes
+    hit = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", lowest_hz=20.0, highest_hz=28.0)
+    assert not any("widen" in note for note in hit.notes)
+
+
 def test_without_a_lightly_damped_mode_a_band_is_asked_for() -> None:
     damped = oscillator(0.0, damping=0.6)
     with pytest.raises(
