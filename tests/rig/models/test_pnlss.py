@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import rig
+from identification import Features
 from rig.campaigns.plans import plan_from
 from rig.console import FitLines
 from rig.models.files import load, save
@@ -20,7 +21,7 @@ PLANS = {
     | {"kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25, "realisations": 3}
     | {"transient_periods": 3, "periods": 2, "levels_rms_v": [0.2]},
     "sweep": BENCH
-    | {"kind": "sweep", "start_hz": 18.0, "stop_hz": 32.0, "rate_hz_per_s": 1.0, "levels_v": [0.08, 1.2]},
+    | {"kind": "sweep", "start_hz": 18.0, "stop_hz": 32.0, "rate_hz_per_s": 1.0, "levels_v": [0.08, 0.3]},
     "stepped": BENCH
     | {"kind": "stepped-sine", "start_hz": 24.0, "stop_hz": 25.0, "steps": 4, "levels_v": [0.15], "record_periods": 10},
     "backbone": {"levels_v": [0.3], "record_periods": 40},
@@ -154,13 +155,18 @@ def test_sweeps_references_and_multisines_are_compared(there, force_model):
 
 
 def test_a_run_that_leaves_all_bounds_is_said_to_and_drawn(there, force_model, recordings):
-    found = load(force_model)
-    save(replace(found, fit=None, model=replace(found.model, e=100.0 * found.model.e)), recordings / "wild.h5")
+    found = load(force_model).model
+    cubic = found.with_features(Features.monomials(2, 1, [3], of=range(2)))
+    largest_decaying = 0.5 * found.state_range.min()  # beyond, a state that turns grows: |x| <- (1 + g |x|^2) |x|
+    growth = (1.0 - np.abs(np.linalg.eigvals(found.a)).max()) / largest_decaying**2
+    radial = growth * np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    save(replace(cubic, e=radial), recordings / "wild.h5")
     done = there("predict wild.h5 --sweep sweep.h5 --multisine lines.h5 -o W.h5 --overwrite --json")
     assert done.status == 0, done.err
     assert "NaN" not in done.out
     assert "Infinity" not in done.out
     told = json.loads(done.out)
+    assert told["errors"][0]["verdict"] == "inside the identified range"
     assert told["errors"][1]["verdict"] == "unbounded"
     assert told["errors"][1]["peak_error"] is None
     assert told["sweeps"][1]["unbounded"]
