@@ -121,7 +121,7 @@ def test_progress_is_told_every_tenth_iteration_where_there_is_no_terminal(there
     assert lines[0].startswith("iteration  10/12  training ")
 
 
-def test_segments_of_a_backbone_join_the_multisine_at_its_rate(there, recordings):
+def test_settled_points_of_a_backbone_join_the_multisine_at_its_rate(there, recordings):
     done = there(f"identify lines.h5 backbone.h5 {QUICK} -o with.h5 --overwrite")
     assert done.status == 0, done.err
     found = load(recordings / "with.h5")
@@ -227,3 +227,11 @@ def test_mistakes_are_named_in_one_line(there, force_model, line, said):
 def test_options_of_a_fit_that_goes_on_are_its_own(there, force_model):
     done = there("identify lines.h5 --model pnlss --states 3 -o F.h5 --resume")
     assert "--states: is that of the fit that goes on" in done.err
+
+
+def test_relative_errors_weigh_small_levels_as_large_ones(there, recordings):
+    done = there(f"identify lines.h5 backbone.h5 {QUICK} --relative-errors -o relative.h5 --overwrite")
+    assert done.status == 0, done.err
+    levels = {name: load(recordings / f"{name}.h5") for name in ("with", "relative")}
+    lines = {name: next(r for r in found.runs if r.name.startswith("lines")) for name, found in levels.items()}
+    assert lines["relative"].error[0] < lines["with"].error[0]
