@@ -27,12 +27,17 @@ class FitSettings:
         ``rms``: squared errors of each output relative to its mean square over the training data, so that outputs in any
         unit count alike. ``none``: in the units of the channels, as the toolbox of the paper does.
     ridge
-        This many times the sum of squares of E and F, in variables of unit RMS, is added to the squared relative error.
+        This many times the sum of squares of E and F is added to the squared relative error, in variables whose RMS in the
+        start is one. Off by default. It holds what the data do not tell of; larger states would make the same coefficients
+        smaller, so a large one moves the state coordinates too.
     band_hz
         Only frequencies from the first to the second count. Needs periodic experiments.
     line_weights
         Rows of a frequency in Hz and the weight of errors there, one for all outputs or one for each; linear in between and 0
         beyond. Needs periodic experiments.
+    every
+        The Hessian of a step is from each ``every``-th sample. Its gradient is always from all, so that a fit ends at the same
+        parameters; but neighbouring samples of finely sampled records tell nearly the same, and steps take less time.
     damping
         Of the first step, relative to the largest eigenvalue of the scaled normal equations.
     truncation
@@ -52,6 +57,7 @@ class FitSettings:
     ridge: float = 0.0
     band_hz: tuple[float, float] | None = None
     line_weights: tuple[tuple[float, ...], ...] = ()
+    every: int = 1
     damping: float = 1e-3
     truncation: float = 1e-13
 
@@ -63,6 +69,7 @@ class FitSettings:
             ("tolerance", "0 and above, below 1", 0.0 <= self.tolerance < 1.0),
             ("outputs", ", ".join(get_args(OutputWeighting)), self.outputs in get_args(OutputWeighting)),
             ("ridge", "0 and above, finite", 0.0 <= self.ridge < float("inf")),
+            ("every", "1 and above", self.every >= 1),
             ("damping", "above 0, finite", 0.0 < self.damping < float("inf")),
             ("truncation", "0 and above, below 1", 0.0 <= self.truncation < 1.0),
         ):
