@@ -5,6 +5,7 @@ time: the way of Paduart et al., Automatica 46, 2010, and of Scheel et al., Sect
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
