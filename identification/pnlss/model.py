@@ -218,11 +218,14 @@ class PnlssModel:
         m, tables = self.matrices, (self.state_features.table, self.output_features.table)
         count = simulate(m, *tables, np.ascontiguousarray(u.T), x0, self.bound, workspace(m), x, y)
         x[count:], y[count:] = np.nan, np.nan
+        with np.errstate(divide="ignore", invalid="ignore"):  # of what never moved in training
+            state_use = np.max(np.abs(x[:count]), axis=0, initial=0.0) / self.state_range
+            input_use = np.max(np.abs(u), axis=1, initial=0.0) / self.input_range
         return Simulation(
             outputs=y.T,
             states=x.T,
-            state_use=np.max(np.abs(x[:count]), axis=0, initial=0.0) / self.state_range,
-            input_use=np.max(np.abs(u), axis=1, initial=0.0) / self.input_range,
+            state_use=state_use,
+            input_use=input_use,
             unbounded_at=None if count == u.shape[1] else int(count),
         )
 

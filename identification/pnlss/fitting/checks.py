@@ -32,6 +32,10 @@ def check_data(
 ) -> None:
     """Raise `IdentificationError` where data and model do not go together or the data cannot tell the parameters."""
     same_channels(experiments)
+    if not np.array_equal(start.state_features.limits, start.output_features.limits):
+        raise IdentificationError(
+            "output_features: have other limits than state_features; a fit needs the same for both"
+        )
     for kind, group in (("experiments", experiments), ("validation", validation)):
         for index, experiment in enumerate(group):
             belongs(start, experiment, f"{kind}[{index}]{f' ({experiment.name})' if experiment.name else ''}")

@@ -15,6 +15,7 @@ from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.checks import check_data, check_resumed
 from identification.pnlss.fitting.initial_states import fitted_initial_state
 from identification.pnlss.fitting.levenberg_marquardt import Iterates, iterate
+from identification.pnlss.fitting.memory import check_memory
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.problem import Problem, Scales, scales_of
 from identification.pnlss.fitting.result import PnlssFit
@@ -70,6 +71,7 @@ def fit_pnlss(
     estimated = sum(e.initial_state == "estimated" for e in experiments)
     parameters = Parameters(start, estimated)
     check_data(start, experiments, validation, parameters.count)
+    check_memory(parameters, [*experiments, *validation], settings.by_frequency)
     if resume is not None:
         check_resumed(start, resume, estimated)
     scales = scales_of(experiments, _state_scale(start, experiments) if resume is None else resume.state_scale)

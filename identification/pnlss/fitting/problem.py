@@ -74,8 +74,9 @@ class Problem:
         rms = settings.outputs == "rms"
         self.weights = np.ones_like(scales.outputs) if rms else scales.outputs / np.max(scales.outputs)
         self._total = self._measured(self.training)
-        self._penalty = settings.ridge * parameters.nonlinear
-        self._penalty[parameters.ends[2] : parameters.ends[3]] = PRIOR / self._total
+        self._ridge = settings.ridge * parameters.nonlinear
+        self._held = np.zeros(parameters.count)
+        self._held[parameters.ends[2] : parameters.ends[3]] = PRIOR / self._total
         self._validation_total = self._measured(self.validation)
 
     def _measured(self, records: list[Record]) -> float:
@@ -112,13 +113,13 @@ class Problem:
         return float(np.sqrt(total / self._validation_total))
 
     def cost(self, vector: Float, error: float) -> float:
-        """Squared relative error, ridge, and what keeps initial states near those that occur."""
+        """Squared relative error and ridge."""
         if not np.isfinite(error):
             return float(np.inf)
-        return error**2 + float(self._penalty @ vector**2)
+        return error**2 + float(self._ridge @ vector**2)
 
     def equations(self, vector: Float) -> NormalEquations:
-        """Normal equations of half of `cost`."""
+        """Normal equations of half of `cost`; initial states that outputs do not tell of are held back."""
         found = normal_equations(self.parameters, vector, self.training, self.weights)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
-        return NormalEquations(hessian + np.diag(self._penalty), gradient + self._penalty * vector)
+        return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)

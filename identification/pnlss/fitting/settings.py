@@ -27,7 +27,9 @@ class FitSettings:
         ``rms``: squared errors of each output relative to its mean square over the training data, so that outputs in any
         unit count alike. ``none``: in the units of the channels, as the toolbox of the paper does.
     ridge
-        This many times the sum of squares of E and F, in variables of unit RMS, is added to the squared relative error.
+        This many times the sum of squares of E and F is added to the squared relative error, in variables whose RMS in the
+        start is one. Off by default. It holds what the data do not tell of; larger states would make the same coefficients
+        smaller, so a large one moves the state coordinates too.
     band_hz
         Only frequencies from the first to the second count. Needs periodic experiments.
     line_weights

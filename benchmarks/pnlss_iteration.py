@@ -1,0 +1,138 @@
+"""Seconds per iteration of a nonlinear state-space fit: ``python -m benchmarks.pnlss_iteration [--json]``.
+
+Each case runs some iterations of `fit_pnlss` and takes their median; all that belongs to an iteration is in it: sensitivities,
+normal equations, their decomposition, and the simulations that try dampings. The baseline in the same run is what one writes
+first in numpy: the recursion sample by sample, the whole Jacobian, its product; on a short piece, scaled to the samples of
+the case. One core: the pools of the linear algebra are held to one thread. Memory is the peak of the process after each case,
+the data themselves included.
+"""
+
+import json
+import os
+import resource
+import statistics
+import sys
+import time
+
+for pool in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(pool, "1")
+
+import numpy as np  # noqa: E402 (threads are set first)
+
+from identification import (  # noqa: E402
+    Channel,
+    Experiment,
+    Features,
+    FitSettings,
+    PnlssModel,
+    StateSpace,
+    fit_pnlss,
+)
+
+ITERATIONS = 7
+PIECE = 400
+"""Samples of the baseline."""
+CASES = {
+    "4 states, 4 outputs, 400 coefficients, 25 600": (4, 4, 25_600, True),
+    "the same, 256 000": (4, 4, 256_000, True),
+    "2 states, 1 output, 14 coefficients, 73 728": (2, 1, 73_728, False),
+}
+
+
+def system(states: int, outputs: int, nonlinear_outputs: bool) -> tuple[PnlssModel, PnlssModel]:
+    """A start, and what is measured."""
+    rng = np.random.default_rng(0)
+    a = np.zeros((states, states))
+    for first in range(0, states, 2):
+        pole = np.exp((-0.02 + 1j) * (0.25 + 0.15 * first))
+        a[first : first + 2, first : first + 2] = [[pole.real, pole.imag], [-pole.imag, pole.real]]
+    matrices = StateSpace(
+        a, 0.2 * rng.normal(size=(states, 1)), rng.normal(size=(outputs, states)), np.zeros((outputs, 1))
+    )
+    linear = PnlssModel.linear(
+        matrices,
+        sample_rate_hz=1000.0,
+        inputs=(Channel("force", "force", "N"),),
+        outputs=tuple(Channel(f"a{index}", "response", "m/s2") for index in range(outputs)),
+    )
+    of = None if nonlinear_outputs else range(states)
+    phi = Features.monomials(states, 1, (2, 3), of=of)
+    start = linear.with_features(phi, phi if nonlinear_outputs else None)
+    true = PnlssModel(
+        **{**vars(start), "e": 0.003 * rng.normal(size=start.e.shape), "f": 0.02 * rng.normal(size=start.f.shape)}
+    )
+    return start, true
+
+
+def measured(true: PnlssModel, samples: int) -> Experiment:
+    """A run under noise, with noise."""
+    rng = np.random.default_rng(1)
+    inputs = 0.3 * rng.normal(size=(1, samples))
+    run = true.simulate(inputs)
+    return Experiment(
+        inputs=inputs,
+        outputs=run.outputs + 0.01 * np.std(run.outputs) * rng.normal(size=run.outputs.shape),
+        sample_rate_hz=true.sample_rate_hz,
+        input_channels=true.inputs,
+        output_channels=true.outputs,
+    )
+
+
+def plain(model: PnlssModel, experiment: Experiment) -> float:
+    """Seconds per sample of the Jacobian and its product in plain numpy."""
+    n, outputs = model.states, len(model.outputs)
+    wide, own = n + 1 + model.state_features.count, n + 1 + model.output_features.count
+    begin = time.perf_counter()
+    states = model.simulate(experiment.inputs[:, :PIECE]).states
+    v = np.vstack([states, experiment.inputs[:, :PIECE]])
+    z, q = np.vstack([v, model.state_features.values(v)]), np.vstack([v, model.output_features.values(v)])
+    by_state = model.a[:, :, None] + np.einsum("if,fjk->ijk", model.e, model.state_features.derivatives(v)[:, :n])
+    by_output = model.c[:, :, None] + np.einsum("if,fjk->ijk", model.f, model.output_features.derivatives(v)[:, :n])
+    s = np.zeros((n, n * wide))
+    jacobian = np.zeros((PIECE, outputs, n * wide + outputs * own))
+    for k in range(PIECE):
+        jacobian[k, :, : n * wide] = by_output[:, :, k] @ s
+        jacobian[k, :, n * wide :] = np.kron(np.eye(outputs), q[:, k])
+        s = by_state[:, :, k] @ s + np.kron(np.eye(n), z[:, k])
+    rows = jacobian.reshape(-1, jacobian.shape[2])
+    rows.T @ rows
+    return (time.perf_counter() - begin) / PIECE
+
+
+def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool) -> dict[str, float]:
+    """One case."""
+    start, true = system(states, outputs, nonlinear_outputs)
+    experiment = measured(true, samples)
+    fit_pnlss(start, [measured(true, 3000)], settings=FitSettings(iterations=1))  # compiles
+    baseline = min(plain(true, experiment) for _ in range(3)) * samples
+    fit = fit_pnlss(start, [experiment], settings=FitSettings(iterations=ITERATIONS, tolerance=0.0))
+    seconds = np.diff(fit.history.seconds)
+    return {
+        "coefficients": true.nonlinear_coefficients,
+        "seconds": statistics.median(seconds),
+        "best": float(np.min(seconds)),
+        "plain_numpy": baseline,
+        "times_faster": baseline / statistics.median(seconds),
+        "training_error": fit.training_error,
+        "data_mb": (experiment.inputs.nbytes + experiment.outputs.nbytes) / 1e6,
+        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3,
+    }
+
+
+def main() -> None:
+    results = {name: measure(*case) for name, case in CASES.items()}
+    if "--json" in sys.argv:
+        print(json.dumps(results, indent=1))
+        return
+    print(
+        f"{'':48} {'s/iteration':>12} {'best':>8} {'numpy':>8} {'ratio':>7} {'error':>9} {'data MB':>8} {'peak MB':>8}"
+    )
+    for name, row in results.items():
+        print(
+            f"{name:48} {row['seconds']:12.3f} {row['best']:8.3f} {row['plain_numpy']:8.2f} {row['times_faster']:7.1f} "
+            f"{row['training_error']:9.2e} {row['data_mb']:8.1f} {row['peak_mb']:8.0f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
