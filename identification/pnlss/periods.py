@@ -15,7 +15,7 @@ Float = NDArray[np.float64]
 
 _DIFFERENCE = 0.3
 """RMS difference of two periods, relative to the signal: above, noise is no explanation that leaves anything to identify."""
-_SETTLED_PART = 8
+_SETTLED_PART = 32
 """Before the counted part, this fraction of a period must be like the one a period later, however long the transient."""
 
 
@@ -46,7 +46,7 @@ def check_periodic(experiment: Experiment, name: str) -> None:
     """Raise `IdentificationError` unless the counted periods repeat each other, and what is just before them repeats too.
 
     Two neighbouring periods may differ by 0.3 of the signal (RMS, mean removed) in every channel. Of what is put ahead, the
-    last eighth of a period, or all if it is shorter, is held against the same a period later: there the transient must have
+    last thirty-second part of a period, or all if it is shorter, is held against the same a period later: there the transient must have
     decayed.
     """
     n, begin = experiment.period_samples, experiment.counted_from

@@ -100,7 +100,7 @@ def test_periods_that_do_not_repeat_are_refused_by_name() -> None:
         best_linear_responses([replace(good, period_samples=1000, counted_from=3 * PERIOD - 2000)])
     other = np.array(good.inputs)
     other[:, :PERIOD] = multisine(9)
-    with pytest.raises(IdentificationError, match=r"the 128 samples before sample 1024.*Experiment\.periodic"):
+    with pytest.raises(IdentificationError, match=r"the 32 samples before sample 1024.*Experiment\.periodic"):
         best_linear_responses([replace(good, inputs=other)])
 
 
