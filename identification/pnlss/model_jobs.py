@@ -1,7 +1,7 @@
 """Which realisations train a model, which choose its iterate, and which are left to test it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
@@ -48,6 +48,7 @@ def realisation_combinations(
     models: int | Mapping[str, int],
     mixed: bool = True,
     beside: Sequence[Experiment] = (),
+    beside_validation: Sequence[Experiment] = (),
 ) -> tuple[ModelJob, ...]:
     """Jobs of different combinations of the realisations of each level, and of all levels together.
 
@@ -65,8 +66,9 @@ def realisation_combinations(
         Number of models of each training set, or one number for each name, ``mixed`` among them; 0 for none.
     mixed
         Whether there is a training set ``mixed`` of all levels concatenated: of each level combination k.
-    beside
-        Further experiments that are fitted by every model, backbone segments for instance.
+    beside, beside_validation
+        Further experiments that are fitted by every model, backbone segments for instance, and further ones that help to
+        choose its iterate: without, realisations of a low level choose one that knows nothing of high segments.
 
     Raises
     ------
@@ -96,15 +98,16 @@ def realisation_combinations(
             raise IdentificationError(
                 f"models: {count} of {training_set}, allowed are 0 to {most} different combinations"
             )
-        jobs += [_job(training_set, members, k, beside) for k in range(count)]
+        for k in range(count):
+            job = _job(training_set, members, k)
+            training, validation = (*job.training, *beside), (*job.validation, *beside_validation)
+            jobs.append(replace(job, training=training, validation=validation))
     if not jobs:
         raise IdentificationError("models: are 0, needs one at least")
     return tuple(jobs)
 
 
-def _job(
-    training_set: str, members: Mapping[str, Sequence[Experiment]], k: int, beside: Sequence[Experiment]
-) -> ModelJob:
+def _job(training_set: str, members: Mapping[str, Sequence[Experiment]], k: int) -> ModelJob:
     """Combination k."""
     training: list[Experiment] = []
     validation: list[Experiment] = []
@@ -119,7 +122,7 @@ def _job(
     return ModelJob(
         name=f"{training_set} {k + 1:02d}",
         training_set=training_set,
-        training=(*training, *beside),
+        training=tuple(training),
         validation=tuple(validation),
         left_out=tuple(left_out),
     )

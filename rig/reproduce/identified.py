@@ -24,6 +24,9 @@ from rig.reproduce.options import Options
 
 __all__ = ["Models", "identify_all"]
 
+_CHOOSES = 3
+"""Every third of the experiments beside the multisines is not fitted and chooses the iterate with those that do."""
+
 
 @dataclass(frozen=True, eq=False)
 class Models:
@@ -66,7 +69,13 @@ def identify_all(
     say: Callable[[str], None],
 ) -> Models:
     """Identify what is not in the folder yet. `KeyboardInterrupt` leaves there what was finished."""
-    jobs = realisation_combinations(levels, models=options.counts, mixed=options.mixed, beside=beside)
+    jobs = realisation_combinations(
+        levels,
+        models=options.counts,
+        mixed=options.mixed,
+        beside=[one for index, one in enumerate(beside) if index % _CHOOSES != 1],
+        beside_validation=beside[1::_CHOOSES],
+    )
     files = {job.name: _file(options, job.name) for job in jobs}
     fits: dict[str, PnlssFit] = {name: _kept(path) for name, path in files.items() if path.exists()}
     failures: dict[str, str] = {}
@@ -100,7 +109,7 @@ def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment
 
 
 def _kept(path: Path) -> PnlssFit:
-    fit = load_as(PNLSS, path).fit
+    fit: PnlssFit | None = load_as(PNLSS, path).fit
     if fit is None:
         raise RecordingError(f"{path}: holds a model without its fit; remove the file, and it is identified again")
     return fit

@@ -33,13 +33,15 @@ def test_the_first_models_leave_out_every_realisation_once():
 def test_mixed_models_hold_all_levels_and_leave_out_one_of_each():
     levels = {"low": realisations(0.5, 5), "high": realisations(2.0, 10)}
     beside = realisations(1.0, 1)
-    jobs = realisation_combinations(levels, models={"mixed": 30, "high": 2}, beside=beside)
+    chooses = realisations(1.5, 1)
+    jobs = realisation_combinations(levels, models={"mixed": 30, "high": 2}, beside=beside, beside_validation=chooses)
     assert [job.training_set for job in jobs] == ["high"] * 2 + ["mixed"] * 30
     mixed = jobs[2:]
     assert len({split_of(job) for job in mixed}) == 30
     for job in mixed:
-        assert (len(job.training), len(job.validation), len(job.left_out)) == (3 + 8 + 1, 2, 2)
+        assert (len(job.training), len(job.validation), len(job.left_out)) == (3 + 8 + 1, 2 + 1, 2)
         assert job.training[-1] is beside[0]
+        assert job.validation[-1] is chooses[0]
         assert not any(job.seen(one) for one in job.left_out)
         assert all(job.seen(one) for one in job.validation)
     assert len({job.name for job in jobs}) == len(jobs)
