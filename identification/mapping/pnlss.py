@@ -53,7 +53,7 @@ def map_pnlss(data: Any, mapping: PnlssMapping) -> PnlssModel:
     outputs, of_outputs = in_si(mapping.outputs)
     m, p = len(inputs), len(outputs)
     a = _array(data, mapping, "A")
-    n = int(round(np.sqrt(a.size)))
+    n = round(float(np.sqrt(a.size)))
     xpowers, ypowers = (_powers(data, mapping, name, n + m) for name in ("xpowers", "ypowers"))
     shapes = {
         "a": (n, n),

@@ -138,10 +138,9 @@ def _common_rate_hz(paths: Sequence[Path]) -> float:
 
 
 def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment], list[Experiment]]:
-    """What chooses the iterate apart from the others: of a multisine the last realisations of each level but for one, of
-    settled points every fourth.
+    """What chooses the iterate apart from the others: the last realisations of each level, and every fourth settled point.
 
-    Of these too, or an iterate that is good at the levels of the multisine alone would be taken.
+    One realisation stays. Without settled points an iterate would be taken that is good at the multisine's levels alone.
     """
     alike: dict[tuple[float, int], list[Experiment]] = {}
     for one in found:
