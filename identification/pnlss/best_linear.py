@@ -15,7 +15,7 @@ from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.spectra import PeriodicSpectra
-from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.experiment import Experiment, excited_band, same_channels
 from identification.pnlss.periods import periodic_ones
 
 __all__ = ["best_linear_responses"]
@@ -41,8 +41,9 @@ def best_linear_responses(
         Of the same channels, one periodic at least; with several inputs as many as inputs, neighbours of one block
         (orthogonal multisines) following each other.
     band_hz
-        Lowest and highest line; None for every line below half the sample rate where all inputs have a hundredth of the
-        amplitude of their strongest line.
+        Lowest and highest line; None for the band that the experiments were excited in. Of its lines, or where it is
+        unknown of all below half the sample rate, those count where all inputs have a hundredth of the amplitude of their
+        strongest one.
 
     Returns
     -------
@@ -71,7 +72,7 @@ def best_linear_responses(
         chosen = chosen[: len(chosen) - extra]
     spectra = _spectra(chosen)
     frequency_hz = np.arange(spectra.shape[-1]) * first.sample_rate_hz / first.period_samples
-    lines = _excited(spectra[:, :, : len(inputs)], frequency_hz, band_hz)
+    lines = _excited(spectra[:, :, : len(inputs)], frequency_hz, band_hz or excited_band(chosen))
     # Any channel may be an input or an output here: roles are given for the estimate alone.
     roles = [Channel(f"input {i + 1}", "force", "N") for i in range(len(inputs))]
     roles += [Channel(f"output {o + 1}", "response", "m") for o in range(len(outputs))]

@@ -11,7 +11,7 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
-__all__ = ["Experiment", "InitialState", "same_channels"]
+__all__ = ["Experiment", "InitialState", "excited_band", "same_channels"]
 
 Float = NDArray[np.float64]
 InitialState = Literal["zero", "estimated"]
@@ -43,6 +43,9 @@ class Experiment:
         Its level (RMS or peak of what was set), by which tables sort; NaN if it has none.
     specimen
         Name of what was tested.
+    excited_hz
+        Lowest and highest frequency that was excited; None if that is unknown. What a structure makes of it beyond, such as
+        harmonics in a measured force, is no excitation.
 
     Raises
     ------
@@ -62,6 +65,7 @@ class Experiment:
     name: str = ""
     level: float = float("nan")
     specimen: str = ""
+    excited_hz: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         for name in ("input_channels", "output_channels"):
@@ -92,6 +96,10 @@ class Experiment:
                 f"{where}period_samples: is {self.period_samples}, the {self.counted} samples that count are no whole "
                 "number of periods"
             )
+        if self.excited_hz is not None and not 0.0 <= self.excited_hz[0] < self.excited_hz[1]:
+            raise IdentificationError(
+                f"{where}excited_hz: is {self.excited_hz}, needs two rising frequencies, none below zero"
+            )
 
     @classmethod
     def periodic(
@@ -106,6 +114,7 @@ class Experiment:
         name: str = "",
         level: float = float("nan"),
         specimen: str = "",
+        excited_hz: tuple[float, float] | None = None,
     ) -> "Experiment":
         """One settled period (float[n_channels, n_period]), with so many samples of the period before put ahead of it.
 
@@ -127,6 +136,7 @@ class Experiment:
             name=name,
             level=level,
             specimen=specimen,
+            excited_hz=excited_hz,
         )
 
     @property
@@ -178,6 +188,12 @@ class Experiment:
     def weighted(self, weight: float) -> "Experiment":
         """The same with another weight."""
         return replace(self, weight=weight)
+
+
+def excited_band(experiments: Sequence[Experiment]) -> tuple[float, float] | None:
+    """From the lowest to the highest frequency that any experiment excites; None where none says so."""
+    bands = [experiment.excited_hz for experiment in experiments if experiment.excited_hz is not None]
+    return (min(low for low, _ in bands), max(high for _, high in bands)) if bands else None
 
 
 def same_channels(experiments: Sequence[Experiment]) -> None:

@@ -48,6 +48,8 @@ class PnlssModel:
         What goes in, and what comes out.
     state_range, input_range
         float[n_states], float[n_inputs]: largest magnitudes in the training data; NaN if unknown.
+    excited_hz
+        Band in which the training data was excited; None if unknown.
     training
         What it was trained on, one line per experiment.
     specimen
@@ -74,6 +76,7 @@ class PnlssModel:
     outputs: tuple[Channel, ...]
     state_range: Float
     input_range: Float
+    excited_hz: tuple[float, float] | None = None
     training: tuple[str, ...] = ()
     specimen: str = ""
     notes: tuple[str, ...] = ()
@@ -244,6 +247,7 @@ class PnlssModel:
             "sample_rate_hz": self.sample_rate_hz,
             "inputs": [vars(channel) for channel in self.inputs],
             "outputs": [vars(channel) for channel in self.outputs],
+            "excited_hz": None if self.excited_hz is None else list(self.excited_hz),
             "training": list(self.training),
             "specimen": self.specimen,
             "notes": list(self.notes),
@@ -261,9 +265,11 @@ class PnlssModel:
             for name in ("inputs", "outputs"):
                 values[name] = tuple(Channel(**channel) for channel in attributes[name])
             texts: dict[str, Any] = {name: tuple(attributes[name]) for name in ("training", "notes")}
+            band = attributes.get("excited_hz")
             return cls(
                 **values,
                 **texts,
+                excited_hz=None if band is None else (float(band[0]), float(band[1])),
                 sample_rate_hz=float(attributes["sample_rate_hz"]),
                 specimen=str(attributes["specimen"]),
             )

@@ -52,6 +52,7 @@ def realisation(
         name=name,
         level=float(point["level"]),
         specimen=bench.specimen.name,
+        excited_hz=(plan.lowest_hz, plan.highest_hz),
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment import Experiment, excited_band
 from identification.pnlss.fitting.checks import check_data, check_resumed
 from identification.pnlss.fitting.initial_states import fitted_initial_state
 from identification.pnlss.fitting.levenberg_marquardt import Iterates, iterate
@@ -153,6 +153,7 @@ def _trained(model: PnlssModel, experiments: Sequence[Experiment], begins: Float
         model,
         state_range=states,
         input_range=np.max([np.max(np.abs(e.inputs), axis=1) for e in experiments], axis=0),
+        excited_hz=excited_band(experiments) or model.excited_hz,
         training=tuple(e.name or f"experiment {index + 1}" for index, e in enumerate(experiments)),
         specimen=model.specimen or experiments[0].specimen,
     )

@@ -65,7 +65,8 @@ def _voltage_driven(model: PnlssModel, amplitude: float, held: Held, exciter: Ex
 def linear_resonance_hz(model: PnlssModel) -> float:
     """Natural frequency of the linear part's lightly damped mode with the largest displacement of the drive point.
 
-    Raises `IdentificationError` if it has none.
+    Of those in the band that its training data was excited in, where that is known and holds one: others are guesses. Raises
+    `IdentificationError` if it has none.
     """
     poles = np.linalg.eigvals(model.a)
     s = np.log(poles[(poles.imag > 0.0) & (np.abs(poles) > 0.0)]) * model.sample_rate_hz
@@ -74,6 +75,9 @@ def linear_resonance_hz(model: PnlssModel) -> float:
         raise IdentificationError(
             "lowest_hz, highest_hz: not given, and the model's linear part has no lightly damped mode to set them by"
         )
+    low, high = (2.0 * np.pi * f for f in model.excited_hz or (0.0, np.inf))
+    inside = (np.abs(s) >= low) & (np.abs(s) <= high)
+    s = s[inside] if inside.any() else s
     output = motion_rows(model.outputs)[0]
     order = MOTION_ORDER[model.outputs[output].motion]
     response = model.linear_part.response(np.exp(1j * s.imag / model.sample_rate_hz))[:, output, :]
