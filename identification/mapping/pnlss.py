@@ -63,7 +63,7 @@ def map_pnlss(data: Any, mapping: PnlssMapping) -> PnlssModel:
         "e": (n, len(xpowers)),
         "f": (p, len(ypowers)),
     }
-    matrices = {
+    matrices: dict[str, Any] = {
         name: _shaped(_array(data, mapping, name.upper()), name.upper(), shape) for name, shape in shapes.items()
     }
     rate_hz = mapping.sample_rate_hz
