@@ -155,7 +155,10 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("NM.h5", "nothing to predict: give --frequency-response, --sweep, --planned-sweep or --reference"),
+        (
+            "NM.h5",
+            "nothing to predict: give --frequency-response, --sweep, --planned-sweep, --multisine or --reference",
+        ),
         ("nothing.h5 --frequency-response 0.1", "nothing.h5"),
         ("LIN.h5 --frequency-response 0.1", "LIN.h5: is a file of kind linear-modes, wanted is one of kind "),
         ("NM.h5 --frequency-response 0", "force_n: is 0 N"),
