@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from identification.mapping.backbone import BackboneMapping, map_backbone
     from identification.mapping.multisine import MultisineMapping, map_multisine
     from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
+    from identification.mapping.pnlss import PnlssMapping, map_pnlss
     from identification.mapping.response_matrix import ResponseMatrixMapping, map_response_matrix
     from identification.mapping.stepped_sine import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
@@ -124,6 +125,7 @@ __all__ = [
     "PeriodicVibration",
     "PnlssErrors",
     "PnlssFit",
+    "PnlssMapping",
     "PnlssModel",
     "PnlssResponse",
     "PredictionError",
@@ -174,6 +176,7 @@ __all__ = [
     "map_frequency_responses",
     "map_multisine",
     "map_nonlinear_mode",
+    "map_pnlss",
     "map_response_matrix",
     "nonlinear_mode",
     "pack_frequency_responses",
@@ -239,6 +242,7 @@ _MODULE_OF = {
     "PeriodicVibration": "measurements",
     "PnlssErrors": "pnlss.errors",
     "PnlssFit": "pnlss.fitting.result",
+    "PnlssMapping": "mapping.pnlss",
     "PnlssModel": "pnlss.model",
     "PnlssResponse": "pnlss.steady.response",
     "PredictionError": "prediction.comparison",
@@ -289,6 +293,7 @@ _MODULE_OF = {
     "map_frequency_responses": "mapping.stepped_sine",
     "map_multisine": "mapping.multisine",
     "map_nonlinear_mode": "mapping.nonlinear_mode",
+    "map_pnlss": "mapping.pnlss",
     "map_response_matrix": "mapping.response_matrix",
     "nonlinear_mode": "nonlinear.phase_resonance",
     "pack_frequency_responses": "frequency_responses",

@@ -72,7 +72,7 @@ class Run:
         outputs: Sequence[str] | None = None,
         rate_hz: float | None = None,
         periods: Periods = "mean",
-        transient_periods: float = 1.0,
+        transient_periods: float | None = None,
         segment_periods: int = 30,
     ) -> tuple[Experiment, ...]:
         """The accepted points as training or test data of nonlinear state-space models (`rig.experiments.experiments`)."""

@@ -54,4 +54,5 @@ def export_(
         return
     for one in written:
         told = one.summary()
-        print(f"{told['kind']}: {told['title']}, {told['rows']} rows of {', '.join(told['arrays'])}")
+        rows = f"{told['rows']} rows of " if told["rows"] else ""
+        print(f"{told['kind']}: {told['title']}, {rows}{', '.join(told['arrays'])}")

@@ -66,8 +66,18 @@ def identify(
     ] = None,
     hold_out: Annotated[
         int | None,
-        typer.Option("--hold-out", help="Realisations of each level that do this instead.", show_default="1"),
+        typer.Option(
+            "--hold-out",
+            help="Realisations of each level that do this instead, beside every fourth settled point.",
+            show_default="1",
+        ),
     ] = None,
+    relative_errors: Annotated[
+        bool,
+        typer.Option(
+            "--relative-errors", help="Of a PNLSS model: small levels count as much as large ones in the fit."
+        ),
+    ] = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the PNLSS model in OUTPUT, from the same files.")
     ] = False,
@@ -102,6 +112,7 @@ def identify(
             iterations=iterations,
             validation=tuple(validation or ()),
             hold_out=hold_out,
+            relative=True if relative_errors else None,
             resume=output if resume else None,
         ),
     )
@@ -127,8 +138,8 @@ def predict(
     force: Annotated[
         str | None,
         typer.Option(
-            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; pure-sine of a PNLSS model "
-            "that is driven by a force, without an exciter."
+            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; of a PNLSS model "
+            "driven by a force, and without an exciter, pure-sine."
         ),
     ] = None,
     sweep: Annotated[

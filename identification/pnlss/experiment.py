@@ -144,6 +144,37 @@ class Experiment:
         """float[n_outputs, counted]."""
         return np.asarray(self.outputs[:, self.counted_from :])
 
+    def averaged(self, *, transient_samples: int | None = None) -> "Experiment":
+        """The mean over the counted periods as one settled period, with so many samples of it put ahead (`periodic`).
+
+        A fit to it comes to the same as one to all periods, noise being alike in all of them, in a fraction of the time.
+        ``transient_samples`` are as many as counting began after if None. Raises `IdentificationError` if it is not periodic.
+        """
+        if not self.period_samples:
+            raise IdentificationError(
+                f"experiment '{self.name}': is not periodic, so that there are no periods to average"
+            )
+        ahead = self.counted_from if transient_samples is None else transient_samples
+        means = [
+            values.reshape(len(values), -1, self.period_samples).mean(axis=1)[
+                :, np.arange(-ahead, self.period_samples) % self.period_samples
+            ]
+            for values in (self.counted_inputs, self.counted_outputs)
+        ]
+        return replace(self, inputs=means[0], outputs=means[1], counted_from=ahead)
+
+    def with_constant_input(self, value: float = 1.0) -> "Experiment":
+        """The same with one more input, ``constant``, which has one value throughout: what it does makes up for offsets.
+
+        Offsets of sensors and amplifiers are no small matter to a polynomial, and rarely known well enough to be subtracted.
+        Give it the same value in all experiments, those that are predicted included.
+        """
+        return replace(
+            self,
+            inputs=np.vstack([self.inputs, np.full((1, self.inputs.shape[1]), positive("value", value))]),
+            input_channels=(*self.input_channels, Channel("constant", "monitor", "1")),
+        )
+
     def weighted(self, weight: float) -> "Experiment":
         """The same with another weight."""
         return replace(self, weight=weight)

@@ -60,7 +60,8 @@ def identify_pnlss(
         Degrees of the monomials in the state and the output equation. None: 2 and 3, but none beside saturating features,
         with which alone a model stays bounded; in the outputs as in the states. ``()`` for none.
     variables
-        What the monomials are made of: ``all`` states and inputs, ``states`` alone, or the numbers of some (states first).
+        What the monomials are made of: ``all`` states and inputs that vary, ``states`` alone, or the numbers of some (states
+        first).
     saturating
         Number of saturating features in the state equation, or numbers in the state and the output equation; 10 to 15 do
         for a hysteresis. With one number the output equation has as many, unless all outputs are displacements or
@@ -78,7 +79,7 @@ def identify_pnlss(
         Of the fit over time; None for the usual ones.
     seed
         Of the random directions in which saturating features begin: eight starts, of which the better half goes on after
-        10, 20 and 40 iterations.
+        10, 20 and 60 iterations.
     progress
         Called after every iteration of the fit over time; not while starts are compared.
 
@@ -95,7 +96,7 @@ def identify_pnlss(
     chosen = FitSettings() if settings is None else settings
     begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     counts = _saturating(saturating, begin)
-    of = _chosen(variables, states, len(begin.inputs))
+    of = _chosen(variables, states, _varying(experiments))
     powers = tuple((() if any(counts) else (2, 3)) if degrees is None else degrees)
     of_output = powers if output_degrees is None else tuple(output_degrees)
     given = (state_features, output_features)
@@ -134,7 +135,12 @@ def linear_pnlss(
     first = experiments[0]
     if linear is not None:
         return _given(linear, first, states)
-    responses = best_linear_responses(experiments, band_hz=band_hz)
+    varying = _varying(experiments)
+    moved = [
+        replace(e, inputs=e.inputs[varying], input_channels=tuple(e.input_channels[i] for i in varying))
+        for e in experiments
+    ]
+    responses = best_linear_responses(moved, band_hz=band_hz)
     found = linear_start(responses, states, sample_rate_hz=first.sample_rate_hz)
     low, high = responses.frequency_hz[[0, -1]]
     note = (
@@ -144,12 +150,29 @@ def linear_pnlss(
     model = PnlssModel.linear(
         found.model,
         sample_rate_hz=first.sample_rate_hz,
-        inputs=first.input_channels,
+        inputs=moved[0].input_channels,
         outputs=first.output_channels,
         specimen=first.specimen,
         notes=(*responses.notes, note),
     )
-    return with_independent_states(model, experiments)
+    model = with_independent_states(model, moved)
+    m = len(first.input_channels)
+    b, d = np.zeros((states, m)), np.zeros((len(first.output_channels), m))
+    b[:, varying], d[:, varying] = model.b, model.d
+    return PnlssModel.linear(
+        StateSpace(np.array(model.a), b, np.array(model.c), d),
+        sample_rate_hz=model.sample_rate_hz,
+        inputs=first.input_channels,
+        outputs=model.outputs,
+        specimen=model.specimen,
+        notes=model.notes,
+    )
+
+
+def _varying(experiments: Sequence[Experiment]) -> list[int]:
+    """Numbers of the inputs that are not constant; all if none is, for what is wrong then is said elsewhere."""
+    low, high = (f([f(e.inputs, axis=1) for e in experiments], axis=0) for f in (np.min, np.max))
+    return [int(i) for i in np.flatnonzero(low < high)] or list(range(low.size))
 
 
 def _given(linear: StateSpace | PnlssModel, first: Experiment, states: int) -> PnlssModel:
@@ -198,9 +221,9 @@ def _with_scores(found: PnlssFit, begin: PnlssModel, experiments: Sequence[Exper
     return replace(found, model=replace(found.model, notes=(*found.model.notes, note, score)), linear=begin)
 
 
-def _chosen(variables: Variables, states: int, inputs: int) -> list[int]:
+def _chosen(variables: Variables, states: int, varying: Sequence[int]) -> list[int]:
     if variables == "all":
-        return list(range(states + inputs))
+        return [*range(states), *(states + i for i in varying)]
     if variables == "states":
         return list(range(states))
     if isinstance(variables, str):

@@ -45,9 +45,8 @@ def periodic_ones(experiments: Sequence[Experiment]) -> tuple[list[Experiment], 
 def check_periodic(experiment: Experiment, name: str) -> None:
     """Raise `IdentificationError` unless the counted periods repeat each other, and what is just before them repeats too.
 
-    Two neighbouring periods may differ by 0.3 of the signal (RMS, mean removed) in every channel. Of what is put ahead, the
-    last thirty-second part of a period, or all if it is shorter, is held against the same a period later: there the transient must have
-    decayed.
+    Two neighbouring periods may differ by 0.3 of the signal (RMS, mean removed) in every channel. Of what is put ahead, as much
+    as 1/32 of a period is held against the same a period later: there the transient must have decayed.
     """
     n, begin = experiment.period_samples, experiment.counted_from
     channels = (*experiment.input_channels, *experiment.output_channels)

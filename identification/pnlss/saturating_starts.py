@@ -23,7 +23,7 @@ __all__ = ["best_of_starts", "random_start"]
 Float = NDArray[np.float64]
 
 STARTS = 8
-_ROUNDS = (10, 20, 40)
+_ROUNDS = (10, 20, 60)
 """Iterations after which the better half of the starts goes on, counted from the beginning."""
 _COEFFICIENT = 0.03
 """Of what is fed back, relative to the RMS of the state or output: near the linear model, but weights count from the first."""

@@ -46,7 +46,8 @@ class SteadyPrediction:
     stable
         bool[n], under constant force and frequency, by the eigenvalues of the slow flow, or of the disturbed vibration.
     branch
-        int[n], 0 for the response that begins at rest, 1 and on for detached ones.
+        int[n], 0 for the response that begins at rest, 1 and on for detached ones; or, where the first leaves what a model
+        knows, for the part that is reached from the other end of the band.
     range_use
         float[n], modal amplitude over the largest identified, or states over the largest in the training data; NaN where
         that is unknown.

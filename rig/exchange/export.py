@@ -27,6 +27,11 @@ def export_file(
     if item and not 1 <= item <= len(found):
         raise RecordingError(f"--item = {item}: {source} holds 1 to {len(found)}")
     chosen = [found[item - 1]] if item else found
+    loose = next((one for one in chosen if not one.rows), None)
+    if loose is not None and format_ != "mat":
+        raise RecordingError(
+            f"{source}: a {loose.kind} is matrices and no table, for which {format_} has no place; use mat"
+        )
     write_contents(chosen, output, format_)
     return chosen
 

@@ -13,6 +13,7 @@ from identification import (
     IdentificationError,
     LinearModes,
     NonlinearMode,
+    PnlssModel,
     Transient,
     pack_frequency_responses,
     unpack_frequency_responses,
@@ -21,6 +22,7 @@ from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
 from rig.exchange.backbone_table import backbone_from, backbone_parts
 from rig.exchange.contents import Contents, Labels, unit_of
+from rig.exchange.pnlss import pnlss_from, pnlss_parts
 from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
 from rig.exchange.time_data import TimeData
 
@@ -96,6 +98,7 @@ KINDS = (
     Kind("linear-modes", LinearModes, _linear_modes, LinearModes.from_arrays),
     Kind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays),
     Kind("time-data", TimeData, time_data_parts, time_data_from),
+    Kind("pnlss", PnlssModel, pnlss_parts, pnlss_from),
     Kind("sweep", Transient, transient_parts, transient_from),
 )
 

@@ -95,6 +95,7 @@ def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
         "frequency-response-matrix": (i.ResponseMatrixMapping, i.map_response_matrix),
         "multisine": (i.MultisineMapping, i.map_multisine),
         "backbone": (i.BackboneMapping, i.map_backbone),
+        "pnlss": (i.PnlssMapping, i.map_pnlss),
         "nonlinear-mode": (i.NonlinearModeMapping, i.map_nonlinear_mode),
     }
 

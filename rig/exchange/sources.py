@@ -14,6 +14,7 @@ from rig.exchange.time_data import TimeData
 from rig.measurements import backbone, bench_of_recording, frequency_responses, point_rows, response_matrices, sweeps
 from rig.models.files import load
 from rig.models.force_surface import MeasuredSurface
+from rig.models.pnlss import IdentifiedPnlss
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
@@ -51,6 +52,8 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     found = load(path)
     if isinstance(found, MeasuredSurface):
         return [found.responses]
+    if isinstance(found, IdentifiedPnlss):
+        return [found.model]
     if isinstance(found, ModalAnalysis):
         return [found.modes] if found.responses is None else [found.modes, found.responses]
     return [found]

@@ -38,7 +38,7 @@ def experiments(
     outputs: Sequence[str] | None = None,
     rate_hz: float | None = None,
     periods: Periods = "mean",
-    transient_periods: float = 1.0,
+    transient_periods: float | None = None,
     segment_periods: int = 30,
 ) -> tuple[Experiment, ...]:
     """The accepted points of a recording as training or test data, in the order of the plan.
@@ -62,7 +62,8 @@ def experiments(
     periods
         Of a multisine: the ``mean`` over its periods, or ``all`` of them.
     transient_periods
-        Of a multisine, put ahead.
+        Of a multisine, put ahead: as many as its plan waited for before it recorded, one at least, if not given. Fewer than
+        a vibration takes to decay cost accuracy.
     segment_periods
         Of a settled point, at most.
 
@@ -77,7 +78,7 @@ def experiments(
         raise RecordingError(f"{recording.path}: holds a {recording.kind}, wanted is a {' or a '.join(KINDS)}")
     if periods not in get_args(Periods):
         raise IdentificationError(f"periods: is '{periods}', allowed are {', '.join(get_args(Periods))}")
-    if transient_periods < 0.0 or not math.isfinite(transient_periods):
+    if transient_periods is not None and not 0.0 <= transient_periods < math.inf:
         raise IdentificationError(f"transient_periods: is {transient_periods:g}, needs zero or more")
     if segment_periods < FEWEST_PERIODS:
         raise IdentificationError(f"segment_periods: is {segment_periods}, needs {FEWEST_PERIODS} at least")
@@ -100,7 +101,7 @@ def experiments(
                 point_rows(recording, point["number"]),
                 rate_hz=rate_hz,
                 periods=periods,
-                transient_periods=transient_periods,
+                transient_periods=max(1, plan.transient_periods) if transient_periods is None else transient_periods,
                 name=f"{_called(stem, point)}, realisation {point['realisation']}",
             )
             for point in used

@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from identification import (
     Experiment,
     FitProgress,
@@ -29,6 +31,11 @@ from rig.recording.reader import Recording
 __all__ = ["identified_pnlss"]
 
 Progress = Callable[[FitProgress], None]
+
+_EVERY = 4
+"""One of so many settled points chooses the iterate."""
+_FEWEST_POINTS = 5
+"""Settled points of a recording from which on one of them does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +122,8 @@ def _data(paths: Sequence[Path], options: PnlssOptions, earlier: IdentifiedPnlss
     one_specimen(**{one.name: one.specimen for one in (*training, *validation)})
     if not validation:
         notes.append("no data to choose the iterate by: the last one is taken, however it does on other data")
+    if options.relative:
+        training, validation = list(_relative(training)), list(_relative(validation) if validation else ())
     return _Data(tuple(training), tuple(validation), tuple(notes))
 
 
@@ -129,14 +138,31 @@ def _common_rate_hz(paths: Sequence[Path]) -> float:
 
 
 def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment], list[Experiment]]:
-    """The last realisations of each level of a multisine apart from the others, of which one at least stays."""
-    levels: dict[float, list[Experiment]] = {}
+    """What chooses the iterate apart from the others: the last realisations of each level, and every fourth settled point.
+
+    One realisation stays. Without settled points an iterate would be taken that is good at the multisine's levels alone.
+    """
+    alike: dict[tuple[float, int], list[Experiment]] = {}
     for one in found:
         if one.period_samples:
-            levels.setdefault(one.level, []).append(one)
-    out = [one for alike in levels.values() for one in alike[max(1, len(alike) - count) :] if count]
+            alike.setdefault((one.level, one.period_samples), []).append(one)
+    out = [one for same in alike.values() for one in same[max(1, len(same) - count) :] if count]
+    settled = [one for one in found if not one.period_samples]
+    if count and len(settled) >= _FEWEST_POINTS:
+        out += settled[_EVERY // 2 : -1 : _EVERY]
     chosen = {id(one) for one in out}
     return [one for one in found if id(one) not in chosen], out
+
+
+def _relative(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """Weighted so that errors of all count relative to their own outputs, whatever the level: by the mean square ratio."""
+    power = np.array([np.mean(one.counted_outputs**2, axis=1) for one in experiments])
+    pooled = np.mean(power, axis=0)
+    pooled = np.where(pooled > 0.0, pooled, 1.0)
+    return tuple(
+        one.weighted(1.0 / max(float(np.mean(own / pooled)), 1e-12))
+        for one, own in zip(experiments, power, strict=True)
+    )
 
 
 def _with_errors(fit: PnlssFit, data: _Data, seconds: float) -> IdentifiedPnlss:

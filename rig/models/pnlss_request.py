@@ -38,7 +38,10 @@ class PnlssOptions:
     validation: tuple[Path, ...] = ()
     """Recordings on which the iterate is chosen."""
     hold_out: int | None = None
-    """Realisations of each level, the last ones, on which it is chosen instead; 1 if None."""
+    """Realisations of each level, the last ones, on which it is chosen instead, beside every fourth settled point; 1 if
+    None, nothing with 0."""
+    relative: bool | None = None
+    """Whether errors of all experiments count relative to their own outputs; else as they are, which large levels rule."""
     resume: Path | None = None
     """A file of an earlier fit of the same data, that goes on."""
 
@@ -94,4 +97,9 @@ class PnlssOptions:
         }
 
 
-_OPTION = {"rate_hz": "--rate", "output_polynomials": "--no-output-polynomials", "hold_out": "--hold-out"}
+_OPTION = {
+    "rate_hz": "--rate",
+    "output_polynomials": "--no-output-polynomials",
+    "hold_out": "--hold-out",
+    "relative": "--relative-errors",
+}

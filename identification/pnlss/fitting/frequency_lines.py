@@ -67,27 +67,26 @@ def _line_weights(settings: FitSettings, record: Record, sample_rate_hz: float) 
     return rows
 
 
-def transformed(record: Record, lines: Float, blocks: Iterable[tuple[Float, Float]]) -> Iterator[tuple[Float, Float]]:
-    """For each output the Jacobian float[2 n_used, n_columns] of its lines and rows float[2 n_used, n_own + n_outputs].
+def transformed(
+    record: Record, lines: Float, blocks: Iterable[tuple[Float, Float, Float]]
+) -> Iterator[tuple[Float, Float, Float]]:
+    """For each output the Jacobian float[2 n_used, n_columns] of its lines, rows float[2 n_used, n_own] and errors.
 
-    Periods are averaged first; real parts stand above imaginary ones, all weighted.
+    Errors are float[2 n_used, n_outputs]. Periods are averaged first; real parts stand above imaginary ones, all weighted.
     """
     periods = (len(record.u) - record.counted_from) // record.period
-    jacobian: Float | None = None
-    rows = np.zeros(0)
+    means: list[Float] = []
     at = 0
-    for filled, more in blocks:
-        if jacobian is None:
-            jacobian = np.zeros((len(filled), record.period, filled.shape[2]))
-            rows = np.zeros((record.period, more.shape[1]))
-        place = slice(at % record.period, at % record.period + len(more))
-        jacobian[:, place] += filled[:, : len(more)] / periods
-        rows[place] += more / periods
-        at += len(more)
-    if jacobian is None:
-        return
-    spectra = np.fft.rfft(rows, axis=0)
-    for mine, weight in zip(jacobian, lines, strict=True):
+    for block in blocks:
+        if not means:
+            means = [np.zeros((*part.shape[:-2], record.period, part.shape[-1])) for part in block]
+        n = block[0].shape[1]
+        place = slice(at % record.period, at % record.period + n)
+        for mean, part in zip(means, block, strict=True):
+            mean[..., place, :] += part / periods
+        at += n
+    rows, errors = (np.fft.rfft(mean, axis=0) for mean in means[1:])
+    for mine, weight in zip(means[0], lines, strict=True):
         used = np.flatnonzero(weight)
         by = weight[used, None]
         out = np.empty((2 * used.size, mine.shape[1]))
@@ -95,5 +94,8 @@ def transformed(record: Record, lines: Float, blocks: Iterable[tuple[Float, Floa
             part = np.fft.rfft(mine[:, begin : begin + _COLUMNS], axis=0)[used] * by
             out[: used.size, begin : begin + _COLUMNS] = part.real
             out[used.size :, begin : begin + _COLUMNS] = part.imag
-        kept = spectra[used] * by
-        yield out, np.concatenate([kept.real, kept.imag])
+        yield out, _stacked(rows[used] * by), _stacked(errors[used] * by)
+
+
+def _stacked(lines: NDArray[np.complex128]) -> Float:
+    return np.concatenate([lines.real, lines.imag])

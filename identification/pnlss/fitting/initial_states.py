@@ -27,10 +27,8 @@ def fitted_initial_state(system: System, record: Record, weights: Float, samples
     n, outputs = len(system.state), len(weights)
     first, end = record.counted_from, min(record.counted_from + samples, len(record.u))
     u, y = record.u[:end], record.y[:end]
-    jacobian, rows = (
-        np.zeros((outputs, end - first, n + _inner(system))),
-        np.zeros((end - first, system.output.shape[1] + outputs)),
-    )
+    jacobian = np.zeros((outputs, end - first, n + system.output_table.weights.size))
+    rows, errors = np.zeros((end - first, system.output.shape[1])), np.zeros((end - first, outputs))
 
     def error(x: Float) -> float:
         run = simulated(system, u, x)
@@ -46,13 +44,13 @@ def fitted_initial_state(system: System, record: Record, weights: Float, samples
         r = room(system, slopes, n)
         r.x[:] = x
         r.s[0] = np.eye(n)
-        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, False, r, jacobian, rows)
-        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, True, r, jacobian, rows)
+        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, 0, r, jacobian, rows, errors)
+        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, 1, r, jacobian, rows, errors)
         stacked = jacobian[:, :, :n].reshape(-1, n)
         if done < end or not np.all(np.isfinite(stacked)):
             break
         values, vectors = np.linalg.eigh(stacked.T @ stacked + PRIOR * np.eye(n))
-        along = vectors.T @ (stacked.T @ rows[:, -outputs:].T.ravel() + PRIOR * x)
+        along = vectors.T @ (stacked.T @ errors.T.ravel() + PRIOR * x)
         before = best
         while damping < 1e6:
             step = -vectors @ (along / (values + damping * values[-1]))
@@ -64,7 +62,3 @@ def fitted_initial_state(system: System, record: Record, weights: Float, samples
         if best > before * (1.0 - 1e-10):
             break
     return x
-
-
-def _inner(system: System) -> int:
-    return int(system.output_table.weights.size)

@@ -43,6 +43,14 @@ class Room(NamedTuple):
     """float[n_slopes], the monomials in derivatives."""
     effective: np.ndarray
     """float[(n_states + n_outputs) * n_states], ``A + E d phi / d x`` above ``C + F d chi / d x``."""
+    back: np.ndarray
+    """float[n_states], errors through the outputs."""
+    gradient: np.ndarray
+    """float[n_columns + n_output_weights], derivatives times errors, summed."""
+    own_gradient: np.ndarray
+    """float[n_outputs, n_output_columns], the same of [C D F]."""
+    row: np.ndarray
+    """float[n_output_weights], derivatives of an output by the weights in its features."""
     state_steep: np.ndarray
     output_steep: np.ndarray
 
@@ -57,6 +65,10 @@ def room(system: System, slopes: Slopes, columns: int) -> Room:
         np.zeros(system.output.shape[1]),
         np.zeros(len(slopes.coefficients)),
         np.zeros((n + outputs) * n),
+        np.zeros(n),
+        np.zeros(columns + system.output_table.weights.size),
+        np.zeros((outputs, system.output.shape[1])),
+        np.zeros(system.output_table.weights.size),
         np.zeros((system.state_table.weights.shape[0], 2)),
         np.zeros((system.output_table.weights.shape[0], 2)),
     )
@@ -129,18 +141,21 @@ def sensitivities(
     bound: float,
     weight: np.ndarray,
     linear: int,
-    counted: bool,
+    every: int,
     r: Room,
     jacobian: np.ndarray,
     rows: np.ndarray,
+    errors: np.ndarray,
 ) -> int:
     """Go through a block of inputs and measured outputs (float[n, n_inputs], float[n, n_outputs]), carrying ``r``.
 
     The columns of sensitivities are ``linear`` ones of [A B E] (row by row; 0 for none), then the weights of the saturating
-    state features (row by row), if linear is not 0, then whatever began as not zero: initial states. Where the block
-    counts, ``jacobian`` (float[n_outputs, n, n_columns + n_output_weights]) gets the derivatives of the weighted outputs,
-    those by the weights of saturating output features last, and ``rows`` (float[n, n_output_columns + n_outputs]) q and
-    the weighted errors, simulated less measured: the derivative of output l by its own [C D F] is ``weight[l] q``.
+    state features (row by row), if linear is not 0, then whatever began as not zero: initial states. ``every`` is 0 where
+    the block does not count. Else ``errors`` (float[n, n_outputs]) gets the weighted errors, simulated less measured,
+    ``r`` their products with all derivatives, and of each ``every``-th sample, the first one to begin with, ``jacobian``
+    (float[n_outputs, n / every, n_columns + n_output_weights]) gets the derivatives of the weighted outputs, those by the
+    weights of saturating output features last, and ``rows`` (float[n / every, n_output_columns]) q: the derivative of
+    output l by its own [C D F] is ``weight[l] q``.
 
     Returns n, or the sample at which a state is beyond ``bound`` or not a number.
     """
@@ -162,19 +177,35 @@ def sensitivities(
         feature_values(system.state_table, v, r.z[variables:])
         feature_values(system.output_table, v, r.q[variables:])
         effective_matrices(system, slopes, v, r)
-        if counted:
+        if every > 0:
+            for i in range(n):
+                r.back[i] = 0.0
             for o in range(outputs):
-                total = 0.0
+                total = -y[k, o]
                 for j in range(own):
                     total += system.output[o, j] * r.q[j]
-                rows[k, own + o] = weight[o] * (total - y[k, o])
+                error = weight[o] * total
+                errors[k, o] = error
+                for j in range(own):
+                    r.own_gradient[o, j] += weight[o] * error * r.q[j]
+                _output_weights(system, o, v, weight[o], r.output_steep, r.row)
+                for c in range(r.row.size):
+                    r.gradient[columns + c] += error * r.row[c]
                 at = (n + o) * n
                 for i in range(n):
                     r.effective[at + i] *= weight[o]
-                combine_rows(r.effective[at : at + n], r.s[here], jacobian[o, k])
-                _output_weights(system, o, v, weight[o], r.output_steep, columns, jacobian[o, k])
-            for j in range(own):
-                rows[k, j] = r.q[j]
+                    r.back[i] += error * r.effective[at + i]
+                if k % every == 0:
+                    combine_rows(r.effective[at : at + n], r.s[here], jacobian[o, k // every])
+                    for c in range(r.row.size):
+                        jacobian[o, k // every, columns + c] = r.row[c]
+            for i in range(n):
+                back = r.back[i]
+                for c in range(columns):
+                    r.gradient[c] += back * r.s[here, i, c]
+            if k % every == 0:
+                for j in range(own):
+                    rows[k // every, j] = r.q[j]
         after = r.s[1 - here]
         for i in range(n):
             combine_rows(r.effective[i * n : (i + 1) * n], r.s[here], after[i])
@@ -201,9 +232,8 @@ def sensitivities(
 
 
 @kernel
-def _output_weights(
-    system: System, o: int, v: np.ndarray, weight: float, steep: np.ndarray, begin: int, row: np.ndarray
-) -> None:
+def _output_weights(system: System, o: int, v: np.ndarray, weight: float, steep: np.ndarray, row: np.ndarray) -> None:
+    begin = 0
     monomials = system.output_table.factors.shape[0]
     for f in range(system.output_table.weights.shape[0]):
         factor = weight * system.output[o, v.size + monomials + f]

@@ -18,13 +18,11 @@ from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import BOUND, Record
 from identification.pnlss.fitting.slopes import slopes_of
 
-__all__ = ["NormalEquations", "blocks", "jacobian", "normal_equations"]
+__all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "normal_equations"]
 
 Float = NDArray[np.float64]
-Blocks = Iterator[tuple[Float, Float]]
-
-BLOCK = 512
-"""Samples of a block: its Jacobian stays in the cache between the recursion and the products."""
+BLOCK = 256
+"""Samples of a block whose derivatives are kept: its Jacobian stays in the cache between the recursion and the products."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,39 +33,58 @@ class NormalEquations:
     gradient: Float
 
 
-def blocks(
-    parameters: Parameters, system: System, record: Record, initial_state: Float, weights: Float, size: int = BLOCK
-) -> Blocks:
-    """Jacobian float[n_outputs, n, n_columns] and rows float[n, n_own + n_outputs] of the counted samples, block by block.
+class Blocks:
+    """Goes through an experiment block by block.
 
-    The arrays are used again for the next block. Ends early, with NaN, where the run leaves all bounds.
+    Iterating gives the Jacobian float[n_outputs, n, n_columns], rows float[n, n_own] and weighted errors
+    float[n_errors, n_outputs] of counted samples, n of them each ``every``-th and errors of all; the arrays are used again.
+    After that the products of derivatives and errors are there. Ends early, with NaN, where the run leaves all bounds.
     """
-    n, outputs = system.state.shape[0], len(weights)
-    recursion = parameters.ends[1] + (0 if record.place is None else n)
-    inner = parameters.ends[2] - parameters.ends[1]
-    slopes = slopes_of(system)
-    r = room(system, slopes, recursion)
-    r.x[:] = initial_state
-    if record.place is not None:
-        r.s[0, :, parameters.ends[1] :] = np.eye(n)
-    filled = np.zeros((outputs, size, recursion + inner))
-    rows = np.zeros((size, system.output.shape[1] + outputs))
-    edges = [*range(0, record.counted_from, size), *_period_edges(record, size), len(record.u)]
-    for begin, end in pairwise(edges):
-        counted = begin >= record.counted_from
-        if end - begin != filled.shape[1] and counted:
-            filled, rows = np.zeros((outputs, end - begin, filled.shape[2])), np.zeros((end - begin, rows.shape[1]))
-        u, y = record.u[begin:end], record.y[begin:end]
-        done = sensitivities(system, slopes, u, y, BOUND, weights, parameters.linear, counted, r, filled, rows)
-        if done < end - begin:
-            filled[:] = np.nan
-            yield filled, rows
-            return
-        if counted:
-            yield filled, rows
+
+    def __init__(
+        self, parameters: Parameters, system: System, record: Record, begin: Float, weights: Float, every: int = 1
+    ) -> None:
+        n = system.state.shape[0]
+        self._system, self._record, self._weights, self._every = system, record, weights, every
+        self._linear, self._slopes = parameters.linear, slopes_of(system)
+        self._room = room(system, self._slopes, parameters.ends[1] + (0 if record.place is None else n))
+        self._room.x[:] = begin
+        if record.place is not None:
+            self._room.s[0, :, parameters.ends[1] :] = np.eye(n)
+
+    @property
+    def gradient(self) -> Float:
+        """float[n_columns], of the parameters that outputs share."""
+        return self._room.gradient
+
+    @property
+    def own_gradient(self) -> Float:
+        """float[n_outputs, n_own]."""
+        return self._room.own_gradient
+
+    def __iter__(self) -> Iterator[tuple[Float, Float, Float]]:
+        """The blocks, once."""
+        record, every, outputs = self._record, self._every, len(self._weights)
+        edges = [*range(0, record.counted_from, BLOCK * every), *_edges(record, BLOCK * every), len(record.u)]
+        columns, own = self.gradient.size, self.own_gradient.shape[1]
+        kept = np.zeros((outputs, 0, columns)), np.zeros((0, own)), np.zeros((0, outputs))
+        for begin, end in pairwise(edges):
+            counted = begin >= record.counted_from
+            if counted and end - begin != len(kept[2]):
+                n = -(-(end - begin) // every)
+                kept = np.zeros((outputs, n, columns)), np.zeros((n, own)), np.zeros((end - begin, outputs))
+            u, y = record.u[begin:end], record.y[begin:end]
+            how = (BOUND, self._weights, self._linear, every if counted else 0)
+            if sensitivities(self._system, self._slopes, u, y, *how, self._room, *kept) < end - begin:
+                kept[0][:] = np.nan
+                self.gradient[:] = np.nan
+                yield kept
+                return
+            if counted:
+                yield kept
 
 
-def _period_edges(record: Record, size: int) -> Iterator[int]:
+def _edges(record: Record, size: int) -> Iterator[int]:
     """Where blocks of counted samples begin; none goes on into the next period."""
     period = record.period or len(record.u)
     for begin in range(record.counted_from, len(record.u), period):
@@ -75,33 +92,41 @@ def _period_edges(record: Record, size: int) -> Iterator[int]:
 
 
 class _Sums:
-    """Products of the blocks of one experiment."""
+    """Products of the blocks of one experiment; of symmetric ones the upper half counts."""
 
     def __init__(self, columns: int, own: int, outputs: int) -> None:
         self.shared = np.zeros((columns, columns), order="F")
-        self.mixed = [np.zeros((columns, own + outputs), order="F") for _ in range(outputs)]
-        self.rows = np.zeros((own + outputs, own + outputs), order="F")
-        self.rows_of = [self.rows] * outputs
+        self.mixed = [np.zeros((columns, own), order="F") for _ in range(outputs)]
+        self.own = [np.zeros((own, own), order="F")] * outputs
+        self.gradient = np.zeros(columns)
+        self.own_gradient = np.zeros((outputs, own))
 
-    def add(self, filled: Float, rows: Float) -> None:
-        """One block in time: rows are the same for all outputs."""
-        flat = filled.reshape(-1, filled.shape[2]).T
-        dsyrk(1.0, flat, beta=1.0, c=self.shared, overwrite_c=1)
-        for mine, into in zip(filled, self.mixed, strict=True):
-            dgemm(1.0, mine.T, rows.T, beta=1.0, c=into, trans_b=1, overwrite_c=1)
-        dsyrk(1.0, rows.T, beta=1.0, c=self.rows, overwrite_c=1)
+    def add(self, blocks: Blocks, every: int) -> None:
+        """All blocks in time, where rows are the same for all outputs."""
+        for jacobian, rows, _ in blocks:
+            dsyrk(every, jacobian.reshape(-1, jacobian.shape[2]).T, beta=1.0, c=self.shared, overwrite_c=1)
+            for mine, into in zip(jacobian, self.mixed, strict=True):
+                dgemm(every, mine.T, rows.T, beta=1.0, c=into, trans_b=1, overwrite_c=1)
+            dsyrk(every, rows.T, beta=1.0, c=self.own[0], overwrite_c=1)
+        self.gradient, self.own_gradient = blocks.gradient, blocks.own_gradient
 
-    def set_lines(self, output: int, lines: Float, rows: Float) -> None:
-        """All frequency lines of one output, real parts above imaginary ones."""
-        self.shared += np.triu(lines.T @ lines)
-        self.mixed[output] = lines.T @ rows
-        self.rows_of[output] = np.triu(rows.T @ rows)
+    def add_lines(self, record: Record, lines: Float, blocks: Blocks, weights: Float) -> None:
+        """All frequency lines."""
+        for output, (jacobian, rows, errors) in enumerate(transformed(record, lines, blocks)):
+            self.shared += jacobian.T @ jacobian
+            self.mixed[output] = jacobian.T @ rows
+            self.own[output] = rows.T @ rows
+            self.gradient += jacobian.T @ errors[:, output]
+            self.own_gradient[output] = weights[output] * rows.T @ errors[:, output]
 
 
-def normal_equations(parameters: Parameters, vector: Float, records: list[Record], weights: Float) -> NormalEquations:
+def normal_equations(
+    parameters: Parameters, vector: Float, records: list[Record], weights: Float, every: int = 1
+) -> NormalEquations:
     """Of all experiments at ``vector``, errors weighted by output (float[n_outputs]) and as each record says.
 
-    Not finite where a run leaves all bounds.
+    The gradient is that of all samples; the Hessian that of each ``every``-th, except for errors by frequency line. Not finite
+    where a run leaves all bounds.
     """
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     hessian, gradient = np.zeros((parameters.count, parameters.count)), np.zeros(parameters.count)
@@ -110,13 +135,10 @@ def normal_equations(parameters: Parameters, vector: Float, records: list[Record
         begin = np.zeros(system.state.shape[0]) if record.place is None else begins[record.place]
         places = parameters.columns(record.place)
         sums = _Sums(len(places), own, outputs)
-        parts = blocks(parameters, system, record, begin, weights)
         if record.lines is None:
-            for filled, rows in parts:
-                sums.add(filled, rows)
+            sums.add(Blocks(parameters, system, record, begin, weights, every), every)
         else:
-            for output, (lines, rows) in enumerate(transformed(record, record.lines, parts)):
-                sums.set_lines(output, lines, rows)
+            sums.add_lines(record, record.lines, Blocks(parameters, system, record, begin, weights), weights)
         _scatter(parameters, record.weight, places, weights, sums, hessian, gradient)
     return NormalEquations(hessian, gradient)
 
@@ -131,31 +153,32 @@ def _scatter(
     gradient: Float,
 ) -> None:
     """Put the products of an experiment where its parameters stand."""
-    shared = np.triu(sums.shared)
-    hessian[np.ix_(places, places)] += weight * (shared + np.triu(shared, 1).T)
-    own = parameters.own(0).stop - parameters.own(0).start
-    for output, (mixed, by, upper) in enumerate(zip(sums.mixed, weights, sums.rows_of, strict=True)):
+    hessian[np.ix_(places, places)] += weight * _whole(sums.shared)
+    gradient[places] += weight * sums.gradient
+    for output, (mixed, by, own) in enumerate(zip(sums.mixed, weights, sums.own, strict=True)):
         mine = parameters.own(output)
-        rows = np.triu(upper)[:own, :own]
-        cross = weight * by * mixed[:, :own]
-        hessian[places, mine] += cross
-        hessian[mine, places] += cross.T
-        hessian[mine, mine] += weight * by**2 * (rows + np.triu(rows, 1).T)
-        gradient[places] += weight * mixed[:, own + output]
-        gradient[mine] += weight * by * upper[:own, own + output]
+        hessian[places, mine] += weight * by * mixed
+        hessian[mine, places] += weight * by * mixed.T
+        hessian[mine, mine] += weight * by**2 * _whole(own)
+        gradient[mine] += weight * sums.own_gradient[output]
+
+
+def _whole(upper: Float) -> Float:
+    """A symmetric matrix from its upper half."""
+    return np.asarray(np.triu(upper) + np.triu(upper, 1).T)
 
 
 def jacobian(parameters: Parameters, vector: Float, record: Record, weights: Float) -> Float:
     """float[n_outputs, counted, n_parameters] of one experiment in time, all columns: for small problems and checks."""
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     begin = np.zeros(system.state.shape[0]) if record.place is None else begins[record.place]
-    places, own = parameters.columns(record.place), system.output.shape[1]
+    places = parameters.columns(record.place)
     whole = np.zeros((len(weights), len(record.u) - record.counted_from, parameters.count))
     at = 0
-    for filled, rows in blocks(parameters, system, record, begin, weights):
+    for filled, rows, _ in Blocks(parameters, system, record, begin, weights):
         part = whole[:, at : at + len(rows)]
         part[:, :, places] = filled
         for output, by in enumerate(weights):
-            part[output, :, parameters.own(output)] = by * rows[:, :own]
+            part[output, :, parameters.own(output)] = by * rows
         at += len(rows)
     return whole

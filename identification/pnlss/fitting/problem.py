@@ -120,6 +120,6 @@ class Problem:
 
     def equations(self, vector: Float) -> NormalEquations:
         """Normal equations of half of `cost`; initial states that outputs do not tell of are held back."""
-        found = normal_equations(self.parameters, vector, self.training, self.weights)
+        found = normal_equations(self.parameters, vector, self.training, self.weights, self.settings.every)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
         return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)

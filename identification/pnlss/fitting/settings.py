@@ -35,6 +35,9 @@ class FitSettings:
     line_weights
         Rows of a frequency in Hz and the weight of errors there, one for all outputs or one for each; linear in between and 0
         beyond. Needs periodic experiments.
+    every
+        The Hessian of a step is from each ``every``-th sample. Its gradient is always from all, so that a fit ends at the same
+        parameters; but neighbouring samples of finely sampled records tell nearly the same, and steps take less time.
     damping
         Of the first step, relative to the largest eigenvalue of the scaled normal equations.
     truncation
@@ -54,6 +57,7 @@ class FitSettings:
     ridge: float = 0.0
     band_hz: tuple[float, float] | None = None
     line_weights: tuple[tuple[float, ...], ...] = ()
+    every: int = 1
     damping: float = 1e-3
     truncation: float = 1e-13
 
@@ -65,6 +69,7 @@ class FitSettings:
             ("tolerance", "0 and above, below 1", 0.0 <= self.tolerance < 1.0),
             ("outputs", ", ".join(get_args(OutputWeighting)), self.outputs in get_args(OutputWeighting)),
             ("ridge", "0 and above, finite", 0.0 <= self.ridge < float("inf")),
+            ("every", "1 and above", self.every >= 1),
             ("damping", "above 0, finite", 0.0 < self.damping < float("inf")),
             ("truncation", "0 and above, below 1", 0.0 <= self.truncation < 1.0),
         ):

@@ -1,4 +1,4 @@
-"""What drives a model periodically: a sine, a voltage that holds the force among its outputs, an exciter that it is coupled to.
+"""What drives a model periodically: a sine, or a voltage that holds the force among its outputs; see `coupled` for exciters.
 
 Each knows the inputs' Fourier coefficients as linear functions of unknowns of its own and of the level (1 is what was asked
 for), and the equations that these unknowns obey. The coefficients are real, ordered as in `identification.pnlss.steady.basis`.
@@ -10,16 +10,10 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.steady.basis import complex_product
-from identification.prediction.exciter import Exciter
-
-__all__ = ["Coupled", "Drive", "Equations", "HeldOutput", "Sine"]
+__all__ = ["Drive", "Equations", "HeldOutput", "Sine", "level_reached", "peak_of_level"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
-
-_NUDGE = 1e-5
-"""Relative step of the exciter's derivatives by frequency, which are smooth: they are right to ten digits."""
 
 
 class Equations(NamedTuple):
@@ -109,115 +103,26 @@ class HeldOutput:
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
         """``|F_1|^2 = (level F)^2``, or the mean square."""
-        residual, slope = _level_reached(outputs[:, self.output], self.held, self.force_n, level)
+        residual, slope = level_reached(outputs[:, self.output], self.held, self.force_n, level)
         by_outputs = np.zeros((1, *outputs.shape))
         by_outputs[0, :, self.output] = slope
         return Equations(np.array([residual]), np.zeros((1, 1)), by_outputs, np.zeros(1), np.array([-2.0 * level]))
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
         """Force over force per volt."""
-        return np.array([_peak(self.force_n, self.held) / np.abs(response[self.output])])
+        return np.array([peak_of_level(self.force_n, self.held) / np.abs(response[self.output])])
 
     def voltage(self, own: Float) -> complex:
         """The unknown."""
         return complex(own[0])
 
 
-@dataclass(frozen=True)
-class Coupled:
-    """An exciter whose sine of voltage makes the force at one input, with the reaction of the drive point's motion.
-
-    Unknowns are the force's coefficients without a static one, then those of the voltage. The force's fundamental is the
-    reference of the phase; where the voltage is held, the voltage is.
-    """
-
-    exciter: Exciter
-    amplitude: float
-    held: Literal["fundamental", "rms", "voltage"]
-    output: int
-    order: int
-    """How many times the drive point's displacement was differentiated in that output."""
-    row: int
-    n_inputs: int
-    coefficients: int
-
-    @property
-    def size(self) -> int:
-        """Harmonics of the force and the voltage."""
-        return self.coefficients + 1
-
-    def inputs(self, coefficients: int) -> tuple[Float, Float]:
-        """The force's coefficients."""
-        slope = np.zeros((coefficients, self.n_inputs, self.size))
-        slope[1:, self.row, : coefficients - 1] = np.eye(coefficients - 1)
-        return np.zeros((coefficients, self.n_inputs)), slope
-
-    def _factors(self, frequency_hz: float) -> tuple[complex, Complex]:
-        """Force per volt, and complex[H] force per drive output at each harmonic."""
-        h = np.arange(1, self.coefficients // 2 + 1)
-        to_acceleration = (2j * np.pi * frequency_hz * h) ** (2 - self.order)
-        per_motion = self.exciter.force(0.0, 1.0, h * frequency_hz) * to_acceleration
-        return complex(self.exciter.force(1.0, 0.0, frequency_hz)), np.asarray(per_motion)
-
-    def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """``F_h = g V delta_h1 + r_h Y_h`` for each harmonic, then what is held, and the phase's reference."""
-        count = self.coefficients - 1
-        by_own, by_outputs = np.zeros((self.size, self.size)), np.zeros((self.size, *outputs.shape))
-        by_frequency, by_level = np.zeros(self.size), np.zeros(self.size)
-        residual = np.empty(self.size)
-
-        def made(at_hz: float) -> tuple[Float, Float, Float]:
-            per_volt, per_motion = self._factors(at_hz)
-            volt, motion = complex_product(np.array(per_volt)), complex_product(per_motion)
-            force = np.einsum("hij,hj->hi", motion, outputs[1:, self.output].reshape(-1, 2)).ravel()
-            force[:2] += volt @ own[count:]
-            return force, volt, motion
-
-        force, volt, motion = made(frequency_hz)
-        residual[:count] = (own[:count] - force) / self.amplitude
-        by_own[:count, :count] = np.eye(count) / self.amplitude
-        by_own[:2, count:] = -volt / self.amplitude
-        for h in range(count // 2):
-            by_outputs[2 * h : 2 * h + 2, 2 * h + 1 : 2 * h + 3, self.output] = -motion[h] / self.amplitude
-        nudge = _NUDGE * frequency_hz
-        change = made(frequency_hz + nudge)[0] - made(frequency_hz - nudge)[0]
-        by_frequency[:count] = -change / (2.0 * nudge * self.amplitude)
-        if self.held == "voltage":
-            residual[count:] = [own[count] / self.amplitude - level, own[count + 1] / self.amplitude]
-            by_own[count:, count:] = np.eye(2) / self.amplitude
-            by_level[count] = -1.0
-        else:
-            with_static = np.concatenate([[0.0], own[:count]])
-            residual[count], slope = _level_reached(with_static, self.held, self.amplitude, level)
-            residual[count + 1] = own[1] / self.amplitude
-            by_own[count, :count], by_own[count + 1, 1] = slope[1:], 1.0 / self.amplitude
-            by_level[count] = -2.0 * level
-        return Equations(residual, by_own, by_outputs, by_frequency, by_level)
-
-    def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """A force without harmonics, and the voltage that it needs."""
-        per_volt, per_motion = self._factors(frequency_hz)
-        of_force = (1.0 - per_motion[0] * response[self.output]) / per_volt
-        if self.held == "voltage":
-            voltage, force = complex(self.amplitude), self.amplitude / of_force
-        else:
-            force = complex(_peak(self.amplitude, self.held))
-            voltage = of_force * force
-        own = np.zeros(self.size)
-        own[:2], own[-2:] = [force.real, -force.imag], [voltage.real, -voltage.imag]
-        return own
-
-    def voltage(self, own: Float) -> complex:
-        """The last two unknowns."""
-        return complex(own[-2], -own[-1])
-
-
-def _peak(force_n: float, held: str) -> float:
+def peak_of_level(force_n: float, held: str) -> float:
     """Peak of a sine that has the level."""
     return force_n * (np.sqrt(2.0) if held == "rms" else 1.0)
 
 
-def _level_reached(force: Float, held: str, force_n: float, level: float) -> tuple[float, Float]:
+def level_reached(force: Float, held: str, force_n: float, level: float) -> tuple[float, Float]:
     """``|F_1|^2``, or the mean square of a force's harmonics, over that asked for, minus level^2; by its coefficients."""
     weight = np.zeros(force.size)
     if held == "rms":

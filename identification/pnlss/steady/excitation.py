@@ -7,7 +7,8 @@ import numpy as np
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.steady.drives import Coupled, Drive, HeldOutput, Sine
+from identification.pnlss.steady.coupled import Coupled
+from identification.pnlss.steady.drives import Drive, HeldOutput, Sine
 from identification.pnlss.steady.states import motion_rows
 from identification.prediction.exciter import Exciter
 from identification.validation import positive

@@ -9,7 +9,7 @@ from identification.continuation import Path, Steps, continued, solved
 from identification.errors import IdentificationError
 from identification.pnlss.steady.balance import Balance
 
-__all__ = ["Followed", "followed", "from_rest", "sizes", "statically_stable"]
+__all__ = ["Followed", "followed", "from_rest", "polished", "sizes", "statically_stable"]
 
 Float = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ _FIRST_LEVEL = 0.02
 _LEVELS = Steps(first=0.1, largest=0.5)
 _MOST_LEVELS = 300
 _BAND_UNITS = 4.0
-"""Lengths in a band: with the longest step of 0.1 a band takes 40 points, and a resonance in it many more."""
+"""Lengths in a band: with the longest step of 0.05 a band takes 80 points, and a resonance in it many more."""
 
 
 class Followed(NamedTuple):

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.steady.balance import Balance, samples_for
-from identification.pnlss.steady.basis import Basis, real_coefficients
-from identification.pnlss.steady.excitation import Held, drive_of, linear_resonance_hz
+from identification.pnlss.steady.balance import Balance
+from identification.pnlss.steady.excitation import Held
 from identification.pnlss.steady.notes import notes_of
 from identification.pnlss.steady.paths import Followed, followed, from_rest, polished, statically_stable
+from identification.pnlss.steady.setting_up import balance_of, band_of, harmonics_that_fit, unknowns_near
 from identification.pnlss.steady.states import SteadyStates, steady_states
 from identification.prediction.exciter import Exciter
 from identification.prediction.steady_prediction import SteadyPrediction
@@ -21,8 +21,7 @@ __all__ = ["PnlssResponse", "pnlss_frequency_response", "pnlss_response", "pnlss
 
 Float = NDArray[np.float64]
 
-_BAND = (0.85, 1.15)
-_STEP = 0.1
+_STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -143,9 +142,9 @@ def pnlss_response(
         On a model, exciter and force that do not go together, a band that is none, too few samples; and if no periodic
         vibration is found at either end of the band.
     """
-    low, high = _band(model, lowest_hz, highest_hz)
-    held, more = _fitting(model, harmonics, high)
-    balance = _balance(model, force_n, force, exciter, held, samples)
+    low, high = band_of(model, lowest_hz, highest_hz)
+    held, more = harmonics_that_fit(model, harmonics, high)
+    balance = balance_of(model, force_n, force, exciter, held, samples)
     allowed = positive("largest_range_use", largest_range_use)
     if points < 2:
         raise IdentificationError(f"points: is {points}, needs at least 2")
@@ -173,7 +172,7 @@ def pnlss_response(
         points=every,
         folds=folds[0] if len(folds) == 1 else folds[0].joined(folds[1]),
         branch=np.repeat(np.arange(len(states)), [each.count for each in states]),
-        notes=(*notes_of(model, every, force, exciter), *more),
+        notes=(*notes_of(model, every, force, exciter), *more, *_at_the_edge(every, low, high)),
     )
 
 
@@ -195,79 +194,27 @@ def pnlss_steady_state(
     range. Raises `IdentificationError` if it finds none.
     """
     at_hz = positive("frequency_hz", frequency_hz, "Hz")
-    held, _ = _fitting(model, harmonics, at_hz)
-    balance = _balance(model, force_n, force, exciter, held, samples)
+    held, _ = harmonics_that_fit(model, harmonics, at_hz)
+    balance = balance_of(model, force_n, force, exciter, held, samples)
     if near is None:
         z = from_rest(balance, at_hz, largest_range_use)
     else:
-        z = polished(balance, _unknowns(balance, near), at_hz)
+        z = polished(balance, unknowns_near(balance, near), at_hz)
     if z is None:
         raise IdentificationError(f"frequency_hz: no periodic vibration was found at {at_hz:g} Hz and {force_n:g}")
     stable = np.array([statically_stable(balance, z, at_hz)])
     return steady_states(balance, z[None], np.array([at_hz]), stable)
 
 
-def _balance(
-    model: PnlssModel, level: float, force: Held, exciter: Exciter | None, harmonics: int, samples: int | None
-) -> Balance:
-    least = 2 * harmonics + 1
-    count = samples_for(model, harmonics) if samples is None else samples
-    if count < least:
-        raise IdentificationError(f"samples: is {count}, needs at least {least} for {harmonics} harmonics")
-    basis = Basis(harmonics, count)
-    return Balance(model, drive_of(model, level, force, exciter, basis.size), basis)
-
-
-def _band(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None) -> tuple[float, float]:
-    if lowest_hz is None or highest_hz is None:
-        resonance = linear_resonance_hz(model)
-        lowest_hz = _BAND[0] * resonance if lowest_hz is None else lowest_hz
-        highest_hz = _BAND[1] * resonance if highest_hz is None else highest_hz
-    half = 0.5 * model.sample_rate_hz
-    if not 0.0 < lowest_hz < highest_hz < half:
-        raise IdentificationError(
-            f"lowest_hz, highest_hz: are {lowest_hz:g} and {highest_hz:g} Hz, need to rise between 0 and {half:g} Hz"
-        )
-    return float(lowest_hz), float(highest_hz)
-
-
-def _fitting(model: PnlssModel, harmonics: int, highest_hz: float) -> tuple[int, list[str]]:
-    """Harmonics that the sample rate has room for, with a note where they are fewer than asked for."""
-    if harmonics < 1:
-        raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
-    room = int(np.ceil(0.5 * model.sample_rate_hz / highest_hz)) - 1
-    if room < 1:
-        raise IdentificationError(
-            f"frequency_hz: {highest_hz:g} Hz is not below half the model's {model.sample_rate_hz:g} Hz"
-        )
-    if room >= harmonics:
-        return harmonics, []
-    return room, [
-        f"{room} harmonics, for which the model's {model.sample_rate_hz:g} Hz has room at {highest_hz:.4g} Hz"
-    ]
-
-
-def _unknowns(balance: Balance, near: SteadyStates) -> Float:
-    """Unknowns of the first point of other steady states, as far as their harmonics go."""
-    size = balance.basis.size
-
-    def fitted(harmonics: NDArray[np.complex128]) -> Float:
-        given = real_coefficients(harmonics)[:size]
-        return np.concatenate([given, np.zeros((size - len(given), given.shape[1]))])
-
-    states, inputs, voltage = fitted(near.states[0]), fitted(near.inputs[0]), complex(near.voltage_v[0])
-    own = np.zeros(balance.drive.size)
-    if own.size == 1:
-        own[0] = voltage.real
-    elif own.size:
-        row = next(row for row, channel in enumerate(balance.model.inputs) if channel.role == "force")
-        own[:] = [*inputs[1:, row], voltage.real, -voltage.imag]
-    return np.concatenate([states.ravel(), own])
-
-
 def _along(balance: Balance, found: Followed) -> SteadyStates:
     path = found.path
     return steady_states(balance, path.unknowns, path.parameter, path.direction * path.direction[0] > 0.0)
+
+
+def _at_the_edge(points: SteadyStates, low: float, high: float) -> list[str]:
+    """Whether the band misses the resonance."""
+    at_hz = points.frequency_hz[int(np.argmax(np.abs(points.displacement_m[:, 1, 0])))]
+    return ["the largest amplitude is at an end of the band: widen it"] if at_hz in (low, high) else []
 
 
 def _turns(balance: Balance, found: Followed) -> SteadyStates:

@@ -145,3 +145,27 @@ def test_what_cannot_be_is_named() -> None:
         identify_pnlss(experiments, states=4, linear=oscillator())
     with pytest.raises(IdentificationError, match="linear: has an eigenvalue of magnitude 2"):
         identify_pnlss(experiments, states=2, linear=oscillator()._replace(a=2.0 * np.eye(2)))
+
+
+def test_a_constant_input_makes_up_for_offsets_that_nobody_knows() -> None:
+    exact = hardening()
+    plain = [measured(exact, multisine(seed)) for seed in range(3)]
+    offset = [replace(e, inputs=e.inputs + 0.3, outputs=e.outputs - 0.2) for e in plain]
+    *training, test = [e.with_constant_input() for e in offset]
+    found = identify_pnlss(training, states=2, settings=FitSettings(iterations=30))
+    assert found.model.state_features.count == 16  # the constant is in no monomial
+    assert pnlss_errors(found.model, [test]).overall[0] < 1e-3
+    without = identify_pnlss(offset[:2], states=2, settings=FitSettings(iterations=30))
+    assert pnlss_errors(without.model, offset[2:]).overall[0] > 0.01
+
+
+def test_averaged_periods_stand_for_all_of_them() -> None:
+    record = measured(hardening(), multisine(0), periods=4, noise=0.1)
+    mean = record.averaged(transient_samples=500)
+    assert (mean.counted_from, mean.counted, mean.period_samples) == (500, 1024, 1024)
+    clean = measured(hardening(), multisine(0)).counted_outputs
+    ratio = np.std(mean.counted_outputs - clean) / np.std(record.counted_outputs[:, :1024] - clean)
+    assert ratio == pytest.approx(0.5, abs=0.05)
+    np.testing.assert_array_equal(mean.inputs[:, :500], mean.counted_inputs[:, -500:])
+    with pytest.raises(IdentificationError, match="is not periodic, so that there are no periods to average"):
+        replace(record, period_samples=0).averaged()

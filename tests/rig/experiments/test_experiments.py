@@ -55,10 +55,11 @@ def test_a_period_of_a_multisine_has_the_lines_that_its_spectra_have(multisine):
     assert [one.name[-13:] for one in made] == ["realisation 0", "realisation 1"]
     for one, lines in zip(made, measured.mean, strict=True):
         assert one.sample_rate_hz == 800.0
-        assert (one.counted, one.counted_from, one.period_samples) == (1600, 1600, 1600)
+        assert (one.counted, one.counted_from, one.period_samples) == (1600, 3200, 1600)  # two periods of transient
         found = np.fft.rfft(np.vstack([one.counted_inputs, one.counted_outputs]))[:, 30:71] / 800.0
         np.testing.assert_allclose(found, lines[:-1], atol=1e-9 * np.abs(lines).max())
-        assert np.array_equal(one.inputs[:, :1600], one.counted_inputs)  # the period before is the same period
+        assert np.array_equal(one.inputs[:, :1600], one.counted_inputs)  # those before are the same period
+        assert np.array_equal(one.inputs[:, 1600:3200], one.counted_inputs)
         assert np.abs(one.counted_outputs.mean(axis=1)).max() < 1e-12
 
 

@@ -86,6 +86,17 @@ def test_normal_equations_are_products_of_the_jacobian_whatever_the_block() -> N
     np.testing.assert_allclose(found.gradient, gradient, rtol=0.0, atol=1e-12 * np.max(np.abs(gradient)))
 
 
+def test_each_third_sample_makes_the_hessian_and_all_make_the_gradient() -> None:
+    system = nonlinear_system(2, 1, 2, saturating=1)
+    records = records_of([replace(experiment(system, 500, noise=0.1), counted_from=31)], np.ones(1), np.ones(2))
+    parameters, weights = Parameters(system), np.array([1.0, 2.0])
+    vector = parameters.vector(system, np.zeros((0, 2)))
+    rows = jacobian(parameters, vector, records[0], weights)[:, ::3].reshape(-1, parameters.count)
+    whole, thinned = (normal_equations(parameters, vector, records, weights, every) for every in (1, 3))
+    np.testing.assert_allclose(thinned.hessian, 3.0 * rows.T @ rows, rtol=0.0, atol=1e-12 * np.max(whole.hessian))
+    np.testing.assert_array_equal(thinned.gradient, whole.gradient)
+
+
 def test_lines_of_all_frequencies_make_the_same_normal_equations_as_samples() -> None:
     system = nonlinear_system(2, 1, 2)
     weights, rate_hz = np.array([1.0, 0.5]), system.sample_rate_hz

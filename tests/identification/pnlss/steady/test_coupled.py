@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification import IdentificationError, pnlss_frequency_response, pnlss_response, pnlss_steady_state
+from identification import Exciter, IdentificationError, pnlss_frequency_response, pnlss_response, pnlss_steady_state
 from tests.identification.pnlss.steady.oscillators import (
     RATE_HZ,
     after_disturbance,
@@ -48,6 +48,33 @@ def test_a_voltage_driven_model_is_the_model_with_its_exciter() -> None:
         reaction[:, 1] += 4.0 * found.points.voltage_v
         np.testing.assert_allclose(force, reaction, atol=1e-8)
         assert found.folds.count == 2
+
+
+@pytest.mark.parametrize("held", ["fundamental", "rms", "voltage"])
+def test_an_exciter_beside_a_model_and_one_inside_it_give_the_same_response(held: str) -> None:
+    inner = oscillator(6e8, 1e6, rate_hz=12800.0)
+    beside = Exciter(
+        force_per_volt_n_v=4.0,
+        coil_time_constant_s=0.0,
+        moving_mass_kg=0.0,
+        suspension_damping_n_s_m=30.0,
+        suspension_stiffness_n_m=0.0,
+        back_emf_damping_n_s_m=0.0,
+    )
+    both = [
+        pnlss_response(model, 1.2, force=held, exciter=exciter, lowest_hz=23.0, highest_hz=28.0)  # type: ignore[arg-type]
+        for model, exciter in ((inner, beside), (driven_by_voltage(inner), None))
+    ]
+    assert both[0].folds.count == both[1].folds.count == (0 if held == "voltage" else 2)
+    np.testing.assert_allclose(both[0].folds.frequency_hz, both[1].folds.frequency_hz, rtol=1e-3)
+    one, other = (each.prediction.peak() for each in both)
+    assert one.amplitude_m == pytest.approx(other.amplitude_m, rel=5e-3)
+    assert one.frequency_hz == pytest.approx(other.frequency_hz, rel=1e-3)
+    assert one.phase_lag_deg == pytest.approx(other.phase_lag_deg, abs=2.0)
+    for each in both:
+        backwards = np.flatnonzero(np.gradient(each.points.frequency_hz) < 0.0)[2:-2]
+        assert not each.points.stable[backwards].any()
+        assert np.count_nonzero(~each.points.stable) <= backwards.size + 6
 
 
 def test_constant_voltage_is_the_pure_sine_of_a_voltage_driven_model() -> None:

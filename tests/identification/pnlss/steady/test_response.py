@@ -117,9 +117,16 @@ def test_a_model_without_a_periodic_vibration_is_reported_in_one_line() -> None:
         pnlss_frequency_response(escaping, 400.0, force="pure-sine", lowest_hz=24.0, highest_hz=25.0)
     with pytest.raises(IdentificationError, match="no periodic vibration was found at 25 Hz and 400"):
         pnlss_steady_state(escaping, 400.0, 25.0, force="pure-sine")
-    softening = pnlss_response(escaping, 0.5, force="pure-sine")
+    softening = pnlss_response(escaping, 0.9, force="pure-sine")
     assert softening.folds.count == 2
     assert softening.points.frequency_hz[-1] == pytest.approx(1.15 * HZ)
+
+
+def test_a_band_beside_the_resonance_is_said_to_miss_it() -> None:
+    missed = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", lowest_hz=20.0, highest_hz=23.0)
+    assert "the largest amplitude is at an end of the band: widen it" in missed.notes
+    hit = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", lowest_hz=20.0, highest_hz=28.0)
+    assert not any("widen" in note for note in hit.notes)
 
 
 def test_without_a_lightly_damped_mode_a_band_is_asked_for() -> None:

@@ -89,7 +89,7 @@ def test_disturbed_simulations_come_back_to_stable_points_and_leave_others() -> 
     model = oscillator(CUBIC, 1e6)
     found = pnlss_response(model, FORCE_N, force="pure-sine", harmonics=9).points
     unstable = np.flatnonzero(~found.stable)
-    points = [5, unstable[2], unstable[unstable.size // 2], unstable[0] - 4, unstable[-1] + 4, found.count - 5]
+    points = [5, unstable[2], unstable[unstable.size // 2], unstable[0] - 8, unstable[-1] + 8, found.count - 5]
     for point in points:
         away = np.log(after_disturbance(model, found, int(point), 80)[20:])
         largest = np.abs(found.multipliers[point]).max() ** (RATE_HZ / found.frequency_hz[point])

@@ -1,0 +1,237 @@
+"""PNLSS models from the command line: identified, interrupted and resumed, shown, drawn, and asked for predictions."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rig
+from identification import Features
+from rig.campaigns.plans import plan_from
+from rig.console import FitLines
+from rig.models.files import load, save
+from simulators.analysis import constant_force_response
+from simulators.virtual_rig import VirtualRig
+
+BENCH = {"bench": "magnet-beam"}
+PLANS = {
+    "lines": BENCH
+    | {"kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25, "realisations": 3}
+    | {"transient_periods": 3, "periods": 2, "levels_rms_v": [0.2]},
+    "sweep": BENCH
+    | {"kind": "sweep", "start_hz": 18.0, "stop_hz": 32.0, "rate_hz_per_s": 1.0, "levels_v": [0.08, 0.3]},
+    "stepped": BENCH
+    | {"kind": "stepped-sine", "start_hz": 24.0, "stop_hz": 25.0, "steps": 4, "levels_v": [0.15], "record_periods": 10},
+    "backbone": {"levels_v": [0.3], "record_periods": 40},
+}
+QUICK = "--model pnlss --iterations 8 --outputs drive"
+
+
+@pytest.fixture(scope="session")
+def recordings(tmp_path_factory) -> Path:
+    """A folder with the recordings."""
+    from tests.rig.test_runs import plan_with
+
+    folder = tmp_path_factory.mktemp("pnlss")
+    for name, table in PLANS.items():
+        plan = plan_with(**table) if name == "backbone" else plan_from(table, name)
+        rig.run(plan, output=folder / f"{name}.h5", seed=1).close()
+    return folder
+
+
+@pytest.fixture
+def there(command, recordings, monkeypatch):
+    """Commands typed in the folder of the recordings."""
+
+    def typed(line):
+        monkeypatch.chdir(recordings)
+        return command(line)
+
+    return typed
+
+
+@pytest.fixture
+def force_model(there, recordings) -> Path:
+    """A model from force to drive point."""
+    path = recordings / "F.h5"
+    if not path.exists():
+        done = there(f"identify lines.h5 {QUICK} -o F.h5")
+        assert done.status == 0, done.err
+    return path
+
+
+def test_a_model_is_better_than_its_linear_start_on_data_that_were_held_out(there, force_model):
+    told = json.loads(there("show F.h5 --json").out)
+    assert (told["kind"], told["states"], told["sample_rate_hz"], told["outputs"]) == ("pnlss", 2, 800.0, ["drive"])
+    assert [run["use"] for run in told["errors"]] == ["training", "training", "validation"]
+    for run, before in zip(told["errors"], told["linear_errors"], strict=True):
+        assert run["errors"]["drive"] < 0.8 * before["errors"]["drive"]
+        assert not run["unbounded"]
+    assert told["fit"]["validation_error"] == pytest.approx(told["errors"][2]["errors"]["drive"], rel=1e-6)
+    assert told["poles"][0]["frequency_hz"] == pytest.approx(24.37, rel=1e-3)
+    assert len(told["training"]) == 2
+    assert max(run["range_use"] for run in told["errors"][:2]) == pytest.approx(1.0)
+
+
+def test_files_give_back_the_model_to_the_bit(force_model, tmp_path):
+    first = load(force_model)
+    save(first, tmp_path / "again.h5")
+    again = load(tmp_path / "again.h5")
+    u = np.random.default_rng(0).normal(size=(1, 300))
+    assert np.array_equal(first.model.simulate(u).outputs, again.model.simulate(u).outputs)
+    assert again.fit.chosen == first.fit.chosen
+    assert [run.row() for run in again.runs] == [run.row() for run in first.runs]
+    assert np.array_equal(again.spectra.error, first.spectra.error)
+
+
+def test_ctrl_c_keeps_what_was_reached_and_resume_ends_where_a_whole_fit_does(there, force_model, monkeypatch):
+    def stop(self, at):
+        if at.iteration == 3:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(FitLines, "__call__", stop)
+        done = there(f"identify lines.h5 {QUICK} -o half.h5")
+    assert done.status == 1
+    assert "interrupted; the best so far is in half.h5, and --resume goes on" in done.err
+    half = load(force_model.parent / "half.h5")
+    assert half.fit.interrupted
+    assert half.fit.history.iterations == 3
+    done = there("identify lines.h5 --model pnlss --iterations 8 -o half.h5 --resume")
+    assert done.status == 0, done.err
+    whole, resumed = load(force_model), load(force_model.parent / "half.h5")
+    np.testing.assert_allclose(resumed.fit.history.training_error, whole.fit.history.training_error, rtol=1e-6)
+
+
+def test_ctrl_c_before_there_is_anything_leaves_nothing_behind(there, recordings, monkeypatch):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rig.models.identify_pnlss.identify_pnlss", stop)
+    assert there(f"identify lines.h5 {QUICK} -o early.h5").status == 130
+    assert not list(recordings.glob("early*"))
+
+
+def test_progress_is_told_every_tenth_iteration_where_there_is_no_terminal(there):
+    done = there("identify lines.h5 --model pnlss --outputs drive --iterations 12 -o twelve.h5 --overwrite")
+    lines = [line for line in done.err.splitlines() if line.startswith("iteration")]
+    assert len(lines) == 1
+    assert lines[0].startswith("iteration  10/12  training ")
+
+
+def test_settled_points_of_a_backbone_join_the_multisine_at_its_rate(there, recordings):
+    done = there(f"identify lines.h5 backbone.h5 {QUICK} -o with.h5 --overwrite")
+    assert done.status == 0, done.err
+    found = load(recordings / "with.h5")
+    assert [run.use for run in found.runs].count("training") == 3
+    segment = next(run for run in found.runs if run.name.startswith("backbone"))
+    assert segment.error[0] < 0.1
+
+
+def test_steady_peaks_are_those_of_the_rig(there, force_model):
+    told = json.loads(there("predict F.h5 --frequency-response 0.05 -o steady.h5 --overwrite --json").out)
+    response = told["frequency_responses"][0]
+    truth = constant_force_response(VirtualRig.shipped("magnet-beam"), 0.05)
+    assert response["force"] == "pure-sine"
+    assert any("force without harmonics" in note for note in told["notes"])
+    assert response["peak_m"] == pytest.approx(np.abs(truth.drive_harmonics_m[:, 1]).max(), rel=0.05)
+
+
+def test_sweeps_references_and_multisines_are_compared(there, force_model):
+    line = "predict F.h5 --sweep sweep.h5 --reference stepped.h5 --multisine lines.h5 -o P.h5 --overwrite --json"
+    told = json.loads(there(line).out)
+    stepped, small, _ = told["errors"]
+    assert (stepped["name"], small["name"]) == ("0.15 V", "sweep [0]")
+    assert stepped["envelope_error"] < 0.05
+    assert abs(small["peak_error"]) < 0.05
+    assert small["range_use"] < 1.0
+    assert [run["use"] for run in told["multisines"]] == ["training", "training", "validation"]
+    shown = json.loads(there("show F.h5 --json").out)
+    for run, known in zip(told["multisines"], shown["errors"], strict=True):
+        assert run["errors"] == known["errors"]
+    assert there("plot P.h5 -o P.png").status == 0
+
+
+def test_a_run_that_leaves_all_bounds_is_said_to_and_drawn(there, force_model, recordings):
+    found = load(force_model).model
+    cubic = found.with_features(Features.monomials(2, 1, [3], of=range(2)))
+    largest_decaying = 0.5 * found.state_range.min()  # beyond, a state that turns grows: |x| <- (1 + g |x|^2) |x|
+    growth = (1.0 - np.abs(np.linalg.eigvals(found.a)).max()) / largest_decaying**2
+    radial = growth * np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    save(replace(cubic, e=radial), recordings / "wild.h5")
+    done = there("predict wild.h5 --sweep sweep.h5 --multisine lines.h5 -o W.h5 --overwrite --json")
+    assert done.status == 0, done.err
+    assert "NaN" not in done.out
+    assert "Infinity" not in done.out
+    told = json.loads(done.out)
+    assert told["errors"][0]["verdict"] == "inside the identified range"
+    assert told["errors"][1]["verdict"] == "unbounded"
+    assert told["errors"][1]["peak_error"] is None
+    assert told["sweeps"][1]["unbounded"]
+    assert 0.0 < told["sweeps"][1]["unbounded_at_s"] < 14.0
+    assert all(run["unbounded"] for run in told["multisines"])
+    assert "3 of 3 runs unbounded" in there("show W.h5").out
+    assert there("plot W.h5 -o W.png").status == 0
+
+
+def test_with_the_voltage_as_input_sweeps_are_predicted_from_the_voltage(there, recordings):
+    line = "identify lines.h5 --model pnlss --input voltage --outputs force,drive --states 4 --iterations 5 -o V.h5 --overwrite"
+    done = there(line)
+    assert done.status == 0, done.err
+    told = json.loads(there("predict V.h5 --sweep sweep.h5 -o VP.h5 --overwrite --json").out)
+    assert told["sweeps"][0]["origin"] == "the recorded voltage"
+    assert abs(told["errors"][0]["peak_error"]) < 0.05
+
+
+def test_a_figure_is_drawn_from_what_the_file_holds(there, force_model, recordings):
+    assert there("plot F.h5 -o F.png").status == 0
+    assert (recordings / "F.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("identify lines.h5 --model linear --states 2", "--states: means nothing to --model linear"),
+        ("identify lines.h5 --model pnlss --count 2", "--count: means nothing to --model pnlss, which takes --states"),
+        ("identify lines.h5 --model pnlss --degrees 1,3", "--degrees = '1,3': allowed are whole numbers from 2 to 12"),
+        ("identify lines.h5 --model pnlss --input current", "--input = 'current': allowed are force, voltage"),
+        ("identify lines.h5 --model pnlss --rate 0", "--rate = 0: allowed is any number above 0"),
+        ("identify lines.h5 --model pnlss --rate 9000", "rate_hz: is 9000 Hz, allowed is up to 5000 Hz"),
+        ("identify lines.h5 --model pnlss --outputs nothing", "outputs: there is no channel nothing"),
+        (
+            "identify lines.h5 --model pnlss --validation sweep.h5 --hold-out 1",
+            "--hold-out: is instead of --validation",
+        ),
+        ("identify lines.h5 --model pnlss --resume", "X.h5: there is nothing to resume"),
+        ("identify lines.h5 --model pnlss --states 0", "--states = 0: allowed is 1 and above"),
+        ("identify F.h5 --model pnlss", "F.h5: holds a pnlss; a PNLSS model comes from a multisine or a sweep or"),
+        ("predict F.h5 --sweep lines.h5", "lines.h5: holds a multisine, wanted is a sweep recording"),
+        ("predict F.h5 --multisine sweep.h5", "sweep.h5: holds a sweep, wanted is a multisine recording"),
+        ("predict F.h5 --frequency-response 0.1 --modes F.h5", "--modes: means nothing to a PNLSS model"),
+        ("predict F.h5 --sweep sweep.h5 --exciter F.h5", "--exciter: is for frequency responses of a PNLSS model"),
+        (
+            "predict F.h5 --frequency-response 0.1 --force rms",
+            "force: 'rms' of a model driven by a force needs an exciter",
+        ),
+    ],
+)
+def test_mistakes_are_named_in_one_line(there, force_model, line, said):
+    done = there(f"{line} -o X.h5")
+    assert done.status == 1
+    assert said in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_options_of_a_fit_that_goes_on_are_its_own(there, force_model):
+    done = there("identify lines.h5 --model pnlss --states 3 -o F.h5 --resume")
+    assert "--states: is that of the fit that goes on" in done.err
+
+
+def test_relative_errors_weigh_small_levels_as_large_ones(there, recordings):
+    done = there(f"identify lines.h5 backbone.h5 {QUICK} --relative-errors -o relative.h5 --overwrite")
+    assert done.status == 0, done.err
+    levels = {name: load(recordings / f"{name}.h5") for name in ("with", "relative")}
+    lines = {name: next(r for r in found.runs if r.name.startswith("lines")) for name, found in levels.items()}
+    assert lines["relative"].error[0] < lines["with"].error[0]
