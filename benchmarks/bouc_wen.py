@@ -15,7 +15,7 @@ from identification import FitSettings, PnlssFit, identify_pnlss, linear_pnlss, 
 
 CASES: dict[str, dict[str, Any]] = {
     "degrees 2-3": {"degrees": (2, 3)},
-    "degrees 2-3, states only": {"degrees": (2, 3), "output_degrees": ()},
+    "degrees 2-3, no outputs": {"degrees": (2, 3), "output_degrees": ()},
     **{
         f"{count} saturating, seed {seed}": {"saturating": count, "seed": seed} for count in (10, 15) for seed in (0, 1)
     },
@@ -41,9 +41,8 @@ def main() -> None:
         sys.exit(f"set VIBROLOCK_DATA to a folder that holds {' and '.join(BOUC_WEN)} (dynoNet, MIT, not shipped)")
     data = bouc_wen(*paths)  # type: ignore[arg-type]
     identified(data, 1, degrees=(2,)), identified(data, 1, saturating=1)  # compiles
-    print(
-        f"{'':26} {'multisine':>9} {'sweep':>7} {'range':>6} {'parameters':>10} {'chosen':>7} {'s/iter':>7} {'total s':>8}"
-    )
+    heads = ("multisine", "sweep", "range", "parameters", "chosen", "s/iter", "total s")
+    print(f"{'':26}" + "".join(f"{head:>11}" for head in heads))
     for name, asked in CASES.items():
         begin = time.perf_counter()
         found = identified(data, 200, **asked)
@@ -53,10 +52,9 @@ def main() -> None:
         model = found.model
         count = 16 + model.nonlinear_coefficients + model.state_features.parameters + model.output_features.parameters
         each = float(np.mean(np.diff(found.history.seconds)))
-        print(
-            f"{name:26} {multisine:9.1f} {sweep:7.1f} {np.max(errors.range_use):6.2f} {count:10d} {found.chosen:7d} {each:7.3f} "
-            f"{total:8.2f}"
-        )
+        decibels = (f"{multisine:.1f}", f"{sweep:.1f}", f"{np.max(errors.range_use):.2f}")
+        values = (*decibels, f"{count}", f"{found.chosen}", f"{each:.3f}", f"{total:.2f}")
+        print(f"{name:26}" + "".join(f"{value:>11}" for value in values))
 
 
 if __name__ == "__main__":

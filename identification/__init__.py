@@ -50,7 +50,8 @@ if TYPE_CHECKING:
     from identification.pnlss.fitting.fit import fit_pnlss
     from identification.pnlss.fitting.result import FitHistory, PnlssFit
     from identification.pnlss.fitting.settings import FitProgress, FitSettings
-    from identification.pnlss.identify import identify_pnlss, linear_pnlss
+    from identification.pnlss.identify import identify_pnlss
+    from identification.pnlss.linear_model import linear_pnlss
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
@@ -286,7 +287,7 @@ _MODULE_OF = {
     "identify_many": "pnlss.study",
     "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
-    "linear_pnlss": "pnlss.identify",
+    "linear_pnlss": "pnlss.linear_model",
     "mac": "nonlinear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",

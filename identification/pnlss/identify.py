@@ -12,20 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.linear.state_space_fit import spectral_radius
 from identification.linear.subspace import StateSpace
-from identification.pnlss.best_linear import best_linear_responses
 from identification.pnlss.errors import pnlss_errors
-from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
 from identification.pnlss.fitting.fit import fit_pnlss
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
-from identification.pnlss.linear_start import linear_start, with_independent_states
+from identification.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.saturating_starts import STARTS, best_of_starts, random_start
 
-__all__ = ["identify_pnlss", "linear_pnlss"]
+__all__ = ["identify_pnlss"]
 
 Float = NDArray[np.float64]
 Variables = Literal["all", "states"] | Sequence[int]
@@ -96,7 +94,7 @@ def identify_pnlss(
     chosen = FitSettings() if settings is None else settings
     begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     counts = _saturating(saturating, begin)
-    of = _chosen(variables, states, _varying(experiments))
+    of = _chosen(variables, states, varying_inputs(experiments))
     powers = tuple((() if any(counts) else (2, 3)) if degrees is None else degrees)
     of_output = powers if output_degrees is None else tuple(output_degrees)
     given = (state_features, output_features)
@@ -118,84 +116,6 @@ def identify_pnlss(
         start = begin.with_features(phi, chi)
         found = fit_pnlss(start, experiments, validation=validation, settings=chosen, progress=progress)
     return _with_scores(found, begin, experiments)
-
-
-def linear_pnlss(
-    experiments: Sequence[Experiment],
-    *,
-    states: int,
-    linear: StateSpace | PnlssModel | None = None,
-    band_hz: tuple[float, float] | None = None,
-) -> PnlssModel:
-    """The linear model that a fit begins from, with notes on how near it comes.
-
-    Parameters and errors are those of `identify_pnlss`.
-    """
-    same_channels(experiments)
-    first = experiments[0]
-    if linear is not None:
-        return _given(linear, first, states)
-    varying = _varying(experiments)
-    moved = [
-        replace(e, inputs=e.inputs[varying], input_channels=tuple(e.input_channels[i] for i in varying))
-        for e in experiments
-    ]
-    responses = best_linear_responses(moved, band_hz=band_hz)
-    found = linear_start(responses, states, sample_rate_hz=first.sample_rate_hz)
-    low, high = responses.frequency_hz[[0, -1]]
-    note = (
-        f"linear start: misfit {100 * found.error.max():.2g} % of the responses at {responses.frequency_hz.size} lines in "
-        f"{low:g} to {high:g} Hz, {found.weighting} weights"
-    )
-    model = PnlssModel.linear(
-        found.model,
-        sample_rate_hz=first.sample_rate_hz,
-        inputs=moved[0].input_channels,
-        outputs=first.output_channels,
-        specimen=first.specimen,
-        notes=(*responses.notes, note),
-    )
-    model = with_independent_states(model, moved)
-    m = len(first.input_channels)
-    b, d = np.zeros((states, m)), np.zeros((len(first.output_channels), m))
-    b[:, varying], d[:, varying] = model.b, model.d
-    return PnlssModel.linear(
-        StateSpace(np.array(model.a), b, np.array(model.c), d),
-        sample_rate_hz=model.sample_rate_hz,
-        inputs=first.input_channels,
-        outputs=model.outputs,
-        specimen=model.specimen,
-        notes=model.notes,
-    )
-
-
-def _varying(experiments: Sequence[Experiment]) -> list[int]:
-    """Numbers of the inputs that are not constant; all if none is, for what is wrong then is said elsewhere."""
-    low, high = (f([f(e.inputs, axis=1) for e in experiments], axis=0) for f in (np.min, np.max))
-    return [int(i) for i in np.flatnonzero(low < high)] or list(range(low.size))
-
-
-def _given(linear: StateSpace | PnlssModel, first: Experiment, states: int) -> PnlssModel:
-    """A linear model from outside, checked."""
-    matrices = linear.linear_part if isinstance(linear, PnlssModel) else linear
-    n, m, outputs = states, len(first.input_channels), len(first.output_channels)
-    for name, part, shape in zip("abcd", matrices, ((n, n), (n, m), (outputs, n), (outputs, m)), strict=True):
-        if np.shape(part) != shape:
-            raise IdentificationError(f"linear: {name} has shape {np.shape(part)}, needs {shape}")
-    if isinstance(linear, PnlssModel) and abs(linear.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
-        raise IdentificationError(
-            f"linear: is of {linear.sample_rate_hz:g} Hz, the experiments of {first.sample_rate_hz:g} Hz"
-        )
-    if (radius := spectral_radius(matrices.a)) >= 1.0:
-        raise IdentificationError(f"linear: has an eigenvalue of magnitude {radius:.6g}, allowed is below 1 (stable)")
-    return PnlssModel.linear(
-        matrices,
-        sample_rate_hz=first.sample_rate_hz,
-        inputs=first.input_channels,
-        outputs=first.output_channels,
-        specimen=first.specimen,
-        notes=linear.notes if isinstance(linear, PnlssModel) else (),
-    )
 
 
 def _saturating(saturating: int | tuple[int, int], model: PnlssModel) -> tuple[int, int]:

@@ -29,9 +29,9 @@ def hysteresis() -> Benchmark:
 
 
 def test_the_arrow_of_the_silverbox_is_predicted_beyond_the_range_of_the_estimation(oscillator: Benchmark) -> None:
-    found = identified_silverbox(oscillator, (3,), 12)
+    found = identified_silverbox(oscillator, (2, 3), 12)
     arrow = pnlss_errors(found.model, oscillator.test)
-    assert arrow.rms[0, 0] < 0.28e-3  # a linear model: 13 mV; published PNLSS models: 0.26 mV and above
+    assert arrow.rms[0, 0] < 0.28e-3  # 0.26 mV; the linear model is above 5 mV
     assert arrow.range_use[0] > 1.3
     assert pnlss_errors(found.model, oscillator.validation).rms[0, 0] < 0.25e-3
     assert pnlss_errors(found.linear, oscillator.test).rms[0, 0] > 5e-3
@@ -45,7 +45,7 @@ def test_polynomials_predict_a_hysteresis_to_ninety_decibels(hysteresis: Benchma
 
 
 def test_a_few_saturating_features_predict_it_better_than_any_polynomial(hysteresis: Benchmark) -> None:
-    found = identified_hysteresis(hysteresis, 60, saturating=10, seed=1)
+    found = identified_hysteresis(hysteresis, 40, saturating=10, seed=1)
     error = pnlss_errors(found.model, hysteresis.test)
-    assert 20 * np.log10(error.rms[0, 0]) < -100.0
+    assert 20 * np.log10(error.rms[0, 0]) < -98.0  # polynomials of degrees 2 and 3: -94 dB
     assert error.unbounded == 0
