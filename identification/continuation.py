@@ -255,11 +255,7 @@ class _Walk:
 
     def _tangent(self, v: Float, units: Float, along: Float) -> Float | None:
         """Unit tangent on the side of ``along``."""
-        _, matrix = self._bordered(v, units, along)
-        right = np.zeros(v.size)
-        right[-1] = 1.0
-        tangent = _solution(matrix, right)
-        return None if tangent is None else tangent / np.linalg.norm(tangent)
+        return _tangent_of(self._bordered(v, units, along)[1])
 
     def corrected(self, point: _Point, length: float) -> _Point | None:
         """The point of the curve ``length`` along the tangent of ``point``."""
@@ -273,11 +269,17 @@ class _Walk:
             if np.linalg.norm((v - begin) / point.units) > max(_NEAR * abs(length), self._steps.tolerance):
                 return None
             if np.linalg.norm(change) <= self._steps.tolerance:
-                units = self._units(v)
-                along = point.tangent * point.units / units
-                tangent = self._tangent(v, units, along / np.linalg.norm(along))
-                return None if tangent is None else _Point(v, units, tangent, count)
+                return self._arrived(point, v, matrix, count)
         return None
+
+    def _arrived(self, point: _Point, v: Float, matrix: Float, iterations: int) -> _Point | None:
+        """A solution with its tangent, from the derivatives at the last iterate: as near as the solution itself."""
+        along = _tangent_of(matrix)
+        if along is None:
+            return None
+        units = self._units(v)
+        tangent = along * point.units / units
+        return _Point(v, units, tangent / np.linalg.norm(tangent), iterations)
 
     def next(self, last: _Point, length: float) -> tuple[_Point | None, float]:
         """The next point and the length to try after it; None if there is none."""
@@ -331,6 +333,14 @@ class _Walk:
             return None
         at = self.corrected(last, length)
         return None if at is None else at.v
+
+
+def _tangent_of(bordered: Float) -> Float | None:
+    """Unit tangent on the side of the last row."""
+    right = np.zeros(len(bordered))
+    right[-1] = 1.0
+    tangent = _solution(bordered, right)
+    return None if tangent is None else tangent / np.linalg.norm(tangent)
 
 
 def _evaluated(system: System, z: Float, parameter: float) -> tuple[Float, Float, Float]:
