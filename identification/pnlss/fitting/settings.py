@@ -38,6 +38,7 @@ class FitSettings:
     every
         The Hessian of a step is from each ``every``-th sample. Its gradient is always from all, so that a fit ends at the same
         parameters; but neighbouring samples of finely sampled records tell nearly the same, and steps take less time.
+        With fewer than some 50 values of outputs for each parameter left, more iterations cost what each of them saves.
     damping
         Of the first step, relative to the largest eigenvalue of the scaled normal equations.
     truncation

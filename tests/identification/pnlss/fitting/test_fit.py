@@ -93,6 +93,25 @@ def test_the_iterate_with_the_smallest_validation_error_is_chosen_and_patience_e
     assert pnlss_errors(fit.last, validation).overall[0] == pytest.approx(errors[-1], rel=1e-9)
 
 
+def test_validation_runs_begin_where_their_first_samples_say() -> None:
+    system = nonlinear_system(2, 1, 2)
+    running = experiment(system, 900, seed=3, begin=np.array([1.0, -1.0]))
+    fit = fit_pnlss(disturbed(system), [experiment(system, 900)], validation=[running])
+    assert fit.history.validation_error[0] > 1e-2
+    assert fit.validation_error < 1e-5
+
+
+def test_a_hessian_of_fewer_samples_leads_to_the_same_parameters() -> None:
+    system = nonlinear_system(2, 1, 2)
+    experiments = [experiment(system, 3000, noise=0.05)]
+    whole, thinned = (
+        fit_pnlss(disturbed(system), experiments, settings=FitSettings(every=every, tolerance=1e-9)) for every in (1, 4)
+    )
+    assert thinned.training_error == pytest.approx(whole.training_error, rel=1e-6)
+    outputs = [fit.model.simulate(experiments[0].inputs).outputs for fit in (whole, thinned)]
+    assert np.max(np.abs(outputs[1] - outputs[0])) < 1e-3 * np.max(np.abs(outputs[0]))
+
+
 def test_a_resumed_fit_goes_on_as_if_it_had_not_stopped() -> None:
     system = nonlinear_system(2, 1, 2)
     experiments = [experiment(system, 600, noise=0.01, begin=np.array([1.0, 1.0]))]

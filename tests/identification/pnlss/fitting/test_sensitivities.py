@@ -111,6 +111,21 @@ def test_lines_of_all_frequencies_make_the_same_normal_equations_as_samples() ->
     np.testing.assert_allclose(by_lines[0].squares(records[0].y), records[0].squares(records[0].y), rtol=1e-8)
 
 
+def test_line_weights_count_by_output_and_frequency() -> None:
+    system = nonlinear_system(2, 1, 2)
+    rate_hz = system.sample_rate_hz
+    records = records_of([periodic_experiment(system, 600)], np.ones(1), np.ones(2))
+    rows = ((0.0, 2.0, 0.0), (20.0, 2.0, 1.0))
+    (one,) = with_lines(records, FitSettings(line_weights=rows), rate_hz)
+    spectra = np.fft.rfft(records[0].y[-600:], axis=0).T
+    frequencies_hz = np.fft.rfftfreq(600, 1.0 / rate_hz)
+    inside = (frequencies_hz > 0.0) & (frequencies_hz <= 20.0)
+    ramps = np.stack([np.full(frequencies_hz.size, 2.0), frequencies_hz / 20.0])
+    by_hand = 2.0 * 2.0 / 600.0 * np.sum(np.abs(ramps * spectra)[:, inside] ** 2, axis=1)  # two periods, both sides
+    by_hand += [2.0 / 600.0 * np.abs(2.0 * spectra[0, 0]) ** 2, 0.0]
+    np.testing.assert_allclose(one.squares(records[0].y), by_hand, rtol=1e-6)
+
+
 def test_a_run_that_leaves_all_bounds_gives_no_finite_equations() -> None:
     system = nonlinear_system(2, 1, 1)
     records = records_of([experiment(system, 800)], np.ones(1), np.ones(1))
