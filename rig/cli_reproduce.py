@@ -32,6 +32,7 @@ def reproduce_(
     saturating: Annotated[int, typer.Option(help="Saturating features beside the monomials.", min=0, max=100)] = 0,
     iterations: Annotated[int, typer.Option(help="Iterations of a fit, at most.", min=1, max=10_000)] = 60,
     levels: Annotated[int | None, typer.Option(help="Levels of the specimen, from the lowest; default: all.")] = None,
+    channel: Annotated[str, typer.Option(help="Output whose errors the tables have.")] = "drive",
     without: Annotated[
         list[str] | None, typer.Option(metavar="PART", help="Leave out steady or sweeps; may be repeated.")
     ] = None,
@@ -63,6 +64,7 @@ def reproduce_(
         saturating=saturating,
         iterations=iterations,
         levels=levels,
+        channel=channel,
         jobs=jobs,
         seed=seed,
         without=frozenset(without or ()),

@@ -42,6 +42,8 @@ class Options:
     """Iterations of a fit, at most."""
     levels: int | None = None
     """How many of the specimen's levels, from the lowest; None for all."""
+    channel: str = "drive"
+    """Output whose errors the tables have."""
     jobs: int = 1
     """Models that are identified at the same time."""
     seed: int = 0
@@ -64,6 +66,8 @@ class Options:
             raise ConfigurationError(f"--models {self.models}: allowed is a number from 1, or {PAPER}")
         if not 0.0 <= self.scatter <= 0.05:
             raise ConfigurationError(f"--scatter {self.scatter:g}: allowed is 0 to 0.05")
+        if self.channel not in self.specimen.outputs:
+            raise ConfigurationError(f"--channel {self.channel}: allowed is {', '.join(self.specimen.outputs)}")
         if self.levels is not None and not 1 <= self.levels <= len(self.specimen.levels):
             raise ConfigurationError(f"--levels {self.levels}: allowed is 1 to {len(self.specimen.levels)}")
 

@@ -82,7 +82,7 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
     if not models.fits:
         name, reason = next(iter(models.failures.items()))
         raise IdentificationError(f"no model could be identified; {name}: {reason}")
-    tables = {name: _table(models, levels, of) for name, of in VARIANTS.items()}
+    tables = {name: _table(options, models, levels, of) for name, of in VARIANTS.items()}
     table = next(iter(tables.values()))
     selected = {name: (model, models.fits[model].model) for name, model in table.selected.items()}
     found: list[Steady] = []
@@ -97,8 +97,11 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
 
 
 def _table(
-    models: Models, levels: Mapping[str, Sequence[Experiment]], of: Callable[[PnlssFit], PnlssModel | None]
+    options: Options,
+    models: Models,
+    levels: Mapping[str, Sequence[Experiment]],
+    of: Callable[[PnlssFit], PnlssModel | None],
 ) -> ErrorTable:
     variants = {name: of(fit) for name, fit in models.fits.items()}
     known = {name: model for name, model in variants.items() if model is not None}
-    return ErrorTable.of(known, models.jobs, levels, output="drive", failures=models.failures)
+    return ErrorTable.of(known, models.jobs, levels, output=options.channel, failures=models.failures)

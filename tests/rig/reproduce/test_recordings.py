@@ -97,6 +97,7 @@ def test_a_folder_of_other_settings_is_refused_and_what_differs_is_named(asked):
         ({"models": "many"}, "--models many"),
         ({"scatter": 0.2}, "--scatter 0.2: allowed is 0 to 0.05"),
         ({"input": "acceleration"}, "--input acceleration: allowed is force, voltage"),
+        ({"channel": "tip"}, "--channel tip: allowed is drive, acc_magnet"),
         ({"levels": 4}, "--levels 4: allowed is 1 to 3"),
         ({"without": frozenset({"tables"})}, "--without tables: allowed is steady, sweeps"),
     ],
