@@ -6,7 +6,7 @@ time: the way of Paduart et al., Automatica 46, 2010, and of Scheel et al., Sect
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.saturating_starts import STARTS, best_of_starts, random_start
+from identification.pnlss.saturating_starts import STARTS, best_of_starts, interrupted, random_start
 
 __all__ = ["identify_pnlss"]
 
@@ -79,12 +79,13 @@ def identify_pnlss(
         Of the random directions in which saturating features begin: eight starts, of which the better half goes on after
         10, 20 and 60 iterations.
     progress
-        Called after every iteration of the fit over time; not while starts are compared.
+        Called after every iteration of the fit over time, and of those of starts that are compared (`FitProgress.stage`).
 
     Returns
     -------
     PnlssFit
-        Notes of its model say what the linear start came to, over frequency and over time, and the nonlinear model.
+        Notes of its model say what the linear start came to, over frequency and over time, and the nonlinear model. Ctrl-C
+        gives the best there is, ``interrupted``; before there is any fit it is passed on.
 
     Raises
     ------
@@ -107,11 +108,13 @@ def identify_pnlss(
             raise IdentificationError("saturating: beside features of one's own; put saturating ones among those")
         random = np.random.default_rng(seed)
         starts = [random_start(begin, experiments, phi, chi, counts, random) for _ in range(STARTS)]
-        start, found = best_of_starts(starts, experiments, validation=validation, settings=chosen)
+        data: dict[str, Any] = {"validation": validation, "settings": chosen, "progress": progress}
+        start, found = best_of_starts(starts, experiments, **data)
         if not found.interrupted:
-            found = fit_pnlss(
-                start, experiments, validation=validation, settings=chosen, progress=progress, resume=found
-            )
+            try:
+                found = fit_pnlss(start, experiments, resume=found, **data)
+            except KeyboardInterrupt:  # before its first iteration
+                found = interrupted(found)
     else:
         start = begin.with_features(phi, chi)
         found = fit_pnlss(start, experiments, validation=validation, settings=chosen, progress=progress)

@@ -9,7 +9,8 @@ from identification.errors import IdentificationError
 from identification.linear.state_space_fit import spectral_radius
 from identification.linear.subspace import StateSpace
 from identification.pnlss.best_linear import best_linear_responses
-from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment_groups import same_channels
 from identification.pnlss.linear_start import linear_start, with_independent_states
 from identification.pnlss.model import PnlssModel
 

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment_groups import same_channels
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.model import PnlssModel
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment, excited_band
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment_groups import excited_band
 from identification.pnlss.fitting.checks import check_data, check_resumed
 from identification.pnlss.fitting.initial_states import fitted_initial_state
 from identification.pnlss.fitting.levenberg_marquardt import Iterates, iterate
