@@ -81,6 +81,11 @@ class Experiment:
         n = self.inputs.shape[1]
         if self.outputs.shape[1] != n:
             raise IdentificationError(f"{where}outputs: have {self.outputs.shape[1]} samples, inputs {n}")
+        if np.ndim(self.sample_rate_hz):
+            raise IdentificationError(
+                f"{where}sample_rate_hz: has shape {np.shape(self.sample_rate_hz)}, needs one number; resample what was "
+                "sampled at unequal steps"
+            )
         positive(f"{where}sample_rate_hz", self.sample_rate_hz, "Hz")
         positive(f"{where}weight", self.weight)
         if self.initial_state not in get_args(InitialState):

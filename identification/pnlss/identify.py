@@ -11,11 +11,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
 from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
+from identification.pnlss.fitting.checks import check_enough, check_signals
 from identification.pnlss.fitting.fit import fit_pnlss
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
@@ -93,19 +95,24 @@ def identify_pnlss(
         Where the experiments cannot be used, or do not support so many states; see `best_linear_responses`, `fit_pnlss`.
     """
     chosen = FitSettings() if settings is None else settings
-    begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
-    counts = _saturating(saturating, begin)
+    if not isinstance(states, int | np.integer) or states < 1:
+        raise IdentificationError(f"states: is {states}, needs at least 1, whole")
+    check_signals(experiments)
+    inputs, outputs = experiments[0].input_channels, experiments[0].output_channels
+    counts = _saturating(saturating, outputs)
     of = _chosen(variables, states, varying_inputs(experiments))
     powers = tuple((() if any(counts) else (2, 3)) if degrees is None else degrees)
     of_output = powers if output_degrees is None else tuple(output_degrees)
     given = (state_features, output_features)
     phi, chi = (
-        Features.monomials(states, len(begin.inputs), which, of=of) if own is None else own
+        Features.monomials(states, len(inputs), which, of=of) if own is None else own
         for own, which in zip(given, (powers, of_output), strict=True)
     )
+    if any(own is not None and count for own, count in zip(given, counts, strict=True)):
+        raise IdentificationError("saturating: beside features of one's own; put saturating ones among those")
+    check_enough(experiments, _parameters(states, len(inputs), len(outputs), phi, chi, counts))
+    begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     if any(counts):
-        if any(own is not None and count for own, count in zip(given, counts, strict=True)):
-            raise IdentificationError("saturating: beside features of one's own; put saturating ones among those")
         random = np.random.default_rng(seed)
         starts = [random_start(begin, experiments, phi, chi, counts, random) for _ in range(STARTS)]
         data: dict[str, Any] = {"validation": validation, "settings": chosen, "progress": progress}
@@ -121,12 +128,22 @@ def identify_pnlss(
     return _with_scores(found, begin, experiments)
 
 
-def _saturating(saturating: int | tuple[int, int], model: PnlssModel) -> tuple[int, int]:
+def _parameters(
+    states: int, inputs: int, outputs: int, phi: Features, chi: Features, saturating: tuple[int, int]
+) -> int:
+    """Number of parameters, initial states left aside: refused before a linear start is looked for, which takes longer."""
+    variables = states + inputs
+    inner = sum(saturating) * (variables + 1) + phi.parameters + chi.parameters
+    wide, own = (variables + f.count + count for f, count in zip((phi, chi), saturating, strict=True))
+    return states * wide + outputs * own + inner
+
+
+def _saturating(saturating: int | tuple[int, int], outputs: Sequence[Channel]) -> tuple[int, int]:
     """Numbers in the state and in the output equation."""
     if isinstance(saturating, tuple):
         counts = saturating
     else:
-        at_once = any(c.role not in ("drive", "response") or c.motion == "acceleration" for c in model.outputs)
+        at_once = any(c.role not in ("drive", "response") or c.motion == "acceleration" for c in outputs)
         counts = (saturating, saturating if at_once else 0)
     if min(counts) < 0:
         raise IdentificationError(f"saturating: is {saturating}, allowed is 0 and above")

@@ -71,7 +71,7 @@ def fit_pnlss(
     settings = FitSettings() if settings is None else settings
     estimated = sum(e.initial_state == "estimated" for e in experiments)
     parameters = Parameters(start, estimated)
-    check_data(start, experiments, validation, parameters.count)
+    check_data(start, experiments, validation, parameters.count, settings.by_frequency)
     check_memory(parameters, [*experiments, *validation], settings.by_frequency)
     if resume is not None:
         check_resumed(start, resume, estimated)

@@ -19,9 +19,9 @@ Float = NDArray[np.float64]
 _FACTOR = 10.0
 _SMALLEST, _LARGEST = 1e-16, 1e8
 """Dampings worth trying."""
-_NEAR = 10.0
-"""Hessians are from all samples once an iteration gained less than so many times the tolerance. Farther from the end those from
-some of the samples lead on as fast, flat valleys included."""
+_NEAR = 1e-4
+"""Relative gain of an iteration below which the end may be near: from then on all samples make the Hessian, and steps reach a
+minimum in few iterations. Before, some of the samples lead on as fast."""
 _WORTH = 0.01
 """A smaller damping is tried where it promises so much more than the gain that is there."""
 _STALLED = 5
@@ -68,8 +68,8 @@ class Iterates:
 
     def every(self, problem: Problem) -> int:
         """Of how many samples on end the next Hessian takes one; of each one, once the training error has nearly stalled."""
-        errors = np.array(self.training)
-        far = np.all(np.diff(errors) < -_NEAR * problem.settings.tolerance * errors[:-1])
+        errors, near = np.array(self.training), max(_NEAR, problem.settings.tolerance)
+        far = np.all(np.diff(errors) < -near * errors[:-1])
         return problem.every if far else 1
 
     def add(self, problem: Problem, vector: Float, training: float, damping: float) -> None:

@@ -112,7 +112,7 @@ def test_what_is_kept_of_a_vibration_of_a_few_strides_a_period_tells_of_its_harm
         return float(np.linalg.norm(8.0 * rows[kept].T @ rows[kept] - rows.T @ rows) / np.linalg.norm(rows.T @ rows))
 
     assert off(np.arange(0, 4096, 8)) > 0.1
-    assert off(kept_samples(4096, 8)) < 0.01
+    assert off(kept_samples(4096, 8)) < 0.03
 
 
 def test_lines_of_all_frequencies_make_the_same_normal_equations_as_samples() -> None:
