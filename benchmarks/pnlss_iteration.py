@@ -4,8 +4,8 @@ Each case runs some iterations of `fit_pnlss` and takes their median; all that b
 normal equations, their decomposition, and the simulations that try dampings. The baseline in the same run is what one writes
 first in numpy: the recursion sample by sample, the whole Jacobian, its product; on a short piece, scaled to the samples of
 the case. One core: the pools of the linear algebra are held to one thread; on a busy machine the processor time and the best
-iteration tell more. A fit is there when it is nearer to the data than the system that made them, noise added; NaN for one that is
-not. Memory is the peak of the process after each case, the data themselves included.
+iteration tell more. A fit is there when it is nearer to the data than the system that made them, noise added; NaN for one that
+is not. Memory is the peak of the process after each case, the data themselves included.
 """
 
 import json
