@@ -11,7 +11,7 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
-__all__ = ["Experiment", "InitialState", "excited_band", "same_channels"]
+__all__ = ["Experiment", "InitialState"]
 
 Float = NDArray[np.float64]
 InitialState = Literal["zero", "estimated"]
@@ -81,6 +81,11 @@ class Experiment:
         n = self.inputs.shape[1]
         if self.outputs.shape[1] != n:
             raise IdentificationError(f"{where}outputs: have {self.outputs.shape[1]} samples, inputs {n}")
+        if np.ndim(self.sample_rate_hz):
+            raise IdentificationError(
+                f"{where}sample_rate_hz: has shape {np.shape(self.sample_rate_hz)}, needs one number; resample what was "
+                "sampled at unequal steps"
+            )
         positive(f"{where}sample_rate_hz", self.sample_rate_hz, "Hz")
         positive(f"{where}weight", self.weight)
         if self.initial_state not in get_args(InitialState):
@@ -188,28 +193,3 @@ class Experiment:
     def weighted(self, weight: float) -> "Experiment":
         """The same with another weight."""
         return replace(self, weight=weight)
-
-
-def excited_band(experiments: Sequence[Experiment]) -> tuple[float, float] | None:
-    """From the lowest to the highest frequency that any experiment excites; None where none says so."""
-    bands = [experiment.excited_hz for experiment in experiments if experiment.excited_hz is not None]
-    return (min(low for low, _ in bands), max(high for _, high in bands)) if bands else None
-
-
-def same_channels(experiments: Sequence[Experiment]) -> None:
-    """Raise `IdentificationError` unless there is one at least and all have the same channels and sample rate."""
-    if not experiments:
-        raise IdentificationError("experiments: none given, needs one at least")
-    first = experiments[0]
-    for index, other in enumerate(experiments):
-        what = f"experiments[{index}]{f' ({other.name})' if other.name else ''}"
-        if abs(other.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
-            raise IdentificationError(
-                f"{what}: sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one"
-            )
-        for name in ("input_channels", "output_channels"):
-            mine, theirs = (tuple(c.name for c in getattr(e, name)) for e in (other, first))
-            if mine != theirs:
-                raise IdentificationError(
-                    f"{what}: {name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}"
-                )

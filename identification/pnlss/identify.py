@@ -6,22 +6,24 @@ time: the way of Paduart et al., Automatica 46, 2010, and of Scheel et al., Sect
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
 from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
+from identification.pnlss.fitting.checks import check_enough, check_signals
 from identification.pnlss.fitting.fit import fit_pnlss
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.saturating_starts import STARTS, best_of_starts, random_start
+from identification.pnlss.saturating_starts import STARTS, best_of_starts, interrupted, random_start
 
 __all__ = ["identify_pnlss"]
 
@@ -79,12 +81,13 @@ def identify_pnlss(
         Of the random directions in which saturating features begin: eight starts, of which the better half goes on after
         10, 20 and 60 iterations.
     progress
-        Called after every iteration of the fit over time; not while starts are compared.
+        Called after every iteration of the fit over time, and of those of starts that are compared (`FitProgress.stage`).
 
     Returns
     -------
     PnlssFit
-        Notes of its model say what the linear start came to, over frequency and over time, and the nonlinear model.
+        Notes of its model say what the linear start came to, over frequency and over time, and the nonlinear model. Ctrl-C
+        gives the best there is, ``interrupted``; before there is any fit it is passed on.
 
     Raises
     ------
@@ -92,38 +95,55 @@ def identify_pnlss(
         Where the experiments cannot be used, or do not support so many states; see `best_linear_responses`, `fit_pnlss`.
     """
     chosen = FitSettings() if settings is None else settings
-    begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
-    counts = _saturating(saturating, begin)
+    if not isinstance(states, int | np.integer) or states < 1:
+        raise IdentificationError(f"states: is {states}, needs at least 1, whole")
+    check_signals(experiments)
+    inputs, outputs = experiments[0].input_channels, experiments[0].output_channels
+    counts = _saturating(saturating, outputs)
     of = _chosen(variables, states, varying_inputs(experiments))
     powers = tuple((() if any(counts) else (2, 3)) if degrees is None else degrees)
     of_output = powers if output_degrees is None else tuple(output_degrees)
     given = (state_features, output_features)
     phi, chi = (
-        Features.monomials(states, len(begin.inputs), which, of=of) if own is None else own
+        Features.monomials(states, len(inputs), which, of=of) if own is None else own
         for own, which in zip(given, (powers, of_output), strict=True)
     )
+    if any(own is not None and count for own, count in zip(given, counts, strict=True)):
+        raise IdentificationError("saturating: beside features of one's own; put saturating ones among those")
+    check_enough(experiments, _parameters(states, len(inputs), len(outputs), phi, chi, counts))
+    begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     if any(counts):
-        if any(own is not None and count for own, count in zip(given, counts, strict=True)):
-            raise IdentificationError("saturating: beside features of one's own; put saturating ones among those")
         random = np.random.default_rng(seed)
         starts = [random_start(begin, experiments, phi, chi, counts, random) for _ in range(STARTS)]
-        start, found = best_of_starts(starts, experiments, validation=validation, settings=chosen)
+        data: dict[str, Any] = {"validation": validation, "settings": chosen, "progress": progress}
+        start, found = best_of_starts(starts, experiments, **data)
         if not found.interrupted:
-            found = fit_pnlss(
-                start, experiments, validation=validation, settings=chosen, progress=progress, resume=found
-            )
+            try:
+                found = fit_pnlss(start, experiments, resume=found, **data)
+            except KeyboardInterrupt:  # before its first iteration
+                found = interrupted(found)
     else:
         start = begin.with_features(phi, chi)
         found = fit_pnlss(start, experiments, validation=validation, settings=chosen, progress=progress)
     return _with_scores(found, begin, experiments)
 
 
-def _saturating(saturating: int | tuple[int, int], model: PnlssModel) -> tuple[int, int]:
+def _parameters(
+    states: int, inputs: int, outputs: int, phi: Features, chi: Features, saturating: tuple[int, int]
+) -> int:
+    """Number of parameters, initial states left aside: refused before a linear start is looked for, which takes longer."""
+    variables = states + inputs
+    inner = sum(saturating) * (variables + 1) + phi.parameters + chi.parameters
+    wide, own = (variables + f.count + count for f, count in zip((phi, chi), saturating, strict=True))
+    return states * wide + outputs * own + inner
+
+
+def _saturating(saturating: int | tuple[int, int], outputs: Sequence[Channel]) -> tuple[int, int]:
     """Numbers in the state and in the output equation."""
     if isinstance(saturating, tuple):
         counts = saturating
     else:
-        at_once = any(c.role not in ("drive", "response") or c.motion == "acceleration" for c in model.outputs)
+        at_once = any(c.role not in ("drive", "response") or c.motion == "acceleration" for c in outputs)
         counts = (saturating, saturating if at_once else 0)
     if min(counts) < 0:
         raise IdentificationError(f"saturating: is {saturating}, allowed is 0 and above")

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vibrolock.compiled import kernel
+from vibrolock.compiled import inner_kernel, kernel
 
 __all__ = [
     "Matrices",
@@ -63,7 +63,7 @@ def workspace(m: Matrices) -> Workspace:
     return Workspace(np.empty(n + m.b.shape[1]), np.empty(n), np.empty(m.e.shape[1]), np.empty(m.f.shape[1]))
 
 
-@kernel
+@inner_kernel
 def within_limits(table: Table, v: np.ndarray) -> bool:
     """Whether no variable is beyond its limit, as almost always: then nothing has to be held."""
     for j in range(v.size):  # noqa: SIM110 (numba compiles no generators)
@@ -72,7 +72,7 @@ def within_limits(table: Table, v: np.ndarray) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def feature_values(table: Table, v: np.ndarray, phi: np.ndarray) -> None:
     """Write the features of ``v`` (float[n_variables]) to ``phi`` (float[n_features])."""
     count, degree = table.factors.shape
@@ -123,7 +123,7 @@ def feature_derivatives(table: Table, v: np.ndarray, slope: np.ndarray, steep: n
             slope[count + i, j] = steep[i, 0] * table.weights[i, j]
 
 
-@kernel
+@inner_kernel
 def state_after(m: Matrices, phi: np.ndarray, v: np.ndarray, x: np.ndarray) -> None:
     """Write ``A x + B u + E phi`` to ``x``, which is no part of ``v``."""
     n = m.a.shape[0]
@@ -138,7 +138,7 @@ def state_after(m: Matrices, phi: np.ndarray, v: np.ndarray, x: np.ndarray) -> N
         x[i] = total
 
 
-@kernel
+@inner_kernel
 def outputs_at(m: Matrices, chi: np.ndarray, v: np.ndarray, y: np.ndarray) -> None:
     """Write ``C x + D u + F chi`` to ``y``."""
     n = m.a.shape[0]

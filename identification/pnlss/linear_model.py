@@ -9,8 +9,9 @@ from identification.errors import IdentificationError
 from identification.linear.state_space_fit import spectral_radius
 from identification.linear.subspace import StateSpace
 from identification.pnlss.best_linear import best_linear_responses
-from identification.pnlss.experiment import Experiment, same_channels
-from identification.pnlss.linear_start import linear_start, with_independent_states
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment_groups import same_channels
+from identification.pnlss.linear_start import hardly_seen_states, linear_start, with_independent_states
 from identification.pnlss.model import PnlssModel
 
 __all__ = ["linear_pnlss", "varying_inputs"]
@@ -53,6 +54,8 @@ def linear_pnlss(
         notes=(*responses.notes, note),
     )
     model = with_independent_states(model, moved)
+    hardly = hardly_seen_states(model, moved)
+    more = f"states: {hardly} of {states} hardly move the outputs of the linear model; {states - hardly} may do"
     m = len(first.input_channels)
     b, d = np.zeros((states, m)), np.zeros((len(first.output_channels), m))
     b[:, varying], d[:, varying] = model.b, model.d
@@ -62,7 +65,7 @@ def linear_pnlss(
         inputs=first.input_channels,
         outputs=model.outputs,
         specimen=model.specimen,
-        notes=model.notes,
+        notes=(*model.notes, more) if hardly else model.notes,
     )
 
 

@@ -17,8 +17,9 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
 from identification.pnlss.features import Features
-from identification.pnlss.kernels import Matrices, simulate, workspace
-from identification.pnlss.simulation import Simulation
+from identification.pnlss.kernels import Matrices
+from identification.pnlss.model_arrays import MATRICES, model_arrays, model_values
+from identification.pnlss.simulation import Simulation, simulated_run
 from identification.validation import finite_array, positive, read_only
 
 __all__ = ["PnlssModel"]
@@ -27,7 +28,6 @@ Float = NDArray[np.float64]
 
 _UNBOUNDED = 1e4
 """A state this many times the largest of the training data has left every range in which a model says anything."""
-_MATRICES = ("a", "b", "e", "c", "d", "f")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -85,7 +85,7 @@ class PnlssModel:
         for name in ("inputs", "outputs", "training", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         positive("sample_rate_hz", self.sample_rate_hz, "Hz")
-        for name in _MATRICES:
+        for name in MATRICES:
             object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, 2))
         for name in ("state_range", "input_range"):
             object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
@@ -151,7 +151,7 @@ class PnlssModel:
     @property
     def matrices(self) -> Matrices:
         """The matrices as the kernels take them."""
-        return Matrices(*(np.ascontiguousarray(getattr(self, name)) for name in _MATRICES))
+        return Matrices(*(np.ascontiguousarray(getattr(self, name)) for name in MATRICES))
 
     @property
     def nonlinear_coefficients(self) -> int:
@@ -210,27 +210,7 @@ class PnlssModel:
         A run that leaves all bounds is no error: it ends there, and `Simulation` says where. Raises `IdentificationError` on
         NaN or inf, and on shapes that do not agree.
         """
-        u = finite_array("inputs", inputs, np.float64, 2)
-        if u.shape[0] != len(self.inputs):
-            raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
-        begin = np.zeros(self.states) if initial_state is None else initial_state
-        x0 = np.array(finite_array("initial_state", begin, np.float64, 1))
-        if x0.size != self.states:
-            raise IdentificationError(f"initial_state: has {x0.size} values, needs {self.states}")
-        x, y = np.empty((u.shape[1], self.states)), np.empty((u.shape[1], len(self.outputs)))
-        m, tables = self.matrices, (self.state_features.table, self.output_features.table)
-        count = simulate(m, *tables, np.ascontiguousarray(u.T), x0, self.bound, workspace(m), x, y)
-        x[count:], y[count:] = np.nan, np.nan
-        with np.errstate(divide="ignore", invalid="ignore"):  # of what never moved in training
-            state_use = np.max(np.abs(x[:count]), axis=0, initial=0.0) / self.state_range
-            input_use = np.max(np.abs(u), axis=1, initial=0.0) / self.input_range
-        return Simulation(
-            outputs=y.T,
-            states=x.T,
-            state_use=state_use,
-            input_use=input_use,
-            unbounded_at=None if count == u.shape[1] else int(count),
-        )
+        return simulated_run(self, inputs, initial_state)
 
     @property
     def bound(self) -> Float:
@@ -239,39 +219,9 @@ class PnlssModel:
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Arrays by name, and the attributes (ready for JSON) that go with them."""
-        arrays: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in _MATRICES}
-        arrays |= {"state_range": self.state_range, "input_range": self.input_range}
-        for name, features in (("state_features", self.state_features), ("output_features", self.output_features)):
-            arrays |= {f"{name}/{part}": getattr(features, part) for part in ("exponents", "weights", "limits")}
-        return arrays, {
-            "sample_rate_hz": self.sample_rate_hz,
-            "inputs": [vars(channel) for channel in self.inputs],
-            "outputs": [vars(channel) for channel in self.outputs],
-            "excited_hz": None if self.excited_hz is None else list(self.excited_hz),
-            "training": list(self.training),
-            "specimen": self.specimen,
-            "notes": list(self.notes),
-        }
+        return model_arrays(self)
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "PnlssModel":
         """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
-        try:
-            values: dict[str, Any] = {name: arrays[name] for name in (*_MATRICES, "state_range", "input_range")}
-            variables = int(values["a"].shape[0] + values["b"].shape[1])
-            for name in ("state_features", "output_features"):
-                parts: dict[str, Any] = {part: arrays[f"{name}/{part}"] for part in ("exponents", "weights", "limits")}
-                values[name] = Features(variables=variables, **parts)
-            for name in ("inputs", "outputs"):
-                values[name] = tuple(Channel(**channel) for channel in attributes[name])
-            texts: dict[str, Any] = {name: tuple(attributes[name]) for name in ("training", "notes")}
-            band = attributes.get("excited_hz")
-            return cls(
-                **values,
-                **texts,
-                excited_hz=None if band is None else (float(band[0]), float(band[1])),
-                sample_rate_hz=float(attributes["sample_rate_hz"]),
-                specimen=str(attributes["specimen"]),
-            )
-        except (KeyError, TypeError, IndexError) as error:
-            raise IdentificationError(f"PNLSS model: {error} is missing or unknown") from None
+        return cls(**model_values(arrays, attributes))

@@ -5,7 +5,7 @@ early: so several begin, and every few iterations the better half of them goes o
 AISTATS 2016).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +15,10 @@ from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
 from identification.pnlss.fitting.fit import fit_pnlss
 from identification.pnlss.fitting.result import PnlssFit
-from identification.pnlss.fitting.settings import FitSettings
+from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.model import PnlssModel
 
-__all__ = ["best_of_starts", "random_start"]
+__all__ = ["best_of_starts", "interrupted", "random_start"]
 
 Float = NDArray[np.float64]
 
@@ -59,28 +59,48 @@ def best_of_starts(
     *,
     validation: Sequence[Experiment],
     settings: FitSettings,
+    progress: Callable[[FitProgress], None] | None = None,
 ) -> tuple[PnlssModel, PnlssFit]:
     """The start that is left when the worse half has been dropped several times, and its fit so far.
 
-    An interrupt ends it with the best so far.
+    An interrupt ends it with the best so far, or is passed on where there is none.
     """
-    fits: list[tuple[PnlssModel, PnlssFit | None]] = [(start, None) for start in starts]
-    best: tuple[PnlssModel, PnlssFit] | None = None
+    fits: dict[int, PnlssFit] = {}
+    left = list(range(len(starts)))
     for iterations in _ROUNDS:
         limits = replace(settings, iterations=min(settings.iterations, iterations), patience=0)
-        done: list[tuple[PnlssModel, PnlssFit]] = []
-        for start, so_far in fits:
-            found = fit_pnlss(start, experiments, validation=validation, settings=limits, resume=so_far)
-            done.append((start, found))
-            if found.interrupted:
-                rest = [(other, fit) for other, fit in fits[len(done) :] if fit is not None]
-                start, best_fit = min([*done, *rest], key=_error)
-                return start, replace(best_fit, interrupted=True, stopped=found.stopped)
-        done.sort(key=_error)
-        best, fits = done[0], [*done[: max(len(done) // 2, 1)]]
-    assert best is not None
-    return best
+        for number in left:
+            told = None if progress is None else _told(progress, f"start {number + 1} of {len(starts)}")
+            try:
+                fits[number] = fit_pnlss(
+                    starts[number],
+                    experiments,
+                    validation=validation,
+                    settings=limits,
+                    progress=told,
+                    resume=fits.get(number),
+                )
+            except KeyboardInterrupt:
+                if not fits:
+                    raise
+                stopped = True
+            else:
+                stopped = fits[number].interrupted
+            if stopped:
+                best = min(fits, key=lambda k: _error(fits[k]))
+                return starts[best], interrupted(replace(fits[best], settings=settings))
+        left = sorted(left, key=lambda k: _error(fits[k]))[: max(len(left) // 2, 1)]
+    return starts[left[0]], fits[left[0]]
 
 
-def _error(found: tuple[PnlssModel, PnlssFit]) -> float:
-    return found[1].training_error if np.isnan(found[1].validation_error) else found[1].validation_error
+def interrupted(fit: PnlssFit) -> PnlssFit:
+    """The same, as one that was stopped from outside."""
+    return replace(fit, interrupted=True, stopped="interrupted")
+
+
+def _told(progress: Callable[[FitProgress], None], stage: str) -> Callable[[FitProgress], None]:
+    return lambda at: progress(replace(at, stage=stage))
+
+
+def _error(found: PnlssFit) -> float:
+    return found.training_error if np.isnan(found.validation_error) else found.validation_error

@@ -1,11 +1,19 @@
 """What a nonlinear state-space model makes of an input, and how far outside of what it knows that lies."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Simulation"]
+from identification.errors import IdentificationError
+from identification.pnlss.kernels import simulate, workspace
+from identification.validation import finite_array
+
+if TYPE_CHECKING:
+    from identification.pnlss.model import PnlssModel
+
+__all__ = ["Simulation", "simulated_run"]
 
 Float = NDArray[np.float64]
 
@@ -45,3 +53,28 @@ class Simulation:
             return float(np.inf)
         both = np.concatenate([self.state_use, self.input_use])
         return float(np.nanmax(both)) if np.any(np.isfinite(both)) else float(np.nan)
+
+
+def simulated_run(model: "PnlssModel", inputs: ArrayLike, initial_state: ArrayLike | None) -> Simulation:
+    """What a model makes of inputs; see `PnlssModel.simulate`."""
+    u = finite_array("inputs", inputs, np.float64, 2)
+    if u.shape[0] != len(model.inputs):
+        raise IdentificationError(f"inputs: shape {u.shape}, needs {len(model.inputs)} rows")
+    begin = np.zeros(model.states) if initial_state is None else initial_state
+    x0 = np.array(finite_array("initial_state", begin, np.float64, 1))
+    if x0.size != model.states:
+        raise IdentificationError(f"initial_state: has {x0.size} values, needs {model.states}")
+    x, y = np.empty((u.shape[1], model.states)), np.empty((u.shape[1], len(model.outputs)))
+    m, tables = model.matrices, (model.state_features.table, model.output_features.table)
+    count = simulate(m, *tables, np.ascontiguousarray(u.T), x0, model.bound, workspace(m), x, y)
+    x[count:], y[count:] = np.nan, np.nan
+    with np.errstate(divide="ignore", invalid="ignore"):  # of what never moved in training
+        state_use = np.max(np.abs(x[:count]), axis=0, initial=0.0) / model.state_range
+        input_use = np.max(np.abs(u), axis=1, initial=0.0) / model.input_range
+    return Simulation(
+        outputs=y.T,
+        states=x.T,
+        state_use=state_use,
+        input_use=input_use,
+        unbounded_at=None if count == u.shape[1] else int(count),
+    )

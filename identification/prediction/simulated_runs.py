@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.initial_states import fitted_initial_state
-from identification.pnlss.fitting.kernels import System
+from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.records import records_of
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulation import Simulation

@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment_groups import same_channels
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.periods import check_periodic
 
-__all__ = ["belongs", "check_data", "check_resumed"]
+__all__ = ["belongs", "check_data", "check_enough", "check_resumed", "check_signals"]
 
 
 def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
@@ -27,32 +29,51 @@ def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
             raise IdentificationError(f"{what}: {name} are {have}, the model has {need}")
 
 
+def check_signals(experiments: Sequence[Experiment]) -> None:
+    """Raise `IdentificationError` where experiments have not the same channels, or a channel is zero throughout."""
+    same_channels(experiments)
+    for kind, rows, channels in (
+        ("input", [e.inputs for e in experiments], experiments[0].input_channels),
+        ("output", [e.counted_outputs for e in experiments], experiments[0].output_channels),
+    ):
+        for index, channel in enumerate(channels):
+            if not any(np.any(row[index]) for row in rows):
+                raise IdentificationError(
+                    f"{kind} '{channel.name}': is zero throughout the training data; leave it out"
+                )
+
+
+def check_enough(experiments: Sequence[Experiment], parameters: int) -> None:
+    """Raise `IdentificationError` where there are fewer values than parameters."""
+    values = sum(e.counted * len(e.output_channels) for e in experiments)
+    if values < parameters:
+        raise IdentificationError(
+            f"experiments: {values} values of outputs count, fewer than the {parameters} parameters; "
+            "give more data, or take fewer features or states"
+        )
+
+
 def check_data(
-    start: PnlssModel, experiments: Sequence[Experiment], validation: Sequence[Experiment], parameters: int
+    start: PnlssModel,
+    experiments: Sequence[Experiment],
+    validation: Sequence[Experiment],
+    parameters: int,
+    by_frequency: bool,
 ) -> None:
     """Raise `IdentificationError` where data and model do not go together or the data cannot tell the parameters."""
-    same_channels(experiments)
+    check_signals(experiments)
     if not np.array_equal(start.state_features.limits, start.output_features.limits):
         raise IdentificationError(
             "output_features: have other limits than state_features; a fit needs the same for both"
         )
     for kind, group in (("experiments", experiments), ("validation", validation)):
         for index, experiment in enumerate(group):
-            belongs(start, experiment, f"{kind}[{index}]{f' ({experiment.name})' if experiment.name else ''}")
-    values = sum(e.counted for e in experiments) * len(start.outputs)
-    if values < parameters:
-        raise IdentificationError(
-            f"experiments: {values} values of outputs count, fewer than the {parameters} parameters; "
-            "give more data, or take fewer features or states"
-        )
+            what = f"{kind}[{index}]{f' ({experiment.name})' if experiment.name else ''}"
+            belongs(start, experiment, what)
+            if by_frequency and experiment.period_samples:
+                check_periodic(experiment, what)
+    check_enough(experiments, parameters)
     inputs = np.concatenate([e.inputs for e in experiments], axis=1)
-    outputs = np.concatenate([e.counted_outputs for e in experiments], axis=1)
-    for name, rows, channels in (("input", inputs, start.inputs), ("output", outputs, start.outputs)):
-        for row, channel in zip(rows, channels, strict=True):
-            if not np.any(row):
-                raise IdentificationError(
-                    f"{name} '{channel.name}': is zero throughout the training data; leave it out"
-                )
     unit = inputs / np.max(np.abs(inputs), axis=1, keepdims=True)
     values_of = np.linalg.eigvalsh(unit @ unit.T)
     if values_of[0] < 1e-12 * values_of[-1]:

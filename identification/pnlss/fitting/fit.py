@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment, excited_band
+from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment_groups import excited_band
 from identification.pnlss.fitting.checks import check_data, check_resumed
 from identification.pnlss.fitting.initial_states import fitted_initial_state
 from identification.pnlss.fitting.levenberg_marquardt import Iterates, iterate
@@ -70,7 +71,7 @@ def fit_pnlss(
     settings = FitSettings() if settings is None else settings
     estimated = sum(e.initial_state == "estimated" for e in experiments)
     parameters = Parameters(start, estimated)
-    check_data(start, experiments, validation, parameters.count)
+    check_data(start, experiments, validation, parameters.count, settings.by_frequency)
     check_memory(parameters, [*experiments, *validation], settings.by_frequency)
     if resume is not None:
         check_resumed(start, resume, estimated)

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.kernels import System, room, sensitivities
+from identification.pnlss.fitting.kernels import sensitivities
+from identification.pnlss.fitting.layout import System, room
 from identification.pnlss.fitting.records import BOUND, Record, simulated
 from identification.pnlss.fitting.slopes import slopes_of
 
@@ -37,15 +38,16 @@ def fitted_initial_state(system: System, record: Record, weights: Float, samples
                 float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2) + PRIOR * x @ x)
             )
 
-    slopes = slopes_of(system)
+    slopes, none, all_samples = slopes_of(system), np.arange(0), np.arange(end - first)
+    into = (jacobian, rows, errors)
     x, damping = np.zeros(n), 1e-6
     best = error(x)
     for _ in range(_ITERATIONS):
         r = room(system, slopes, n)
         r.x[:] = x
         r.s[0] = np.eye(n)
-        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, 0, r, jacobian, rows, errors)
-        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, 1, r, jacobian, rows, errors)
+        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, False, none, r, *into)
+        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, True, all_samples, r, *into)
         stacked = jacobian[:, :, :n].reshape(-1, n)
         if done < end or not np.all(np.isfinite(stacked)):
             break

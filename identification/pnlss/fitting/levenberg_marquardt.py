@@ -19,6 +19,11 @@ Float = NDArray[np.float64]
 _FACTOR = 10.0
 _SMALLEST, _LARGEST = 1e-16, 1e8
 """Dampings worth trying."""
+_NEAR = 1e-4
+"""Relative gain of an iteration below which the end may be near: from then on all samples make the Hessian, and steps reach a
+minimum in few iterations. Before, some of the samples lead on as fast."""
+_WORTH = 0.01
+"""A smaller damping is tried where it promises so much more than the gain that is there."""
 _STALLED = 5
 """Iterations on end without a gain worth the name, after which a fit ends."""
 
@@ -61,6 +66,12 @@ class Iterates:
             seconds=np.array(self.seconds),
         )
 
+    def every(self, problem: Problem) -> int:
+        """Of how many samples on end the next Hessian takes one; of each one, once the training error has nearly stalled."""
+        errors, near = np.array(self.training), max(_NEAR, problem.settings.tolerance)
+        far = np.all(np.diff(errors) < -near * errors[:-1])
+        return problem.every if far else 1
+
     def add(self, problem: Problem, vector: Float, training: float, damping: float) -> None:
         """One more iterate."""
         validation = problem.validation_error(vector)
@@ -78,10 +89,13 @@ def iterate(problem: Problem, iterates: Iterates, progress: Callable[[FitProgres
     settings = problem.settings
     try:
         while (reason := _reason(iterates, settings)) is None:
-            equations = problem.equations(iterates.vector)
+            equations = problem.equations(iterates.vector, every := iterates.every(problem))
             if not (np.all(np.isfinite(equations.hessian)) and np.all(np.isfinite(equations.gradient))):
                 return "the sensitivities of the last iterate leave all bounds", False
             found = _descend(problem, Steps(equations, settings.truncation), iterates)
+            if found is None and every > 1:
+                equations = problem.equations(iterates.vector)
+                found = _descend(problem, Steps(equations, settings.truncation), iterates)
             if found is None:
                 return "no step of any damping fits better", False
             iterates.add(problem, *found)
@@ -112,8 +126,8 @@ def _reason(iterates: Iterates, settings: FitSettings) -> str | None:
 def _descend(problem: Problem, steps: Steps, iterates: Iterates) -> tuple[Float, float, float] | None:
     """The parameters, their training error and the damping of a step that fits better; None if none does.
 
-    A simulation costs far less than sensitivities, so dampings are simply tried: downwards as long as that is better, and
-    upwards where nothing was.
+    A simulation costs far less than sensitivities, so dampings are simply tried: downwards as long as that is better and
+    promises to be, and upwards where nothing was.
     """
 
     def tried(damping: float) -> tuple[float, Float, float]:
@@ -125,7 +139,12 @@ def _descend(problem: Problem, steps: Steps, iterates: Iterates) -> tuple[Float,
     damping = max(iterates.damping / _FACTOR, _SMALLEST)
     best = tried(damping)
     if best[0] < before:
-        while damping > _SMALLEST and (other := tried(damping / _FACTOR))[0] < best[0]:
+        while damping > _SMALLEST:
+            if steps.promised(damping / _FACTOR) < (1.0 + _WORTH) * steps.promised(damping):
+                break
+            other = tried(damping / _FACTOR)
+            if not other[0] < best[0]:
+                break
             best, damping = other, damping / _FACTOR
         return best[1], best[2], damping
     while damping < _LARGEST:

@@ -13,16 +13,18 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import dgemm, dsyrk
 
 from identification.pnlss.fitting.frequency_lines import transformed
-from identification.pnlss.fitting.kernels import System, room, sensitivities
+from identification.pnlss.fitting.kernels import sensitivities
+from identification.pnlss.fitting.layout import System, room
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import BOUND, Record
 from identification.pnlss.fitting.slopes import slopes_of
 
-__all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "normal_equations"]
+__all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "kept_samples", "normal_equations"]
 
 Float = NDArray[np.float64]
 BLOCK = 256
 """Samples of a block whose derivatives are kept: its Jacobian stays in the cache between the recursion and the products."""
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +35,22 @@ class NormalEquations:
     gradient: Float
 
 
+def kept_samples(samples: int, every: int) -> NDArray[np.int64]:
+    """One of each ``every`` samples on end, at places that follow the golden ratio.
+
+    A fixed stride would see a vibration whose period is a few strides at the same few phases throughout, and tell less of its
+    harmonics than there is to know.
+    """
+    begins = np.arange(0, samples, every)
+    widths = np.minimum(every, samples - begins)
+    return np.asarray(begins + np.floor(widths * (_GOLDEN * np.arange(begins.size) % 1.0)), dtype=np.int64)
+
+
 class Blocks:
     """Goes through an experiment block by block.
 
     Iterating gives the Jacobian float[n_outputs, n, n_columns], rows float[n, n_own] and weighted errors
-    float[n_errors, n_outputs] of counted samples, n of them each ``every``-th and errors of all; the arrays are used again.
+    float[n_errors, n_outputs] of counted samples, n of them one of each ``every`` and errors of all; the arrays are used again.
     After that the products of derivatives and errors are there. Ends early, with NaN, where the run leaves all bounds.
     """
 
@@ -67,21 +80,23 @@ class Blocks:
         record, every, outputs = self._record, self._every, len(self._weights)
         edges = [*range(0, record.counted_from, BLOCK * every), *_edges(record, BLOCK * every), len(record.u)]
         columns, own = self.gradient.size, self.own_gradient.shape[1]
-        kept = np.zeros((outputs, 0, columns)), np.zeros((0, own)), np.zeros((0, outputs))
+        samples = kept_samples(0, every)
+        into = np.zeros((outputs, 0, columns)), np.zeros((0, own)), np.zeros((0, outputs))
         for begin, end in pairwise(edges):
             counted = begin >= record.counted_from
-            if counted and end - begin != len(kept[2]):
-                n = -(-(end - begin) // every)
-                kept = np.zeros((outputs, n, columns)), np.zeros((n, own)), np.zeros((end - begin, outputs))
+            if counted and end - begin != len(into[2]):
+                samples = kept_samples(end - begin, every)
+                n = samples.size
+                into = np.zeros((outputs, n, columns)), np.zeros((n, own)), np.zeros((end - begin, outputs))
             u, y = record.u[begin:end], record.y[begin:end]
-            how = (BOUND, self._weights, self._linear, every if counted else 0)
-            if sensitivities(self._system, self._slopes, u, y, *how, self._room, *kept) < end - begin:
-                kept[0][:] = np.nan
+            how = (BOUND, self._weights, self._linear, counted, samples)
+            if sensitivities(self._system, self._slopes, u, y, *how, self._room, *into) < end - begin:
+                into[0][:] = np.nan
                 self.gradient[:] = np.nan
-                yield kept
+                yield into
                 return
             if counted:
-                yield kept
+                yield into
 
 
 def _edges(record: Record, size: int) -> Iterator[int]:
@@ -125,8 +140,8 @@ def normal_equations(
 ) -> NormalEquations:
     """Of all experiments at ``vector``, errors weighted by output (float[n_outputs]) and as each record says.
 
-    The gradient is that of all samples; the Hessian that of each ``every``-th, except for errors by frequency line. Not finite
-    where a run leaves all bounds.
+    The gradient is that of all samples; the Hessian that of one of each ``every``, except for errors by frequency line. Not
+    finite where a run leaves all bounds.
     """
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     hessian, gradient = np.zeros((parameters.count, parameters.count)), np.zeros(parameters.count)

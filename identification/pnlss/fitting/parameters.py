@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.kernels import System
+from identification.pnlss.fitting.layout import System
 from identification.pnlss.kernels import Matrices, Table
 from identification.pnlss.model import PnlssModel
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.frequency_lines import with_lines
 from identification.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
-from identification.pnlss.fitting.kernels import System
+from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record, records_of, simulated
@@ -19,6 +19,10 @@ from identification.pnlss.model import PnlssModel
 __all__ = ["Problem", "Scales", "scales_of"]
 
 Float = NDArray[np.float64]
+
+_EVERY = (1, 2, 4, 8)
+_VALUES = 100
+"""Values of outputs for each parameter that a Hessian is to be from, if fewer samples are to lead on as all do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,15 @@ class Problem:
         self._held[parameters.ends[2] : parameters.ends[3]] = PRIOR / self._total
         self._validation_total = self._measured(self.validation)
 
+    @property
+    def every(self) -> int:
+        """Of how many samples on end one is enough for the Hessian of a step far from the minimum."""
+        if self.settings.every is not None:
+            return self.settings.every
+        values = sum(len(r.u) - r.counted_from for r in self.training) * self.weights.size
+        enough = [n for n in _EVERY if values >= _VALUES * n * self.parameters.count]
+        return max(enough, default=1)
+
     def _measured(self, records: list[Record]) -> float:
         return sum(record.weight * float(self.weights**2 @ record.squares(record.y)) for record in records)
 
@@ -118,8 +131,8 @@ class Problem:
             return float(np.inf)
         return error**2 + float(self._ridge @ vector**2)
 
-    def equations(self, vector: Float) -> NormalEquations:
+    def equations(self, vector: Float, every: int = 1) -> NormalEquations:
         """Normal equations of half of `cost`; initial states that outputs do not tell of are held back."""
-        found = normal_equations(self.parameters, vector, self.training, self.weights, self.settings.every)
+        found = normal_equations(self.parameters, vector, self.training, self.weights, every)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
         return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.pnlss.experiment import Experiment
-from identification.pnlss.fitting.kernels import System
+from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.parameters import matrices_of
 from identification.pnlss.kernels import simulate, workspace
 

@@ -36,9 +36,10 @@ class FitSettings:
         Rows of a frequency in Hz and the weight of errors there, one for all outputs or one for each; linear in between and 0
         beyond. Needs periodic experiments.
     every
-        The Hessian of a step is from each ``every``-th sample. Its gradient is always from all, so that a fit ends at the same
-        parameters; but neighbouring samples of finely sampled records tell nearly the same, and steps take less time.
-        With fewer than some 50 values of outputs for each parameter left, more iterations cost what each of them saves.
+        The Hessian of a step is from one of each ``every`` samples, neighbours of which tell nearly the same where records are
+        finely sampled. Its gradient is always from all, and once the training error falls slowly, or no step fits better, the
+        Hessian is too: a fit ends where one with 1 throughout does. None: 2, 4 or 8 where some hundred values of outputs
+        remain for each parameter, else 1.
     damping
         Of the first step, relative to the largest eigenvalue of the scaled normal equations.
     truncation
@@ -58,7 +59,7 @@ class FitSettings:
     ridge: float = 0.0
     band_hz: tuple[float, float] | None = None
     line_weights: tuple[tuple[float, ...], ...] = ()
-    every: int = 1
+    every: int | None = None
     damping: float = 1e-3
     truncation: float = 1e-13
 
@@ -70,7 +71,7 @@ class FitSettings:
             ("tolerance", "0 and above, below 1", 0.0 <= self.tolerance < 1.0),
             ("outputs", ", ".join(get_args(OutputWeighting)), self.outputs in get_args(OutputWeighting)),
             ("ridge", "0 and above, finite", 0.0 <= self.ridge < float("inf")),
-            ("every", "1 and above", self.every >= 1),
+            ("every", "None, or 1 and above", self.every is None or self.every >= 1),
             ("damping", "above 0, finite", 0.0 < self.damping < float("inf")),
             ("truncation", "0 and above, below 1", 0.0 <= self.truncation < 1.0),
         ):
@@ -111,6 +112,8 @@ class FitProgress:
         Of the step that led here.
     seconds
         Since the fit began.
+    stage
+        ``start 3 of 8`` while starts are compared; empty in the fit itself.
     """
 
     iteration: int
@@ -119,3 +122,4 @@ class FitProgress:
     validation_error: float
     damping: float
     seconds: float
+    stage: str = ""

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.kernels import Slopes, System
+from identification.pnlss.fitting.layout import Slopes, System
 from identification.pnlss.kernels import Table
 
 __all__ = ["slopes_of"]

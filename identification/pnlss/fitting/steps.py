@@ -45,3 +45,8 @@ class Steps:
             return np.zeros_like(self._scale)
         solved = self._gradient / (self._values + damping * self._values[-1])
         return np.asarray(-self._scale * (self._vectors @ solved))
+
+    def promised(self, damping: float) -> float:
+        """Squared errors that the step with this damping takes away, if outputs are linear in the parameters."""
+        values, damped = self._values, self._values + damping * self._values[-1:]
+        return float(np.sum(self._gradient**2 * (2.0 * damped - values) / damped**2))

@@ -1,5 +1,6 @@
 """From experiments to a model in one call, against systems that are known."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from identification import (
     Features,
+    FitProgress,
     FitSettings,
     IdentificationError,
     PnlssModel,
@@ -16,6 +18,9 @@ from identification import (
     pnlss_errors,
 )
 from identification.linear.state_space_fit import spectral_radius
+from identification.pnlss import identify, saturating_starts
+from identification.pnlss import linear_model as linear_model_module
+from identification.pnlss.fitting import memory
 from identification.pnlss.linear_start import linear_start, reflected
 from tests.identification.pnlss.multisines import RATE_HZ, channels, linear_model, measured, multisine, oscillator
 
@@ -56,6 +61,63 @@ def test_saturating_features_find_a_saturating_system() -> None:
     assert found.model.output_features.count == 0
 
 
+def stopped_after(iterations: int, seen: list[FitProgress]) -> Callable[[FitProgress], None]:
+    def progress(at: FitProgress) -> None:
+        seen.append(at)
+        if len(seen) == iterations:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_starts_are_told_of_while_they_are_compared() -> None:
+    seen: list[FitProgress] = []
+    identify_pnlss(
+        [measured(hardening(), multisine(0))],
+        states=2,
+        saturating=2,
+        settings=FitSettings(iterations=61, tolerance=0.0),
+        progress=seen.append,
+    )
+    stages = list(dict.fromkeys(at.stage for at in seen))
+    assert stages[:8] == [f"start {k} of 8" for k in range(1, 9)]
+    assert stages[-1] == ""
+    assert max(at.iteration for at in seen if at.stage == stages[0]) in (10, 20, 60)
+
+
+@pytest.mark.parametrize("iterations", [25, 85, 161])
+def test_an_interrupt_while_starts_are_compared_gives_the_best_of_them(iterations: int) -> None:
+    seen: list[FitProgress] = []
+    experiments = [measured(hardening(), multisine(0))]
+    found = identify_pnlss(
+        experiments,
+        states=2,
+        saturating=2,
+        settings=FitSettings(tolerance=0.0),
+        progress=stopped_after(iterations, seen),
+    )
+    assert found.interrupted
+    assert found.training_error == min(at.training_error for at in seen)
+    assert pnlss_errors(found.model, experiments).relative[0, 0] == pytest.approx(found.training_error, rel=1e-6)
+
+
+def test_an_interrupt_before_there_is_any_fit_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    experiments = [measured(hardening(), multisine(0))]
+    for module, name in ((linear_model_module, "linear_start"), (saturating_starts, "fit_pnlss")):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, interrupt)
+            with pytest.raises(KeyboardInterrupt):
+                identify_pnlss(experiments, states=2, saturating=2)
+    with monkeypatch.context() as patch:  # between the last of the starts that are compared and what follows
+        patch.setattr(identify, "fit_pnlss", interrupt)
+        found = identify_pnlss(experiments, states=2, saturating=2)
+    assert found.interrupted
+    assert found.training_error < 0.1
+
+
 def test_two_states_in_a_narrow_band_are_found() -> None:
     """A mode at 25 Hz, shaken from 15 to 35 Hz at 800 Hz: all lines lie within nine degrees of the circle."""
     exact = linear_model(oscillator(frequency_hz=25.0, damping=0.005))
@@ -77,7 +139,24 @@ def test_of_too_many_states_for_a_band_it_says_how_many_it_tells() -> None:
     with pytest.raises(
         IdentificationError, match=r"states: is 12, but 3 lines in 24\.2188 to 25\.7812 Hz at 800 Hz.*ask for fewer"
     ):
-        identify_pnlss(experiments, states=12)
+        identify_pnlss(experiments, states=12, degrees=())
+
+
+def test_of_more_states_than_move_the_outputs_a_note_says_how_many_do() -> None:
+    linear = linear_model(oscillator(outputs=2))
+    experiments = [measured(linear, multisine(seed), noise=1e-3, seed=seed) for seed in range(2)]
+    fewer = "states: 2 of 4 hardly move the outputs of the linear model; 2 may do"
+    assert fewer in linear_pnlss(experiments, states=4).notes
+    assert not any("hardly" in note for note in linear_pnlss(experiments, states=2).notes)
+
+
+def test_an_order_with_more_parameters_than_values_is_refused_before_anything_is_fitted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(identify, "linear_pnlss", None)
+    experiments = [measured(hardening(outputs=2), multisine(0))]
+    with pytest.raises(IdentificationError, match="2048 values of outputs count, fewer than the 44506 parameters"):
+        identify_pnlss(experiments, states=20)
 
 
 def test_an_unstable_start_is_reflected_and_fitted() -> None:
@@ -131,10 +210,18 @@ def test_outputs_that_forces_do_not_act_on_at_once_have_no_saturating_features()
     assert (len(model.state_features.weights), len(model.output_features.weights)) == (3, 0)
 
 
-def test_what_cannot_be_is_named() -> None:
+def test_what_cannot_be_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     experiments = [measured(hardening(), multisine(0))]
     with pytest.raises(IdentificationError, match="states: is 0, needs at least 1"):
         identify_pnlss(experiments, states=0)
+    with pytest.raises(IdentificationError, match=r"states: is 2\.5, needs at least 1, whole"):
+        identify_pnlss(experiments, states=2.5)  # type: ignore[arg-type]
+    with pytest.raises(IdentificationError, match="output 'a0': is zero throughout the training data; leave it out"):
+        identify_pnlss([replace(experiments[0], outputs=0.0 * experiments[0].outputs)], states=2)
+    with pytest.raises(IdentificationError, match=r"'run', outputs: value at .* is nan, must be finite"):
+        replace(experiments[0], name="run", outputs=np.nan * experiments[0].outputs)
+    with pytest.raises(IdentificationError, match=r"sample_rate_hz: has shape \(9,\), needs one number; resample"):
+        replace(experiments[0], sample_rate_hz=np.linspace(0.0, 1.0, 9))
     with pytest.raises(IdentificationError, match="variables: is 'inputs', allowed are all, states"):
         identify_pnlss(experiments, states=2, variables="inputs")  # type: ignore[arg-type]
     with pytest.raises(IdentificationError, match="saturating: is -1, allowed is 0 and above"):
@@ -145,6 +232,9 @@ def test_what_cannot_be_is_named() -> None:
         identify_pnlss(experiments, states=4, linear=oscillator())
     with pytest.raises(IdentificationError, match="linear: has an eigenvalue of magnitude 2"):
         identify_pnlss(experiments, states=2, linear=oscillator()._replace(a=2.0 * np.eye(2)))
+    monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
+    with pytest.raises(IdentificationError, match="memory: the fit needs"):
+        identify_pnlss(experiments, states=2)
 
 
 def test_a_constant_input_makes_up_for_offsets_that_nobody_knows() -> None:

@@ -1,0 +1,73 @@
+"""What the kernels of a fit work on: a system, its derivatives, and the room of a recursion over time."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.pnlss.kernels import Table
+
+__all__ = ["Room", "Slopes", "System", "room"]
+
+
+class System(NamedTuple):
+    """A model as its parameters stand: ``x(k+1) = [A B E] z``, ``y = [C D F] q``, ``z = (x, u, phi)``, ``q = (x, u, chi)``."""
+
+    state: np.ndarray
+    """float[n_states, n_variables + n_state_features], [A B E]."""
+    output: np.ndarray
+    """float[n_outputs, n_variables + n_output_features], [C D F]."""
+    state_table: Table
+    output_table: Table
+
+
+class Slopes(NamedTuple):
+    """Derivatives of the monomials of a system, which are a few monomials themselves."""
+
+    table: Table
+    """Monomials that occur in derivatives, of degree one and above."""
+    coefficients: np.ndarray
+    """float[n_monomials, (n_states + n_outputs) * n_states]: their shares in ``E d phi / d x`` and ``F d chi / d x``."""
+
+
+class Room(NamedTuple):
+    """What the recursion carries from sample to sample, and where it works."""
+
+    x: np.ndarray
+    """float[n_states], the state before the next sample."""
+    s: np.ndarray
+    """float[2, n_states, n_columns], its sensitivities, first of the two between calls."""
+    z: np.ndarray
+    q: np.ndarray
+    slopes: np.ndarray
+    """float[n_slopes], the monomials in derivatives."""
+    effective: np.ndarray
+    """float[(n_states + n_outputs) * n_states], ``A + E d phi / d x`` above ``C + F d chi / d x``."""
+    back: np.ndarray
+    """float[n_states], errors through the outputs."""
+    gradient: np.ndarray
+    """float[n_columns + n_output_weights], derivatives times errors, summed."""
+    own_gradient: np.ndarray
+    """float[n_outputs, n_output_columns], the same of [C D F]."""
+    row: np.ndarray
+    """float[n_output_weights], derivatives of an output by the weights in its features."""
+    state_steep: np.ndarray
+    output_steep: np.ndarray
+
+
+def room(system: System, slopes: Slopes, columns: int) -> Room:
+    """Room for a recursion with so many columns of sensitivities."""
+    n, outputs = system.state.shape[0], system.output.shape[0]
+    return Room(
+        np.zeros(n),
+        np.zeros((2, n, columns)),
+        np.zeros(system.state.shape[1]),
+        np.zeros(system.output.shape[1]),
+        np.zeros(len(slopes.coefficients)),
+        np.zeros((n + outputs) * n),
+        np.zeros(n),
+        np.zeros(columns + system.output_table.weights.size),
+        np.zeros((outputs, system.output.shape[1])),
+        np.zeros(system.output_table.weights.size),
+        np.zeros((system.state_table.weights.shape[0], 2)),
+        np.zeros((system.output_table.weights.shape[0], 2)),
+    )
