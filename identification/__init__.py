@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.pnlss.best_linear import best_linear_responses
+    from identification.pnlss.coupled.run import CoupledRun, pnlss_coupled_run
     from identification.pnlss.error_table import ErrorTable
     from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
@@ -94,6 +95,7 @@ __all__ = [
     "Comparison",
     "ConstantForceCurve",
     "ContinuousBackbone",
+    "CoupledRun",
     "DistortionLevels",
     "ErrorSpectra",
     "ErrorTable",
@@ -183,6 +185,7 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "pnlss_coupled_run",
     "pnlss_errors",
     "pnlss_frequency_response",
     "pnlss_response",
@@ -211,6 +214,7 @@ _MODULE_OF = {
     "Comparison": "prediction.comparison",
     "ConstantForceCurve": "response_control.curves",
     "ContinuousBackbone": "slow_flows.continuous",
+    "CoupledRun": "pnlss.coupled.run",
     "DistortionLevels": "multisine.distortion",
     "ErrorSpectra": "prediction.simulated_runs",
     "ErrorTable": "pnlss.error_table",
@@ -300,6 +304,7 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "pnlss_coupled_run": "pnlss.coupled.run",
     "pnlss_errors": "pnlss.errors",
     "pnlss_frequency_response": "pnlss.steady.response",
     "pnlss_response": "pnlss.steady.response",
