@@ -6,7 +6,7 @@ frequencies below those it was trained at becomes unstable with it. No causal fi
 (the phase of one follows from its gain, Bode 1945). Here one is chosen that is stable with the model and near to P; what is
 left to P is added in passes over the whole run (`identification.pnlss.coupled.run`), each of which multiplies the error by
 
-    (P - P^) G / (1 - P^ G),    G the model's linear part,
+    (P - P^) G / (1 - P G),    G the model's linear part,
 
 so that this is what is made small.
 """
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
+from scipy.ndimage import maximum_filter1d
 
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
@@ -42,8 +43,10 @@ _FAST = 2.5
 """Poles of the exciter that turn or decay faster than so many radians a sample are left to the delays."""
 _TOP = 0.495
 """Highest frequency over the sample rate."""
-_LINES = 300
-_EASY, _LEAST = 0.3, 0.8
+_LINES = 600
+_SHIFT = 0.15
+"""Relative shift of resonances with amplitude."""
+_EASY, _LEAST = 0.05, 0.8
 """Factors of a pass: up to the one the most silent filter is taken, beyond the other there is none."""
 
 
@@ -91,9 +94,9 @@ class Reaction:
         """Filters by least squares of the passes' factor, the less silent below the band first."""
         a, b = self.states()
         band_hz = self.lines(_LINES)
-        slow_hz = np.geomspace(0.03, 1.0, _LINES // 3) * _SLOW * self.lowest_hz
-        g, exact = linear(band_hz), self.exact(band_hz)
-        weight = np.abs(g / (1.0 - exact * g))
+        slow_hz = np.geomspace(0.03, 1.0, _LINES // 6) * _SLOW * self.lowest_hz
+        exact = self.exact(band_hz)
+        weight = self.sensitivity(band_hz, linear)
         inside = self._each(a, b, band_hz) * weight[:, None]
         below, still = (self._each(a, b, hz) * weight[0] for hz in (slow_hz, np.zeros(1)))
         right = np.concatenate([exact * weight, np.zeros(slow_hz.size + 1)])
@@ -106,11 +109,15 @@ class Reaction:
             found.append(Loop(a, b, np.ascontiguousarray(c[:-1]), float(c[-1])))
         return found
 
+    def sensitivity(self, lines_hz: Float, linear: Response) -> Float:
+        """float[n]: ``|G / (1 - P G)|``, and what it may become where resonances shift with the amplitude."""
+        g = linear(lines_hz)
+        reach = int(np.ceil(np.log1p(_SHIFT) / np.log(lines_hz[1] / lines_hz[0])))
+        return np.asarray(maximum_filter1d(np.abs(g / (1.0 - self.exact(lines_hz) * g)), 2 * reach + 1, mode="nearest"))
+
     def lines(self, count: int) -> Float:
-        """Hz: from the lowest frequency on, evenly by logarithm and evenly."""
-        top_hz = _TOP * self.sample_rate_hz
-        even_hz = np.linspace(self.lowest_hz, top_hz, count)
-        return np.concatenate([np.geomspace(self.lowest_hz, top_hz, count), even_hz])
+        """Hz: from the lowest frequency on, evenly by logarithm."""
+        return np.geomspace(self.lowest_hz, _TOP * self.sample_rate_hz, count)
 
     def response(self, loop: Loop, frequency_hz: Float) -> Complex:
         """complex[n]: P^ of a filter."""
@@ -134,11 +141,10 @@ def chosen_filter(reaction: Reaction, linear: StateSpace, row: int, output: int)
         return np.asarray(linear.response(z)[:, output, row])
 
     hz = reaction.lines(4 * _LINES)
-    g, exact = response(hz), reaction.exact(hz)
+    exact, sensitivity = reaction.exact(hz), reaction.sensitivity(hz, response)
     best, least = None, _LEAST
     for loop in reaction.filters(response):
-        near = reaction.response(loop, hz)
-        factor = float(np.max(np.abs((exact - near) * g / (1.0 - near * g))))
+        factor = float(np.max(np.abs(exact - reaction.response(loop, hz)) * sensitivity))
         if factor < max(least, _EASY) and _stable(loop, linear, row, output):
             best, least = loop, factor
     if best is None:

@@ -157,7 +157,9 @@ class _Run:
             state_use = np.max(np.abs(x[:reached]), axis=0, initial=0.0) / model.state_range
             input_use = inputs / model.input_range
         notes: tuple[str, ...] = ()
-        if change > _TOLERANCE:
+        if reached < n and passes > 1:
+            notes = (f"left all bounds in pass {passes} over the run, and in none before",)
+        elif change > _TOLERANCE:
             notes = (
                 f"after {passes} passes the force still changed by {100.0 * change:.2g} %: the run is that uncertain",
             )
