@@ -56,12 +56,8 @@ if TYPE_CHECKING:
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
-    from identification.pnlss.steady.response import (
-        PnlssResponse,
-        pnlss_frequency_response,
-        pnlss_response,
-        pnlss_steady_state,
-    )
+    from identification.pnlss.steady.response import pnlss_frequency_response, pnlss_response, pnlss_steady_state
+    from identification.pnlss.steady.result import PnlssResponse
     from identification.pnlss.steady.states import SteadyStates
     from identification.pnlss.study import IdentifiedModel, identify_many
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
@@ -249,7 +245,7 @@ _MODULE_OF = {
     "PnlssFit": "pnlss.fitting.result",
     "PnlssMapping": "mapping.pnlss",
     "PnlssModel": "pnlss.model",
-    "PnlssResponse": "pnlss.steady.response",
+    "PnlssResponse": "pnlss.steady.result",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",

@@ -156,7 +156,7 @@ def chosen_filter(reaction: Reaction, linear: StateSpace, row: int, output: int)
 
 
 def _stable(loop: Loop, linear: StateSpace, row: int, output: int) -> bool:
-    """Whether the linear part is stable with the reaction."""
+    """Whether the linear part is no less stable with the reaction than without it."""
     d = linear.d[output, row]
     through = 1.0 / (1.0 - loop.d * d)
     force = through * np.concatenate([loop.d * linear.c[output], loop.c])
@@ -165,4 +165,5 @@ def _stable(loop: Loop, linear: StateSpace, row: int, output: int) -> bool:
     n = len(linear.a)
     whole[:n] += np.outer(linear.b[:, row], force)
     whole[n:] += np.outer(loop.b, motion)
-    return bool(through > 0.0 and np.max(np.abs(np.linalg.eigvals(whole))) < 1.0)
+    alone = float(np.max(np.abs(np.linalg.eigvals(linear.a))))
+    return bool(through > 0.0 and np.max(np.abs(np.linalg.eigvals(whole))) < max(1.0, alone))
