@@ -156,13 +156,15 @@ class _Run:
         with np.errstate(divide="ignore", invalid="ignore"):  # of what never moved in training
             state_use = np.max(np.abs(x[:reached]), axis=0, initial=0.0) / model.state_range
             input_use = inputs / model.input_range
-        notes: tuple[str, ...] = ()
+        notes = []
         if reached < n and passes > 1:
-            notes = (f"left all bounds in pass {passes} over the run, and in none before",)
+            notes.append(f"left all bounds in pass {passes} over the run, and in none before")
         elif change > _TOLERANCE:
-            notes = (
-                f"after {passes} passes the force still changed by {100.0 * change:.2g} %: the run is that uncertain",
+            notes.append(
+                f"after {passes} passes the force still changed by {100.0 * change:.2g} %: the run is that uncertain"
             )
+        if np.max(np.abs(np.linalg.eigvals(model.a))) > 1.0:
+            notes.append("the model's linear part is unstable")
         return CoupledRun(
             outputs=y.T,
             states=x.T,
@@ -172,5 +174,5 @@ class _Run:
             force_n=force,
             passes=passes,
             change=change,
-            notes=notes,
+            notes=tuple(notes),
         )
