@@ -80,8 +80,9 @@ def test_a_run_settles_on_the_harmonic_balance_of_the_pair_up_to_its_folds() -> 
     rising = [25.0, 26.0, 27.0, 27.6, 28.0, 28.1, upper_hz - 0.02, upper_hz + 0.05]
     falling = [28.7, 28.3, 27.8, 27.4, lower_hz + 0.02, lower_hz - 0.05, 26.5]
     for frequencies, upper, jump in ((rising, 7, 7), (falling, 0, 5)):
-        settled = stairs(model, frequencies)
-        np.testing.assert_allclose(settled, balanced(model, curve.points, frequencies, upper), rtol=1e-3)
+        settled, exact = stairs(model, frequencies), balanced(model, curve.points, frequencies, upper)
+        np.testing.assert_allclose(settled, exact, rtol=1e-3)  # the one after the jump has not quite settled
+        np.testing.assert_allclose(np.delete(settled, jump, 1), np.delete(exact, jump, 1), rtol=1e-4)
         ratio = settled[0, jump] / settled[0, jump - 1]
         assert max(ratio, 1.0 / ratio) > 1.5
 
