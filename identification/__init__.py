@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from identification.nonlinear.single_points import single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode
     from identification.pnlss.best_linear import best_linear_responses
+    from identification.pnlss.coupled.run import CoupledRun, pnlss_coupled_run
     from identification.pnlss.error_table import ErrorTable
     from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
@@ -55,12 +56,8 @@ if TYPE_CHECKING:
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
-    from identification.pnlss.steady.response import (
-        PnlssResponse,
-        pnlss_frequency_response,
-        pnlss_response,
-        pnlss_steady_state,
-    )
+    from identification.pnlss.steady.response import pnlss_frequency_response, pnlss_response, pnlss_steady_state
+    from identification.pnlss.steady.result import PnlssResponse
     from identification.pnlss.steady.states import SteadyStates
     from identification.pnlss.study import IdentifiedModel, identify_many
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
@@ -94,6 +91,7 @@ __all__ = [
     "Comparison",
     "ConstantForceCurve",
     "ContinuousBackbone",
+    "CoupledRun",
     "DistortionLevels",
     "ErrorSpectra",
     "ErrorTable",
@@ -183,6 +181,7 @@ __all__ = [
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",
+    "pnlss_coupled_run",
     "pnlss_errors",
     "pnlss_frequency_response",
     "pnlss_response",
@@ -211,6 +210,7 @@ _MODULE_OF = {
     "Comparison": "prediction.comparison",
     "ConstantForceCurve": "response_control.curves",
     "ContinuousBackbone": "slow_flows.continuous",
+    "CoupledRun": "pnlss.coupled.run",
     "DistortionLevels": "multisine.distortion",
     "ErrorSpectra": "prediction.simulated_runs",
     "ErrorTable": "pnlss.error_table",
@@ -245,7 +245,7 @@ _MODULE_OF = {
     "PnlssFit": "pnlss.fitting.result",
     "PnlssMapping": "mapping.pnlss",
     "PnlssModel": "pnlss.model",
-    "PnlssResponse": "pnlss.steady.response",
+    "PnlssResponse": "pnlss.steady.result",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
@@ -300,6 +300,7 @@ _MODULE_OF = {
     "pack_frequency_responses": "frequency_responses",
     "periodic_spectra": "multisine.spectra",
     "periodic_vibration": "signals.fourier",
+    "pnlss_coupled_run": "pnlss.coupled.run",
     "pnlss_errors": "pnlss.errors",
     "pnlss_frequency_response": "pnlss.steady.response",
     "pnlss_response": "pnlss.steady.response",

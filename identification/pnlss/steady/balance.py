@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.continuation import System
+from identification.continuation.path import System
 from identification.pnlss.features import Features
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.steady.basis import Basis

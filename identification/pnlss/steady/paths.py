@@ -5,7 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.continuation import Path, Steps, continued, solved
+from identification.continuation.follow import continued
+from identification.continuation.newton import solved
+from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
 from identification.pnlss.steady.balance import Balance
 

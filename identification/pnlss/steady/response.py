@@ -1,7 +1,5 @@
 """Frequency responses and single periodic vibrations of nonlinear state-space models at constant force."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,63 +9,18 @@ from identification.pnlss.steady.balance import Balance
 from identification.pnlss.steady.excitation import Held
 from identification.pnlss.steady.notes import notes_of
 from identification.pnlss.steady.paths import Followed, followed, from_rest, polished, statically_stable
+from identification.pnlss.steady.result import PnlssResponse
 from identification.pnlss.steady.setting_up import balance_of, band_of, harmonics_that_fit, unknowns_near
 from identification.pnlss.steady.states import SteadyStates, steady_states
 from identification.prediction.exciter import Exciter
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.validation import positive
 
-__all__ = ["PnlssResponse", "pnlss_frequency_response", "pnlss_response", "pnlss_steady_state"]
+__all__ = ["pnlss_frequency_response", "pnlss_response", "pnlss_steady_state"]
 
 Float = NDArray[np.float64]
 
 _STEP = 0.05
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PnlssResponse:
-    """Frequency response of a nonlinear state-space model at constant force, with all harmonics.
-
-    Parameters
-    ----------
-    force_n, force
-        What is held, as in `SteadyPrediction`.
-    points, folds
-        The vibrations along the curve, and those where it turns back in frequency.
-    branch
-        int[n], 0 for the response that begins at the lowest frequency; 1 for the part that was reached from the highest,
-        where the first did not get there.
-    notes
-        What a user should know about these numbers, one line each.
-    """
-
-    force_n: float
-    force: str
-    points: SteadyStates
-    folds: SteadyStates
-    branch: NDArray[np.int64]
-    notes: tuple[str, ...]
-
-    @property
-    def prediction(self) -> SteadyPrediction:
-        """The fundamental harmonics; the modal amplitude is unknown, for no mode shape is needed."""
-        count, folds = self.points.count, self.folds.count
-        return SteadyPrediction(
-            force_n=self.force_n,
-            force=self.force,
-            channels=self.points.channels,
-            frequency_hz=self.points.frequency_hz,
-            modal_amplitude=np.full(count, np.nan),
-            fundamental_n=np.abs(self.points.force_n[:, 1]),
-            displacement_m=self.points.displacement_m[:, 1],
-            stable=self.points.stable,
-            branch=self.branch,
-            range_use=np.asarray(self.points.range_use),
-            fold_frequency_hz=self.folds.frequency_hz,
-            fold_amplitude_m=np.abs(self.folds.displacement_m[:, 1, 0]),
-            fold_modal_amplitude=np.full(folds, np.nan),
-            notes=self.notes,
-        )
 
 
 def pnlss_frequency_response(

@@ -5,6 +5,9 @@ of ``R^-1 T^+ f' T``, each of them many times over, turned by whole multiples of
 about the static harmonic suffer least from truncation; as many as there are states are kept, those of the lowest centroid,
 no two of them copies (a real negative multiplier over one period has two copies that lie equally low;
 Lazarus and Thomas, C. R. Mecanique 338, 2010; Bayer and Leine, Nonlinear Dyn. 111, 2023, on sorting).
+
+The product of Jacobians over a period, a smaller matrix, is no substitute: a period holds no whole number of samples, and the
+map says nothing between them. Where it does hold one, both are the same to rounding.
 """
 
 from typing import Literal

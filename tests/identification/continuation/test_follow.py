@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.continuation import Path, Steps, continued, solved
+from identification.continuation.follow import continued
+from identification.continuation.newton import solved
+from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
 
 Float = NDArray[np.float64]

@@ -1,0 +1,54 @@
+"""Newton's method at one value of the parameter, and the linear equations of all steps."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.continuation.path import Steps, System
+
+__all__ = ["evaluated", "solution", "solved", "tangent_of"]
+
+Float = NDArray[np.float64]
+
+
+def solved(
+    system: System, unknowns: ArrayLike, parameter: float, *, scale: ArrayLike = 1.0, steps: Steps | None = None
+) -> Float | None:
+    """Solution at one value of the parameter by Newton's method from ``unknowns``; None if it finds none."""
+    z = np.array(unknowns, dtype=float)
+    allowed, size = steps or Steps(), np.broadcast_to(np.asarray(scale, dtype=float), z.shape)
+    for _ in range(allowed.iterations):
+        residual, jacobian, _ = evaluated(system, z, parameter)
+        change = solution(jacobian * size, -residual)
+        if change is None:
+            return None
+        z = z + size * change
+        if np.linalg.norm(change) <= allowed.tolerance * max(1.0, float(np.linalg.norm(z / size))):
+            return z
+    return None
+
+
+def tangent_of(bordered: Float) -> Float | None:
+    """Unit tangent on the side of the last row."""
+    right = np.zeros(len(bordered))
+    right[-1] = 1.0
+    tangent = solution(bordered, right)
+    return None if tangent is None else tangent / np.linalg.norm(tangent)
+
+
+def evaluated(system: System, z: Float, parameter: float) -> tuple[Float, Float, Float]:
+    """The equations; what overflows there is inf or NaN and no warning."""
+    with np.errstate(all="ignore"):
+        return system(z, parameter)
+
+
+def solution(matrix: Float, right: Float) -> Float | None:
+    """Solution of linear equations whose rows may be of any size; None if there is none."""
+    with np.errstate(all="ignore"):
+        size = np.max(np.abs(matrix), axis=1)
+        if not (np.all(np.isfinite(size)) and np.all(np.isfinite(right)) and np.all(size > 0.0)):
+            return None
+        try:
+            found = np.linalg.solve(matrix / size[:, None], right / size)
+        except np.linalg.LinAlgError:
+            return None
+    return found if np.all(np.isfinite(found)) else None

@@ -1,0 +1,101 @@
+"""Compiled simulation of a model whose input is a force that its own output reacts on."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.pnlss.kernels import Matrices, Table, Workspace, feature_values, outputs_at, state_after
+from vibrolock.compiled import kernel
+
+__all__ = ["Loop", "simulate_coupled"]
+
+_ITERATIONS = 20
+_EXACT = 1e-12
+
+
+class Loop(NamedTuple):
+    """``xi(k+1) = A xi + b y_d``, ``F = F_0 + c xi + d y_d``: a force that reacts on an output."""
+
+    a: np.ndarray
+    """float[n_xi, n_xi]."""
+    b: np.ndarray
+    """float[n_xi]."""
+    c: np.ndarray
+    """float[n_xi]."""
+    d: float
+
+
+@kernel
+def simulate_coupled(
+    m: Matrices,
+    state_table: Table,
+    output_table: Table,
+    loop: Loop,
+    row: int,
+    output: int,
+    given: np.ndarray,
+    bound: np.ndarray,
+    work: Workspace,
+    xi: np.ndarray,
+    after: np.ndarray,
+    force: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+) -> int:
+    """Simulate from rest; input ``row`` is ``given`` (float[n]) plus the reaction to ``output``; other inputs are zero.
+
+    Writes ``force`` (float[n]), ``x`` (float[n, n_states]) and ``y`` (float[n, n_outputs]); ``xi`` and ``after`` (float[n_xi])
+    are room. At each sample the force solves a scalar equation, for the output answers to it at once: by the secant method,
+    whose first step is exact where the features have no force in them. Returns n, or the first sample at which a state is
+    beyond its ``bound`` or no force was found; from there on nothing is written.
+    """
+    n, count, reacting = m.a.shape[0], given.size, xi.size
+    largest = 0.0
+    for k in range(count):
+        largest = max(largest, abs(given[k]))
+    for i in range(n):
+        work.x[i] = 0.0
+    for i in range(reacting):
+        xi[i] = 0.0
+    for i in range(work.v.size):
+        work.v[i] = 0.0
+    linear = 1.0 - loop.d * m.d[output, row]
+    new = 0.0
+    for k in range(count):
+        for i in range(n):
+            if not abs(work.x[i]) <= bound[i]:
+                return int(k)
+            work.v[i] = work.x[i]
+        free = given[k]
+        for i in range(reacting):
+            free += loop.c[i] * xi[i]
+        at, short, slope, found = 0.0, 0.0, linear, False
+        for trial in range(_ITERATIONS):
+            work.v[n + row] = new
+            feature_values(output_table, work.v, work.chi)
+            outputs_at(m, work.chi, work.v, y[k])
+            left = new - free - loop.d * y[k, output]
+            if abs(left) <= _EXACT * (abs(new) + largest):
+                found = True
+                break
+            if trial > 0 and new != at:
+                slope = (left - short) / (new - at)
+            if slope == 0.0:
+                break
+            at, short = new, left
+            new -= left / slope
+        if not found:
+            return int(k)
+        force[k] = new
+        for i in range(n):
+            x[k, i] = work.x[i]
+        feature_values(state_table, work.v, work.phi)
+        state_after(m, work.phi, work.v, work.x)
+        for i in range(reacting):
+            total = loop.b[i] * y[k, output]
+            for j in range(reacting):
+                total += loop.a[i, j] * xi[j]
+            after[i] = total
+        for i in range(reacting):
+            xi[i] = after[i]
+    return int(count)

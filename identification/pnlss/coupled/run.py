@@ -1,0 +1,178 @@
+"""A force-driven model and an identified exciter, simulated together from the voltage that was recorded.
+
+``F = g_e V - Z X_a`` (`identification.prediction.exciter`): what the voltage does is known beforehand and made at all lines
+of the run at once, with the delay, hold and coupling of its path, so that nothing is lost to the sample rate. What the motion
+does goes along with the simulation by a filter near to it. What that leaves is added from pass to pass over the run, exactly
+from the lowest frequency on, until the force no longer changes (waveform relaxation: Lelarasmee et al., IEEE Trans. CAD 1,
+1982).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from identification.channels import MOTION_ORDER, find_role
+from identification.errors import IdentificationError
+from identification.pnlss.coupled.kernels import simulate_coupled
+from identification.pnlss.coupled.reaction import Reaction, chosen_filter
+from identification.pnlss.kernels import workspace
+from identification.pnlss.model import PnlssModel
+from identification.pnlss.simulation import Simulation
+from identification.pnlss.steady.excitation import linear_resonance_hz
+from identification.prediction.exciter import Exciter
+from identification.validation import finite_array, positive
+
+__all__ = ["CoupledRun", "pnlss_coupled_run"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_LOWEST, _GUESSED = 0.8, 0.5
+"""Of the lowest frequency excited in training, and of the linear resonance where that is unknown."""
+_FADED = 0.5
+"""Share of the lowest frequency below which nothing is added to the filter."""
+_AFTER_PERIODS = 40
+"""Of the lowest frequency, at zero volts, that are simulated after the end so that it does not come as a shock."""
+_TOLERANCE = 1e-6
+_PASSES = 40
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CoupledRun(Simulation):
+    """A simulated run of a model with its exciter.
+
+    Parameters
+    ----------
+    force_n
+        float[n], force at the model's input; NaN from ``unbounded_at`` on.
+    passes
+        Passes over the run.
+    change
+        RMS of what the last pass changed the force by, over that of the force; NaN for an unbounded run.
+    notes
+        What a user should know about this run, one line each.
+    """
+
+    force_n: Float
+    passes: int
+    change: float
+    notes: tuple[str, ...] = ()
+
+
+def pnlss_coupled_run(
+    model: PnlssModel, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
+) -> CoupledRun:
+    """Response of a model and the exciter at its force input, both from rest, to a recorded voltage.
+
+    Parameters
+    ----------
+    model
+        With one force among its inputs, of which others are zero, and the drive point's motion among its outputs.
+    exciter
+        That of this very rig. No static force is made, as in harmonic balance (`pnlss_response`).
+    voltage_v
+        float[n], at the model's sample rate, as it was recorded: the exciter's ``path`` is in its parameters.
+    lowest_hz
+        Frequency from which the exciter's reaction is exact; below it fades. By default somewhat below the lowest that the
+        model was trained at, half its linear resonance if that is unknown.
+
+    Raises
+    ------
+    IdentificationError
+        On NaN or inf, a model without such channels, and where no stable filter for the reaction is found.
+    """
+    v = finite_array("voltage_v", voltage_v, np.float64, 1)
+    forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"]
+    if len(forces) != 1:
+        raise IdentificationError(
+            f"model: has {len(forces)} forces among its inputs, needs one, which the exciter makes"
+        )
+    output = find_role(model.outputs, "drive")
+    low = _lowest(model) if lowest_hz is None else positive("lowest_hz", lowest_hz, "Hz")
+    if low >= 0.45 * model.sample_rate_hz:
+        raise IdentificationError(f"lowest_hz: is {low:g} Hz, must be well below half of {model.sample_rate_hz:g} Hz")
+    reaction = Reaction(exciter, MOTION_ORDER[model.outputs[output].motion], low, model.sample_rate_hz)
+    return _Run(model, reaction, forces[0], output, v).found()
+
+
+def _lowest(model: PnlssModel) -> float:
+    if model.excited_hz and model.excited_hz[0] > 0.0:
+        return _LOWEST * model.excited_hz[0]
+    return _GUESSED * linear_resonance_hz(model)
+
+
+class _Run:
+    """Passes over a run, with zero volts ahead and after."""
+
+    def __init__(self, model: PnlssModel, reaction: Reaction, row: int, output: int, voltage_v: Float) -> None:
+        self._model, self._row, self._output, self._n = model, row, output, voltage_v.size
+        rate_hz, low = model.sample_rate_hz, reaction.lowest_hz
+        self._loop = chosen_filter(reaction, model.linear_part, row, output)
+        rest = int(np.ceil(_AFTER_PERIODS * rate_hz / low))
+        self._count = voltage_v.size + rest
+        self._size = int(next_fast_len(self._count + rest, real=True))
+        hz = np.arange(self._size // 2 + 1) * rate_hz / self._size
+        made = np.zeros(hz.size, dtype=complex)
+        made[1:] = reaction.exciter.force(1.0, 0.0, hz[1:])
+        self._driving = self._filtered(made, voltage_v)
+        share = np.clip((hz / low - _FADED) / (1.0 - _FADED), 0.0, 1.0)
+        within = np.sin(0.5 * np.pi * share) ** 2
+        self._left = np.zeros(hz.size, dtype=complex)
+        used = np.flatnonzero(within)
+        self._left[used] = within[used] * (reaction.exact(hz[used]) - reaction.response(self._loop, hz[used]))
+
+    def _filtered(self, response: Complex, values: Float) -> Float:
+        """float[count] of values that are zero after their end."""
+        return np.asarray(irfft(response * rfft(values, self._size), self._size)[: self._count])
+
+    def found(self) -> CoupledRun:
+        m, model = self._model.matrices, self._model
+        tables = (model.state_features.table, model.output_features.table)
+        x, y = np.empty((self._count, model.states)), np.empty((self._count, len(model.outputs)))
+        force, before = np.empty(self._count), np.zeros(self._count)
+        xi, after, work = np.empty(self._loop.b.size), np.empty(self._loop.b.size), workspace(m)
+        given, change, passes, reached = self._driving, np.inf, 0, self._count
+        while change > _TOLERANCE and passes < _PASSES:
+            passes += 1
+            reached = simulate_coupled(
+                m, *tables, self._loop, self._row, self._output, given, model.bound, work, xi, after, force, x, y
+            )
+            if reached < self._n:
+                change = np.nan
+                break
+            y[reached:], force[reached:] = 0.0, 0.0
+            change = float(np.linalg.norm(force - before) / max(float(np.linalg.norm(force)), 1e-300))
+            before[:] = force
+            given = self._driving + self._filtered(self._left, y[:, self._output])
+        return self._result(min(reached, self._n), x[: self._n], y[: self._n], force[: self._n], passes, change)
+
+    def _result(self, reached: int, x: Float, y: Float, force: Float, passes: int, change: float) -> CoupledRun:
+        model, n = self._model, self._n
+        x[reached:], y[reached:], force[reached:] = np.nan, np.nan, np.nan
+        inputs = np.zeros(len(model.inputs))
+        inputs[self._row] = np.max(np.abs(force[:reached]), initial=0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):  # of what never moved in training
+            state_use = np.max(np.abs(x[:reached]), axis=0, initial=0.0) / model.state_range
+            input_use = inputs / model.input_range
+        notes = []
+        if reached < n and passes > 1:
+            notes.append(f"left all bounds in pass {passes} over the run, and in none before")
+        elif change > _TOLERANCE:
+            notes.append(
+                f"after {passes} passes the force still changed by {100.0 * change:.2g} %: the run is that uncertain"
+            )
+        if np.max(np.abs(np.linalg.eigvals(model.a))) > 1.0:
+            notes.append("the model's linear part is unstable")
+        return CoupledRun(
+            outputs=y.T,
+            states=x.T,
+            state_use=state_use,
+            input_use=input_use,
+            unbounded_at=None if reached == n else reached,
+            force_n=force,
+            passes=passes,
+            change=change,
+            notes=tuple(notes),
+        )
