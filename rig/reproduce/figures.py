@@ -63,6 +63,9 @@ def _errors(page: "Figure", study: Study) -> None:
         axis.set_xlim(-0.6, len(tests) - 0.4)
         axis.set_title(f"trained at {training_set}", fontsize=9)
         axis.set_yscale("log")
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter(_few_numbers)
+        axis.tick_params(axis="y", which="minor", labelsize=7)
     axes[0].set_ylabel(f"relative error of {table.output}, %")
     title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of all models")
 
@@ -87,7 +90,7 @@ def _steady(page: "Figure", study: Study) -> None:
             if one.truth is truth and one.prediction is not None:
                 _curve(axis, one, colours[one.training_set])
         near = next(other for other in study.truths if other.force_n == truth.force_n and other.held == "fundamental")
-        _around(axis, truth, near if truth.held == "pure-sine" else truth)
+        _around(axis, truth, near if truth.held == "pure-sine" else truth, study.options.specimen.band_hz)
         axis.set_title(f"{truth.held}, {truth.text}", fontsize=9)
     for axis in axes[-1]:
         axis.set_xlabel("frequency, Hz")
@@ -120,20 +123,27 @@ def _sweeps(page: "Figure", study: Study) -> None:
             unbounded = "" if np.isnan(one.unbounded_s) else ", unbounded"
             label = f"{one.training_set}{unbounded}"
             axis.plot(one.frequency_hz, one.simulated, color=colours[one.training_set], lw=1.0, label=label)
-        axis.set_ylim(0.0, 2.5 * top)
+        highest = max((float(np.max(one.simulated)) for one in shown if np.isnan(one.unbounded_s)), default=0.0)
+        beyond = any(not np.isnan(one.unbounded_s) for one in shown) or highest > 2.4 * top
+        axis.set_ylim(0.0, 2.5 * top if beyond else 1.35 * max(top, highest))
         axis.set(ylabel="acceleration, m/s²", title=name)
         axis.legend(fontsize=7, ncols=5, loc="upper right")
     axes[-1].set_xlabel("frequency of the plan, Hz")
     title(page, f"{study.options.specimen.name}: sweeps simulated from the measured {study.options.input}")
 
 
-def _around(axis: Any, truth: Truth, wide: Truth) -> None:
-    """The resonance, as wide as that of ``wide``, and what models make of it next to it."""
+def _around(axis: Any, truth: Truth, wide: Truth, band_hz: tuple[float, float]) -> None:
+    """The resonance, as wide as that of ``wide``, and what models make of it next to it, within the band."""
     responses = wide.responses
     near = responses.frequency_hz[responses.amplitude_m > 0.15 * responses.amplitude_m.max()]
     margin = 0.5 * np.ptp(near)
-    axis.set_xlim(near.min() - margin, near.max() + margin)
+    axis.set_xlim(max(near.min() - margin, band_hz[0]), min(near.max() + margin, band_hz[1]))
     axis.set_ylim(0.0, 1.6e3 * truth.amplitude_m)
+
+
+def _few_numbers(value: float, _: int) -> str:
+    """Twos and fives between powers of ten."""
+    return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 
 def _colours(study: Study) -> dict[str, Any]:

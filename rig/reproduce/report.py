@@ -96,7 +96,8 @@ def _say_times(study: Study) -> None:
 
 def _say_steady(study: Study) -> None:
     print("steady peaks of the selected models against the rig's own:")
-    rows = []
+    rows: list[tuple[str, ...]] = []
+    incomplete: list[str] = []
     for one in study.steady:
         row = one.row()
         rows.append(
@@ -109,10 +110,14 @@ def _say_steady(study: Study) -> None:
                 number(row["error"], "+.1f", 100.0),
                 number(row.get("frequency_error"), "+.3f", 100.0),
                 number(row["range_use"], ".2f"),
-                "" if row["complete"] else row["notes"][-1],
+                "" if row["complete"] else f"({len(incomplete) + 1})",
             )
         )
+        if not row["complete"]:
+            incomplete.append(row["notes"][-1])
     print_table(("trained at", "level", "held", "rig mm", "model mm", "error %", "frequency %", "range use", ""), rows)
+    for index, note in enumerate(incomplete, 1):
+        print(f"({index}) {note}")
     print()
 
 
