@@ -29,8 +29,16 @@ def reproduce_(
     with_backbone: Annotated[
         bool, typer.Option("--with-backbone", help="Fit points of a recorded backbone beside the multisines.")
     ] = False,
-    saturating: Annotated[int, typer.Option(help="Saturating features beside the monomials.", min=0, max=100)] = 0,
-    iterations: Annotated[int, typer.Option(help="Iterations of a fit, at most.", min=1, max=10_000)] = 60,
+    saturating: Annotated[int, typer.Option(help="Saturating features in place of the monomials.", min=0, max=100)] = 0,
+    states: Annotated[
+        int | None, typer.Option(help="States of the models; default: the paper's.", min=1, max=20)
+    ] = None,
+    realisations: Annotated[
+        int | None, typer.Option(help="Realisations of each level that a model is fitted to, at most.", min=1)
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option(help="Iterations of a fit, at most; default: by the specimen.", min=1, max=10_000)
+    ] = None,
     levels: Annotated[int | None, typer.Option(help="Levels of the specimen, from the lowest; default: all.")] = None,
     channel: Annotated[str, typer.Option(help="Output whose errors the tables have.")] = "drive",
     without: Annotated[
@@ -62,6 +70,8 @@ def reproduce_(
         input=input_,
         with_backbone=with_backbone,
         saturating=saturating,
+        states=states,
+        realisations=realisations,
         iterations=iterations,
         levels=levels,
         channel=channel,

@@ -47,6 +47,7 @@ def realisation_combinations(
     *,
     models: int | Mapping[str, int],
     mixed: bool = True,
+    most: int | None = None,
     beside: Sequence[Experiment] = (),
     beside_validation: Sequence[Experiment] = (),
 ) -> tuple[ModelJob, ...]:
@@ -66,6 +67,9 @@ def realisation_combinations(
         Number of models of each training set, or one number for each name, ``mixed`` among them; 0 for none.
     mixed
         Whether there is a training set ``mixed`` of all levels concatenated: of each level combination k.
+    most
+        Realisations of each level that a model is fitted to, at most, where all others would take too long: those that follow
+        the one that chooses. None for all.
     beside, beside_validation
         Further experiments that are fitted by every model, backbone segments for instance, and further ones that help to
         choose its iterate: without, realisations of a low level choose one that knows nothing of high segments.
@@ -73,8 +77,11 @@ def realisation_combinations(
     Raises
     ------
     IdentificationError
-        With fewer than three realisations, more models than combinations, a level called ``mixed``, no level or no model.
+        With fewer than three realisations, none to be fitted, more models than combinations, a level called ``mixed``, no
+        level or no model.
     """
+    if most is not None and most < 1:
+        raise IdentificationError(f"most: is {most}, allowed are 1 and above, or None for all realisations")
     if MIXED in levels or not levels:
         raise IdentificationError(
             f"levels: {', '.join(levels) or 'none given'}; needs one at least, none called {MIXED}"
@@ -93,13 +100,13 @@ def realisation_combinations(
     jobs: list[ModelJob] = []
     for training_set, members in sets.items():
         count = models if isinstance(models, int) else models.get(training_set, 0)
-        most = max(len(r) * (len(r) - 1) for r in members.values())
-        if not 0 <= count <= most:
+        possible = max(len(r) * (len(r) - 1) for r in members.values())
+        if not 0 <= count <= possible:
             raise IdentificationError(
-                f"models: {count} of {training_set}, allowed are 0 to {most} different combinations"
+                f"models: {count} of {training_set}, allowed are 0 to {possible} different combinations"
             )
         for k in range(count):
-            job = _job(training_set, members, k)
+            job = _job(training_set, members, k, most)
             training, validation = (*job.training, *beside), (*job.validation, *beside_validation)
             jobs.append(replace(job, training=training, validation=validation))
     if not jobs:
@@ -107,7 +114,7 @@ def realisation_combinations(
     return tuple(jobs)
 
 
-def _job(training_set: str, members: Mapping[str, Sequence[Experiment]], k: int) -> ModelJob:
+def _job(training_set: str, members: Mapping[str, Sequence[Experiment]], k: int, most: int | None) -> ModelJob:
     """Combination k."""
     training: list[Experiment] = []
     validation: list[Experiment] = []
@@ -118,7 +125,8 @@ def _job(training_set: str, members: Mapping[str, Sequence[Experiment]], k: int)
         chooses = (tests + 1 + k // count % (count - 1)) % count
         left_out.append(realisations[tests])
         validation.append(realisations[chooses])
-        training += [one for index, one in enumerate(realisations) if index not in (tests, chooses)]
+        others = [index for step in range(1, count) if (index := (chooses + step) % count) != tests]
+        training += [realisations[index] for index in sorted(others[:most])]
     return ModelJob(
         name=f"{training_set} {k + 1:02d}",
         training_set=training_set,

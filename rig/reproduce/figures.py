@@ -10,6 +10,7 @@ from rig.errors import RecordingError
 from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, title
 from rig.reproduce.steady import Steady
 from rig.reproduce.study import Study
+from rig.reproduce.truths import Truth
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +24,7 @@ def draw_study(study: Study) -> None:
     """Write ``errors.png``, ``steady.png`` and ``sweeps.png``, those that there is something for."""
     _write(study, "errors", _errors, (9.0, 3.8))
     if study.steady:
-        _write(study, "steady", _steady, (9.0, 4.2))
+        _write(study, "steady", _steady, (9.0, 6.4))
     if study.sweeps:
         _write(study, "sweeps", _sweeps, (9.0, 2.4 * len(study.options.specimen.sweeps) + 0.6))
 
@@ -62,43 +63,51 @@ def _errors(page: "Figure", study: Study) -> None:
         axis.set_xlim(-0.6, len(tests) - 0.4)
         axis.set_title(f"trained at {training_set}", fontsize=9)
         axis.set_yscale("log")
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter(_few_numbers)
+        axis.tick_params(axis="y", which="minor", labelsize=7)
     axes[0].set_ylabel(f"relative error of {table.output}, %")
     title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of all models")
 
 
 def _steady(page: "Figure", study: Study) -> None:
-    """One panel per force: selected models, the rig at constant fundamental, and its peak under a pure sine."""
-    forces = sorted({one.force_n for one in study.steady})
-    axes = page.subplots(1, len(forces), squeeze=False)[0]
-    colours, by_force = _colours(study), study.options.input == "force"
-    for axis, force_n in zip(axes, forces, strict=True):
-        truth = study.truth[force_n]
-        axis.plot(
-            truth.frequency_hz, 1e3 * truth.amplitude_m, color=REJECTED, lw=3.0, label="rig, constant fundamental"
-        )
+    """A row for what is held, a column per force: selected models, and the rig; of a pure sine its peak alone."""
+    forces = study.options.specimen.forces_n
+    rows = list(dict.fromkeys(truth.held for truth in study.truths))
+    axes = page.subplots(len(rows), len(forces), squeeze=False)
+    colours = _colours(study)
+    for truth in study.truths:
+        axis = axes[rows.index(truth.held)][forces.index(truth.force_n)]
+        responses = truth.responses
+        if truth.held == "pure-sine":
+            axis.plot(
+                responses.frequency_hz, 1e3 * responses.amplitude_m, color=REJECTED, lw=2.0, label="rig, backbone"
+            )
+            axis.plot(truth.frequency_hz, 1e3 * truth.amplitude_m, "k+", ms=10, label="rig, peak")
+        else:
+            axis.plot(responses.frequency_hz, 1e3 * responses.amplitude_m, color=REJECTED, lw=3.0, label="rig")
         for one in study.steady:
-            if one.force_n != force_n:
-                continue
-            if one.held == "pure-sine":
-                axis.plot(one.truth_hz, 1e3 * one.truth_m, "k+", ms=8)
-            if one.prediction is not None:
-                _curve(axis, one, colours[one.training_set], dashed=one.held == "fundamental" and by_force)
-        _around(axis, truth.frequency_hz, 1e3 * truth.amplitude_m)
-        axis.set(xlabel="frequency, Hz", title=f"{force_n:g} N")
-    axes[0].set_ylabel("displacement of the drive point, mm")
-    axes[0].legend(fontsize=7)
-    title(page, f"{study.options.specimen.name}: steady responses; dashed: exciter coupled; +: rig, pure sine")
+            if one.truth is truth and one.prediction is not None:
+                _curve(axis, one, colours[one.training_set])
+        near = next(other for other in study.truths if other.force_n == truth.force_n and other.held == "fundamental")
+        _around(axis, truth, near if truth.held == "pure-sine" else truth, study.options.specimen.band_hz)
+        axis.set_title(f"{truth.held}, {truth.text}", fontsize=9)
+    for axis in axes[-1]:
+        axis.set_xlabel("frequency, Hz")
+    for row in axes:
+        row[0].set_ylabel("drive point, mm")
+        row[0].legend(fontsize=7)
+    title(page, f"{study.options.specimen.name}, models {study.options.variant}: steady responses")
 
 
-def _curve(axis: Any, one: Steady, colour: Any, *, dashed: bool) -> None:
+def _curve(axis: Any, one: Steady, colour: Any) -> None:
     """Branch by branch: nothing is known between them."""
     assert one.prediction is not None
     amplitude = 1e3 * one.prediction.amplitude_m()
     for branch in np.unique(one.prediction.branch):
         on = one.prediction.branch == branch
-        label = None if dashed or branch else one.training_set
-        line = "--" if dashed else "-"
-        axis.plot(one.prediction.frequency_hz[on], amplitude[on], line, color=colour, lw=1.0, label=label)
+        label = None if branch else one.training_set
+        axis.plot(one.prediction.frequency_hz[on], amplitude[on], color=colour, lw=1.0, label=label)
 
 
 def _sweeps(page: "Figure", study: Study) -> None:
@@ -114,19 +123,27 @@ def _sweeps(page: "Figure", study: Study) -> None:
             unbounded = "" if np.isnan(one.unbounded_s) else ", unbounded"
             label = f"{one.training_set}{unbounded}"
             axis.plot(one.frequency_hz, one.simulated, color=colours[one.training_set], lw=1.0, label=label)
-        axis.set_ylim(0.0, 2.5 * top)
+        highest = max((float(np.max(one.simulated)) for one in shown if np.isnan(one.unbounded_s)), default=0.0)
+        beyond = any(not np.isnan(one.unbounded_s) for one in shown) or highest > 2.4 * top
+        axis.set_ylim(0.0, 2.5 * top if beyond else 1.35 * max(top, highest))
         axis.set(ylabel="acceleration, m/s²", title=name)
         axis.legend(fontsize=7, ncols=5, loc="upper right")
     axes[-1].set_xlabel("frequency of the plan, Hz")
     title(page, f"{study.options.specimen.name}: sweeps simulated from the measured {study.options.input}")
 
 
-def _around(axis: Any, frequency_hz: Any, amplitude: Any) -> None:
-    """The resonance, and what models make of it next to it."""
-    near = frequency_hz[amplitude > 0.15 * amplitude.max()]
+def _around(axis: Any, truth: Truth, wide: Truth, band_hz: tuple[float, float]) -> None:
+    """The resonance, as wide as that of ``wide``, and what models make of it next to it, within the band."""
+    responses = wide.responses
+    near = responses.frequency_hz[responses.amplitude_m > 0.15 * responses.amplitude_m.max()]
     margin = 0.5 * np.ptp(near)
-    axis.set_xlim(near.min() - margin, near.max() + margin)
-    axis.set_ylim(0.0, 2.0 * amplitude.max())
+    axis.set_xlim(max(near.min() - margin, band_hz[0]), min(near.max() + margin, band_hz[1]))
+    axis.set_ylim(0.0, 1.6e3 * truth.amplitude_m)
+
+
+def _few_numbers(value: float, _: int) -> str:
+    """Twos and fives between powers of ten."""
+    return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 
 def _colours(study: Study) -> dict[str, Any]:

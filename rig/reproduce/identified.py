@@ -10,7 +10,6 @@ import numpy as np
 
 from identification import (
     Experiment,
-    FitSettings,
     ModelJob,
     PnlssFit,
     identify_many,
@@ -73,6 +72,7 @@ def identify_all(
         levels,
         models=options.counts,
         mixed=options.mixed,
+        most=options.realisations,
         beside=[one for index, one in enumerate(beside) if index % _CHOOSES != 1],
         beside_validation=beside[1::_CHOOSES],
     )
@@ -82,12 +82,14 @@ def identify_all(
     specimen = options.specimen
     identify = partial(
         _identify,
-        states=specimen.states,
-        degrees=specimen.degrees,
+        states=options.model_states,
+        degrees=() if options.saturating else specimen.degrees,
+        # The voltage acts on the states alone; monomials of outputs fit no better, and extrapolate far worse.
+        output_degrees=() if options.input == "voltage" or options.saturating else specimen.degrees,
         saturating=options.saturating,
         band_hz=specimen.excited_hz,
         seed=options.seed,
-        settings=FitSettings(iterations=options.iterations),
+        settings=options.fit_settings,
     )
     for found in identify_many(jobs, identify, n_jobs=options.jobs, done=fits):
         if found.fit is None:

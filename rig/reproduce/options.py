@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from identification import FitSettings
 from rig.bench import Bench
 from rig.errors import ConfigurationError
 from rig.reproduce.specimens import Specimen
@@ -13,6 +14,8 @@ __all__ = ["INPUTS", "PAPER", "PARTS", "Options"]
 
 PAPER = "paper"
 """In place of a number of models: as many as the paper has."""
+_SATURATING = 60
+"""Iterations that saturating features need at least: their weights begin at random."""
 INPUTS = ("force", "voltage")
 PARTS = ("steady", "sweeps")
 """What a study can do without."""
@@ -37,9 +40,13 @@ class Options:
     with_backbone: bool = False
     """Whether points of a backbone are fitted beside the multisines."""
     saturating: int = 0
-    """Number of saturating features beside the monomials."""
-    iterations: int = 60
-    """Iterations of a fit, at most."""
+    """Number of saturating features of each equation, in place of the monomials."""
+    states: int | None = None
+    """States of the models; None for the paper's number."""
+    realisations: int | None = None
+    """Realisations of each level that a model is fitted to, at most; None for all but the two that choose and test."""
+    iterations: int | None = None
+    """Iterations of a fit, at most; None for the usual number."""
     levels: int | None = None
     """How many of the specimen's levels, from the lowest; None for all."""
     channel: str = "drive"
@@ -68,6 +75,9 @@ class Options:
             raise ConfigurationError(f"--scatter {self.scatter:g}: allowed is 0 to 0.05")
         if self.channel not in self.specimen.outputs:
             raise ConfigurationError(f"--channel {self.channel}: allowed is {', '.join(self.specimen.outputs)}")
+        for name, value in (("states", self.states), ("realisations", self.realisations)):
+            if value is not None and value < 1:
+                raise ConfigurationError(f"--{name} {value}: allowed is 1 and above")
         if self.levels is not None and not 1 <= self.levels <= len(self.specimen.levels):
             raise ConfigurationError(f"--levels {self.levels}: allowed is 1 to {len(self.specimen.levels)}")
 
@@ -90,10 +100,26 @@ class Options:
         return len(self.plans) > 1
 
     @property
+    def model_states(self) -> int:
+        """States of the models."""
+        return self.specimen.states if self.states is None else self.states
+
+    @property
+    def fit_settings(self) -> FitSettings:
+        """Of every fit."""
+        of = self.specimen
+        usual = max(of.iterations, _SATURATING) if self.saturating else of.iterations
+        most = usual if self.iterations is None else self.iterations
+        return FitSettings(iterations=most, patience=of.patience, every=of.every)
+
+    @property
     def variant(self) -> str:
         """What tells these models from others of the same recordings: the name of their folder."""
         backbone = "-backbone" if self.with_backbone else ""
-        return f"{self.input}{backbone}" + (f"-tanh{self.saturating}" if self.saturating else "")
+        saturating = f"-tanh{self.saturating}" if self.saturating else ""
+        states = f"-n{self.model_states}" if self.model_states != self.specimen.states else ""
+        fitted = f"-r{self.realisations}" if self.realisations is not None else ""
+        return f"{self.input}{backbone}{saturating}{states}{fitted}"
 
     @property
     def recordings(self) -> Path:
@@ -122,4 +148,4 @@ class Options:
     @property
     def of_the_models(self) -> dict[str, Any]:
         """What may not change while the models stay; their number may."""
-        return {"variant": self.variant, "iterations": self.iterations, "levels": list(self.plans)}
+        return {"variant": self.variant, "iterations": self.fit_settings.iterations, "levels": list(self.plans)}

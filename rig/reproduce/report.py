@@ -96,22 +96,28 @@ def _say_times(study: Study) -> None:
 
 def _say_steady(study: Study) -> None:
     print("steady peaks of the selected models against the rig's own:")
-    rows = []
-    for row in (one.row() for one in study.steady):
+    rows: list[tuple[str, ...]] = []
+    incomplete: list[str] = []
+    for one in study.steady:
+        row = one.row()
         rows.append(
             (
                 row["training_set"],
-                f"{row['force_n']:g} N",
-                row["force"],
+                one.truth.text,
+                row["held"],
                 number(row["truth_m"], ".4f", 1e3),
                 number(row["peak_m"], ".4f", 1e3),
                 number(row["error"], "+.1f", 100.0),
                 number(row.get("frequency_error"), "+.3f", 100.0),
                 number(row["range_use"], ".2f"),
-                "" if row["complete"] else row["notes"][-1],
+                "" if row["complete"] else f"({len(incomplete) + 1})",
             )
         )
-    print_table(("trained at", "force", "", "rig mm", "model mm", "error %", "frequency %", "range use", ""), rows)
+        if not row["complete"]:
+            incomplete.append(row["notes"][-1])
+    print_table(("trained at", "level", "held", "rig mm", "model mm", "error %", "frequency %", "range use", ""), rows)
+    for index, note in enumerate(incomplete, 1):
+        print(f"({index}) {note}")
     print()
 
 

@@ -14,16 +14,13 @@ from identification import (
     identify_exciter,
     pnlss_frequency_response,
 )
-from rig.analysis.subject import subject_of
 from rig.measurements import spectra
 from rig.recording.reader import Recording
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded
-from simulators.analysis import PeriodicResponses, constant_force_response, phase_resonance_backbone
+from rig.reproduce.truths import Truth, truths
 
 __all__ = ["Steady", "steady"]
-
-_NEAR_RESONANCE = np.linspace(-170.0, -10.0, 81)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,18 +31,12 @@ class Steady:
     """Of the model."""
     model: str
     """Its name."""
-    force_n: float
-    """Peak of the fundamental, or of the sine."""
-    held: str
-    """``pure-sine``, or ``fundamental`` with the harmonics that the exciter makes."""
+    truth: Truth
+    """What the rig does."""
     prediction: SteadyPrediction | None
     """None where there is none."""
     reason: str
     """Why not."""
-    truth_m: float
-    """Largest amplitude of the rig's drive point."""
-    truth_hz: float
-    """Where."""
 
     @property
     def complete(self) -> bool:
@@ -57,10 +48,11 @@ class Steady:
         head = {
             "training_set": self.training_set,
             "model": self.model,
-            "force_n": self.force_n,
-            "force": self.held,
-            "truth_m": self.truth_m,
-            "truth_hz": self.truth_hz,
+            "force_n": self.truth.force_n,
+            "held": self.truth.held,
+            "level": self.truth.level,
+            "truth_m": self.truth.amplitude_m,
+            "truth_hz": self.truth.frequency_hz,
         }
         if self.prediction is None:
             return {
@@ -77,8 +69,8 @@ class Steady:
             **head,
             "peak_m": peak.amplitude_m,
             "peak_hz": peak.frequency_hz,
-            "error": peak.amplitude_m / self.truth_m - 1.0,
-            "frequency_error": peak.frequency_hz / self.truth_hz - 1.0,
+            "error": peak.amplitude_m / self.truth.amplitude_m - 1.0,
+            "frequency_error": peak.frequency_hz / self.truth.frequency_hz - 1.0,
             "range_use": float(np.max(self.prediction.range_use)),
             "complete": self.complete,
             "notes": list(self.prediction.notes),
@@ -87,63 +79,39 @@ class Steady:
 
 def steady(
     options: Options, models: Mapping[str, tuple[str, PnlssModel]], say: Callable[[str], None]
-) -> tuple[list[Steady], dict[float, PeriodicResponses]]:
-    """Predictions of the selected models (by training set), and the rig's response to each force of an exciter.
+) -> tuple[list[Steady], tuple[Truth, ...]]:
+    """Predictions of the selected models (by training set), and what the rig does.
 
-    A force-input model answers a pure sine, as in the paper, and with the identified exciter coupled a constant fundamental; a
-    voltage-input model has its exciter inside.
+    A force-input model answers a pure sine, as in the paper, and with the identified exciter coupled a constant fundamental. A
+    voltage-input model has its exciter inside: it answers a constant voltage, and a constant fundamental of the force that
+    it has among its outputs.
     """
-    truth = _truth(options)
+    known = truths(options)
     exciter = _exciter(options, say) if options.input == "force" else None
     found = []
     for training_set, (name, model) in models.items():
-        for force_n in options.specimen.forces_n:
-            for held, peak in truth[force_n][1].items():
-                if options.input == "voltage" and held == "pure-sine":
-                    continue
-                prediction, reason = _predicted(options, model, force_n, held, exciter)
-                found.append(Steady(training_set, name, force_n, held, prediction, reason, *peak))
-    return found, {force_n: curve for force_n, (curve, _) in truth.items()}
+        for truth in known:
+            prediction, reason = _predicted(options, model, truth, exciter)
+            found.append(Steady(training_set, name, truth, prediction, reason))
+    return found, known
 
 
 def _predicted(
-    options: Options, model: PnlssModel, force_n: float, held: str, exciter: Exciter | None
+    options: Options, model: PnlssModel, truth: Truth, exciter: Exciter | None
 ) -> tuple[SteadyPrediction | None, str]:
     low, high = options.specimen.band_hz
     try:
-        return (
-            pnlss_frequency_response(
-                model,
-                force_n,
-                force="pure-sine" if held == "pure-sine" else "fundamental",
-                exciter=exciter if held == "fundamental" else None,
-                lowest_hz=low,
-                highest_hz=high,
-            ),
-            "",
+        found = pnlss_frequency_response(
+            model,
+            truth.level,
+            force=truth.held,
+            exciter=exciter if truth.held == "fundamental" else None,
+            lowest_hz=low,
+            highest_hz=high,
         )
     except IdentificationError as error:
         return None, str(error)
-
-
-def _truth(options: Options) -> dict[float, tuple[PeriodicResponses, dict[str, tuple[float, float]]]]:
-    """By force: the response at constant fundamental, and (amplitude, frequency) of the peaks by what is held."""
-    rig = subject_of(options.bench).rig
-    found = {}
-    for force_n in options.specimen.forces_n:
-        curve = constant_force_response(rig, force_n, _NEAR_RESONANCE)
-        sine = phase_resonance_backbone(
-            rig, forces_n=np.linspace(0.1, 1.0, 10) * force_n, excitation="pure-sine"
-        )  # lightly damped: the largest amplitude is that at phase resonance
-        top = int(np.argmax(curve.amplitude_m))
-        found[force_n] = (
-            curve,
-            {
-                "pure-sine": (float(sine.amplitude_m[-1]), float(sine.frequency_hz[-1])),
-                "fundamental": (float(curve.amplitude_m[top]), float(curve.frequency_hz[top])),
-            },
-        )
-    return found
+    return found, ""
 
 
 def _exciter(options: Options, say: Callable[[str], None]) -> Exciter:

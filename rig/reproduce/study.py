@@ -1,7 +1,7 @@
 """`rig reproduce`: record, identify, test, predict, one after the other, all of it kept in a folder."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from identification import ErrorTable, Experiment, IdentificationError, PnlssFit, PnlssModel
@@ -11,7 +11,7 @@ from rig.reproduce.options import Options
 from rig.reproduce.recordings import multisines, segments
 from rig.reproduce.steady import Steady, steady
 from rig.reproduce.sweeps import SweepResult, simulated_sweeps
-from simulators.analysis import PeriodicResponses
+from rig.reproduce.truths import Truth
 
 __all__ = ["VARIANTS", "Study", "reproduce"]
 
@@ -36,8 +36,8 @@ class Study:
     """Error tables by variant."""
     steady: Sequence[Steady] = ()
     """Steady predictions of the selected models."""
-    truth: Mapping[float, PeriodicResponses] = field(default_factory=dict)
-    """Responses of the rig to constant fundamentals, by force."""
+    truths: Sequence[Truth] = ()
+    """What the rig does."""
     sweeps: Sequence[SweepResult] = ()
     """Sweeps simulated by the selected models."""
 
@@ -57,7 +57,9 @@ class Study:
             "saturating": options.saturating,
             "scatter": options.scatter,
             "seed": options.seed,
-            "iterations": options.iterations,
+            "states": options.model_states,
+            "realisations": options.realisations,
+            "iterations": options.fit_settings.iterations,
             "output": self.table.output,
             "selected": self.table.selected,
             "failures": dict(self.models.failures),
@@ -86,14 +88,14 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
     table = next(iter(tables.values()))
     selected = {name: (model, models.fits[model].model) for name, model in table.selected.items()}
     found: list[Steady] = []
-    truth: dict[float, PeriodicResponses] = {}
+    known: tuple[Truth, ...] = ()
     if "steady" not in options.without:
         say("steady responses")
-        found, truth = steady(options, selected, say)
+        found, known = steady(options, selected, say)
     swept: list[SweepResult] = []
     if "sweeps" not in options.without:
         swept = simulated_sweeps(options, selected, say)
-    return Study(options=options, models=models, tables=tables, steady=found, truth=truth, sweeps=swept)
+    return Study(options=options, models=models, tables=tables, steady=found, truths=known, sweeps=swept)
 
 
 def _table(

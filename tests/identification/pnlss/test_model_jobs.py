@@ -47,6 +47,19 @@ def test_mixed_models_hold_all_levels_and_leave_out_one_of_each():
     assert len({job.name for job in jobs}) == len(jobs)
 
 
+def test_fewer_realisations_can_be_fitted_and_all_take_their_turn():
+    levels = {"low": realisations(0.5, 5), "high": realisations(2.0, 10)}
+    jobs = realisation_combinations(levels, models={"high": 10, "mixed": 1}, most=4)
+    for job in jobs[:10]:
+        assert len(job.training) == 4
+        assert len({*split_of(job)[0], *split_of(job)[1], *split_of(job)[2]}) == 6
+    fitted = [name for job in jobs[:10] for name in split_of(job)[0]]
+    assert {fitted.count(name) for name in fitted} == {4}
+    assert len(jobs[10].training) == 3 + 4
+    with pytest.raises(IdentificationError, match="most: is 0, allowed are 1 and above"):
+        realisation_combinations(levels, models=1, most=0)
+
+
 @pytest.mark.parametrize(
     ("levels", "models", "said"),
     [

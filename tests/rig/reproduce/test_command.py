@@ -37,13 +37,13 @@ def test_a_model_of_the_lowest_level_is_near_its_noise_at_its_own_level(results)
 
 
 def test_steady_peaks_stand_beside_those_of_the_rig(results):
-    coupled = {row["force_n"]: row for row in results["steady"] if row["force"] == "fundamental"}
+    coupled = {row["force_n"]: row for row in results["steady"] if row["held"] == "fundamental"}
     assert set(coupled) == {0.25, 0.55}
     for force_n, row in coupled.items():
         truth = constant_force_response(VirtualRig.shipped("magnet-beam"), force_n)
         assert row["truth_m"] == pytest.approx(truth.amplitude_m.max(), rel=0.01)
         assert row["range_use"] > 1.0  # what the lowest level trains is far below these forces
-    sine = {row["force_n"]: row["truth_m"] for row in results["steady"] if row["force"] == "pure-sine"}
+    sine = {row["force_n"]: row["truth_m"] for row in results["steady"] if row["held"] == "pure-sine"}
     assert 1.02 < sine[0.55] / coupled[0.55]["truth_m"] < 1.2  # the exciter's harmonics take from the peak
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rig.bench import load_bench
+from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.reader import Recording
 from rig.reproduce.folder import prepare
@@ -15,8 +16,22 @@ from rig.reproduce.specimens import SPECIMENS
 from simulators.virtual_rig import VirtualRig
 
 
+LIMIT_N = 1.4
+"""Some realisations at 0.5 N RMS have peaks beyond it, some have not."""
+
+
 def quiet(line):
     pass
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Multisines of a second with three realisations."""
+
+    def loaded(name):
+        return load_plan(name).model_copy(update={"resolution_hz": 1.0, "realisations": 3, "periods": 1})
+
+    monkeypatch.setattr("rig.reproduce.recordings.load_plan", loaded)
 
 
 @pytest.fixture
@@ -37,23 +52,23 @@ def asked(tmp_path):
     return with_options
 
 
-def test_what_is_recorded_is_not_recorded_again(asked):
+def test_what_is_recorded_is_not_recorded_again(asked, short):
     options = asked()
     first = multisines(options, quiet)
     files = {path: path.stat().st_mtime_ns for path in options.recordings.iterdir()}
     second = multisines(options, quiet)
     assert {path: path.stat().st_mtime_ns for path in options.recordings.iterdir()} == files
     assert list(first) == ["0.5 N"]
-    assert len(first["0.5 N"]) == 5
+    assert len(first["0.5 N"]) == 3
     for one, other in zip(first["0.5 N"], second["0.5 N"], strict=True):
         assert np.array_equal(one.outputs, other.outputs)
         assert np.sqrt(np.mean(one.counted_inputs**2)) == pytest.approx(0.5, rel=0.05)
 
 
-def test_under_scatter_every_realisation_has_phases_noise_and_a_specimen_of_its_own(asked):
+def test_under_scatter_every_realisation_has_phases_noise_and_a_specimen_of_its_own(asked, short):
     options = asked(scatter=0.001)
     found = multisines(options, quiet)["0.5 N"]
-    assert len({one.inputs[0, :50].tobytes() for one in found}) == 5
+    assert len({one.inputs[0, :50].tobytes() for one in found}) == 3
     frequencies = []
     for path in sorted(options.recordings.glob("multisine-1-*.h5")):
         with Recording(path) as recording:
@@ -61,15 +76,15 @@ def test_under_scatter_every_realisation_has_phases_noise_and_a_specimen_of_its_
             assert table["scatter"] == {"frequency": 0.001}
             realised = VirtualRig.model_validate({k: v for k, v in table.items() if k in VirtualRig.model_fields})
             frequencies.append(realised.realised(recording.seed).linear_modes.frequency_hz[0])
-    assert len(set(frequencies)) == 5
+    assert len(set(frequencies)) == 3
     assert 2e-4 < np.std(frequencies) / np.mean(frequencies) < 2e-3
 
 
-def test_phases_that_trip_the_bench_are_drawn_anew(asked):
+def test_phases_that_trip_the_bench_are_drawn_anew(asked, short):
     bench = load_bench("magnet-beam")
-    tight = bench.model_copy(update={"limits": bench.limits.model_copy(update={"force_n": 1.75})})
+    tight = bench.model_copy(update={"limits": bench.limits.model_copy(update={"force_n": LIMIT_N})})
     options = asked(scatter=0.001, bench=tight)
-    assert len(multisines(options, quiet)["0.5 N"]) == 5
+    assert len(multisines(options, quiet)["0.5 N"]) == 3
     phases = set()
     for path in options.recordings.glob("multisine-1-*.h5"):
         with Recording(path) as recording:

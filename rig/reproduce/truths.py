@@ -1,0 +1,78 @@
+"""Steady vibrations of the virtual rig itself, which predictions are held against."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rig.analysis.subject import subject_of
+from rig.reproduce.options import Options
+from simulators.analysis import (
+    PeriodicResponses,
+    constant_force_response,
+    forced_response,
+    phase_resonance_backbone,
+)
+from simulators.virtual_rig import VirtualRig
+
+__all__ = ["Truth", "truths"]
+
+Held = Literal["fundamental", "pure-sine", "voltage"]
+
+_NEAR_RESONANCE = np.linspace(-170.0, -10.0, 81)
+_FREQUENCIES = 161
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The rig's resonance at one level of what is held."""
+
+    held: Held
+    """``pure-sine`` and ``fundamental`` of a force, with the harmonics that the exciter makes; ``voltage`` of a sine of it."""
+    level: float
+    """Peak of what is held, N or V."""
+    force_n: float
+    """Force of the campaign that it belongs to: of a voltage, that which the rig has at resonance under it."""
+    responses: PeriodicResponses
+    """Through resonance; of a pure sine the backbone up to this force."""
+    amplitude_m: float
+    """Largest amplitude of the drive point."""
+    frequency_hz: float
+    """Where."""
+
+    @classmethod
+    def of(cls, held: Held, level: float, force_n: float, responses: PeriodicResponses) -> "Truth":
+        """With the largest amplitude among the responses."""
+        top = int(np.argmax(responses.amplitude_m))
+        return cls(
+            held,
+            level,
+            force_n,
+            responses,
+            float(responses.amplitude_m[top]),
+            float(responses.frequency_hz[top]),
+        )
+
+    @property
+    def text(self) -> str:
+        """The level, for tables."""
+        return f"{self.level:.3g} {'V' if self.held == 'voltage' else 'N'}"
+
+
+def truths(options: Options) -> tuple[Truth, ...]:
+    """What models of this input can be asked: force by force, the structure alone or the rig, and voltages."""
+    rig = subject_of(options.bench).rig
+    return tuple(one for force_n in options.specimen.forces_n for one in _at(options, rig, force_n))
+
+
+def _at(options: Options, rig: VirtualRig, force_n: float) -> tuple[Truth, ...]:
+    held = Truth.of("fundamental", force_n, force_n, constant_force_response(rig, force_n, _NEAR_RESONANCE))
+    if options.input == "force":
+        # Lightly damped: the largest amplitude is that at phase resonance.
+        forces = np.linspace(0.1, 1.0, 10) * force_n
+        sine = phase_resonance_backbone(rig, forces_n=forces, excitation="pure-sine")
+        return Truth.of("pure-sine", force_n, force_n, sine), held
+    voltage_v = float(held.responses.voltage_v[int(np.argmax(held.responses.amplitude_m))])
+    low, high = options.specimen.band_hz
+    under = forced_response(rig, voltage_v, np.linspace(low, high, _FREQUENCIES))
+    return Truth.of("voltage", voltage_v, force_n, under), held
