@@ -107,13 +107,14 @@ class RunProgress:
 
 
 class FitLines:
-    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration."""
+    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration, or after ten seconds without one."""
 
-    _EVERY = 10
+    _EVERY, _LONGEST_S = 10, 10.0
 
     def __init__(self) -> None:
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._best = (float("inf"), 0)
+        self._said_s = 0.0
 
     def __call__(self, at: "FitProgress") -> None:
         """Say where the fit is, and which iteration is the best so far."""
@@ -127,7 +128,8 @@ class FitLines:
             if self._terminal:
                 sys.stderr.write(f"\r\x1b[2K{line}")
                 sys.stderr.flush()
-            elif at.iteration % self._EVERY == 0:
+            elif at.iteration % self._EVERY == 0 or at.seconds - self._said_s >= self._LONGEST_S:
+                self._said_s = at.seconds
                 print(line, file=sys.stderr, flush=True)
 
     def close(self) -> None:

@@ -28,6 +28,9 @@ KINDS = ("multisine", "sweep", *SETTLED)
 
 SAMPLES_PER_PERIOD = 25
 """Of the highest excited frequency: the paper has 22.9 and 28.4."""
+FEWEST_SAMPLES_PER_PERIOD = 2.5
+"""Of the highest excited frequency: below, its lines are cut off with what would fold."""
+_SAME_RATIO = 1e-12
 _ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)
 
 
@@ -83,11 +86,26 @@ def experiments(
     if segment_periods < FEWEST_PERIODS:
         raise IdentificationError(f"segment_periods: is {segment_periods}, needs {FEWEST_PERIODS} at least")
     bench = bench_of_recording(recording)
-    signals = Signals.chosen(bench, inputs, outputs)
+    try:
+        signals = Signals.chosen(bench, inputs, outputs)
+    except IdentificationError as error:
+        raise IdentificationError(f"{recording.path}: {error}") from None
     rate_hz = default_rate_hz(recording) if rate_hz is None else positive("rate_hz", rate_hz, "Hz")
     if rate_hz > bench.sample_rate_hz:
         raise IdentificationError(
             f"rate_hz: is {rate_hz:g} Hz, allowed is up to {bench.sample_rate_hz:g} Hz, as fast as was recorded"
+        )
+    if rate_hz <= FEWEST_SAMPLES_PER_PERIOD * (highest := _highest_hz(recording)):
+        raise IdentificationError(
+            f"rate_hz: is {rate_hz:g} Hz, {recording.path} is excited up to {highest:g} Hz; allowed is above "
+            f"{FEWEST_SAMPLES_PER_PERIOD * highest:g} Hz"
+        )
+    ratio = rate_hz / bench.sample_rate_hz
+    whole = Fraction(ratio).limit_denominator(LARGEST_FACTOR)
+    if recording.kind != "multisine" and abs(float(whole) / ratio - 1.0) > _SAME_RATIO:
+        raise IdentificationError(
+            f"rate_hz: is {rate_hz:.10g} Hz, {recording.path} was recorded at {bench.sample_rate_hz:g} Hz; allowed are ratios "
+            f"of whole numbers up to {LARGEST_FACTOR}, such as {float(whole) * bench.sample_rate_hz:.10g} Hz"
         )
     used = _accepted(recording)
     stem = recording.path.stem
@@ -160,13 +178,7 @@ def default_rate_hz(recording: Recording) -> float:
     """
     bench = bench_of_recording(recording)
     plan = recording.configuration["plan"]
-    if recording.kind == "multisine":
-        highest = float(plan["highest_hz"])
-    elif recording.kind == "sweep":
-        highest = max(float(plan["start_hz"]), float(plan["stop_hz"]))
-    else:
-        highest = max(float(point["frequency_hz"]) for point in _accepted(recording))
-    most = min(SAMPLES_PER_PERIOD * highest, bench.sample_rate_hz)
+    most = min(SAMPLES_PER_PERIOD * _highest_hz(recording), bench.sample_rate_hz)
     if most == bench.sample_rate_hz:
         return most
     decade = 10.0 ** math.floor(math.log10(most))
@@ -176,6 +188,16 @@ def default_rate_hz(recording: Recording) -> float:
         if abs(rate_hz * period_s - round(rate_hz * period_s)) > 1e-9:
             return math.floor(most * period_s) / period_s
     return rate_hz
+
+
+def _highest_hz(recording: Recording) -> float:
+    """The highest frequency that is excited."""
+    plan = recording.configuration["plan"]
+    if recording.kind == "multisine":
+        return float(plan["highest_hz"])
+    if recording.kind == "sweep":
+        return max(float(plan["start_hz"]), float(plan["stop_hz"]))
+    return max(float(point["frequency_hz"]) for point in _accepted(recording))
 
 
 def _accepted(recording: Recording) -> list[dict[str, Any]]:

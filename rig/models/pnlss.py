@@ -33,6 +33,8 @@ class IdentifiedPnlss:
         Wall time of the identification; NaN if unknown.
     notes
         What a user should know about the data, one line each.
+    data
+        Fingerprint of the data of the fit, by which it is known again; empty if unknown.
     """
 
     model: PnlssModel
@@ -42,6 +44,7 @@ class IdentifiedPnlss:
     spectra: ErrorSpectra | None = None
     seconds: float = float("nan")
     notes: tuple[str, ...] = ()
+    data: str = ""
 
 
 def _pack(found: IdentifiedPnlss) -> tuple[Arrays, Attributes]:
@@ -49,7 +52,7 @@ def _pack(found: IdentifiedPnlss) -> tuple[Arrays, Attributes]:
     arrays, attributes = kept.to_arrays()
     head = "model" if found.fit is None else "fit"
     arrays = {f"{head}/{name}": array for name, array in arrays.items()}
-    out: dict[str, Any] = {head: attributes, "seconds": found.seconds, "notes": list(found.notes)}
+    out: dict[str, Any] = {head: attributes, "seconds": found.seconds, "notes": list(found.notes), "data": found.data}
     spectra = () if found.spectra is None else (found.spectra,)
     for name, things in (("runs", found.runs), ("linear_runs", found.linear_runs), ("spectra", spectra)):
         inside, of_things = pack_all(name, things)
@@ -73,6 +76,7 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
         spectra=spectra[0] if spectra else None,
         seconds=float(attributes["seconds"]),
         notes=tuple(attributes["notes"]),
+        data=str(attributes.get("data", "")),
     )
 
 
@@ -145,9 +149,10 @@ def _say(summary: dict[str, Any]) -> None:
     print(f"poles of the linear part: {'; '.join(modes)}")
     if summary["fit"] is not None:
         fit = summary["fit"]
+        judged = number(fit["validation_error"], ".3f", 100.0)
         print(
             f"iteration {fit['chosen']} of {fit['iterations']} chosen: error {number(fit['training_error'], '.3f', 100.0)} % "
-            f"in training, {number(fit['validation_error'], '.3f', 100.0)} % in validation; {fit['stopped']}; "
+            f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; {fit['stopped']}; "
             f"{number(summary['seconds'], '.1f')} s in all"
         )
     if summary["errors"]:
