@@ -20,7 +20,7 @@ __all__ = ["Truth", "truths"]
 Held = Literal["fundamental", "pure-sine", "voltage"]
 
 _NEAR_RESONANCE = np.linspace(-170.0, -10.0, 81)
-_FREQUENCIES = 161
+_FREQUENCIES = 81
 
 
 @dataclass(frozen=True, eq=False)

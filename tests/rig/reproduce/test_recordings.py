@@ -15,7 +15,6 @@ from rig.reproduce.recordings import multisines
 from rig.reproduce.specimens import SPECIMENS
 from simulators.virtual_rig import VirtualRig
 
-
 LIMIT_N = 1.4
 """Some realisations at 0.5 N RMS have peaks beyond it, some have not."""
 
