@@ -156,7 +156,7 @@ def compare(
     notes = list(prediction.notes)
     top, top_hz = peak_of(measured, reference.frequency_hz)
     main = prediction.branch == 0
-    if top_hz in (reference.frequency_hz.min(), reference.frequency_hz.max()):
+    if over == "frequency" and top_hz in (reference.frequency_hz.min(), reference.frequency_hz.max()):
         where = int(np.argmax(np.where(used, predicted, -np.inf)))
         peak, peak_hz = float(predicted[where]), float(reference.frequency_hz[where])
         notes.append("the reference is largest at an end of its frequencies: compared is the largest within them")
