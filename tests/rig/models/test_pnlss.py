@@ -21,7 +21,7 @@ PLANS = {
     | {"kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25, "realisations": 3}
     | {"transient_periods": 3, "periods": 2, "levels_rms_v": [0.2]},
     "sweep": BENCH
-    | {"kind": "sweep", "start_hz": 18.0, "stop_hz": 32.0, "rate_hz_per_s": 1.0, "levels_v": [0.08, 0.3]},
+    | {"kind": "sweep", "start_hz": 20.0, "stop_hz": 29.0, "rate_hz_per_s": 1.0, "levels_v": [0.08, 0.3]},
     "stepped": BENCH
     | {"kind": "stepped-sine", "start_hz": 24.0, "stop_hz": 25.0, "steps": 4, "levels_v": [0.15], "record_periods": 10},
     "backbone": {"levels_v": [0.3], "record_periods": 40},
@@ -155,7 +155,6 @@ def test_sweeps_references_and_multisines_are_compared(there, force_model):
     shown = json.loads(there("show F.h5 --json").out)
     for run, known in zip(told["multisines"], shown["errors"], strict=True):
         assert run["errors"] == known["errors"]
-    assert there("plot P.h5 -o P.png").status == 0
 
 
 def test_a_run_that_leaves_all_bounds_is_said_to_and_drawn(there, force_model, recordings):
@@ -181,7 +180,7 @@ def test_a_run_that_leaves_all_bounds_is_said_to_and_drawn(there, force_model, r
 
 
 def test_with_the_voltage_as_input_sweeps_are_predicted_from_the_voltage(there, recordings):
-    line = "identify lines.h5 --model pnlss --input voltage --outputs force,drive --states 4 --iterations 5 -o V.h5 --overwrite"
+    line = "identify lines.h5 --model pnlss --input voltage --outputs force,drive --states 4 --iterations 3 -o V.h5 --overwrite"
     done = there(line)
     assert done.status == 0, done.err
     line = (

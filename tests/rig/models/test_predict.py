@@ -183,7 +183,7 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
         ),
         (
             "NM.h5 --sweep sweep.h5 --exciter LIN.h5",
-            "LIN.h5: is a file of kind linear-modes; predictions are made with a nonlinear-mode, ",
+            "LIN.h5: is a file of kind linear-modes, wanted is one of kind exciter",
         ),
         (
             "NM.h5 --sweep sweep.h5 --modes EX.h5",
