@@ -135,6 +135,14 @@ def predict(
         list[float] | None,
         typer.Option(metavar="FORCE_N", help="Predict the frequency response at this constant force; may be repeated."),
     ] = None,
+    voltage_response: Annotated[
+        list[float] | None,
+        typer.Option(
+            metavar="VOLT",
+            help="Predict a PNLSS model's frequency response at this constant voltage (peak), of its input or of the "
+            "exciter; may be repeated.",
+        ),
+    ] = None,
     force: Annotated[
         str | None,
         typer.Option(
@@ -156,7 +164,7 @@ def predict(
     exciter: Annotated[
         Path | None,
         typer.Option(
-            help="Exciter model: sweeps are predicted from the voltage, not from the force; "
+            help="Exciter model: sweeps are predicted from the voltage, not from the force, planned ones too; "
             "a PNLSS model's frequency responses with the harmonics of its force."
         ),
     ] = None,
@@ -194,6 +202,7 @@ def predict(
     keep_existing([path for path in given if path is not None], output, overwrite)
     request = PredictionRequest(
         forces_n=tuple(frequency_response or ()),
+        voltages_v=tuple(voltage_response or ()),
         held=force,
         sweeps=tuple(sweep or ()),
         multisines=tuple(multisine or ()),

@@ -153,10 +153,15 @@ def compare(
             f"reference: no point in common with the prediction over {over}; check ranges and signs"
         )
     measured = np.abs(reference.response)
-    main = prediction.branch == 0
-    peak, peak_hz = peak_of(amplitude[main], prediction.frequency_hz[main])
-    top, top_hz = peak_of(measured, reference.frequency_hz)
     notes = list(prediction.notes)
+    top, top_hz = peak_of(measured, reference.frequency_hz)
+    main = prediction.branch == 0
+    if over == "frequency" and top_hz in (reference.frequency_hz.min(), reference.frequency_hz.max()):
+        where = int(np.argmax(np.where(used, predicted, -np.inf)))
+        peak, peak_hz = float(predicted[where]), float(reference.frequency_hz[where])
+        notes.append("the reference is largest at an end of its frequencies: compared is the largest within them")
+    else:
+        peak, peak_hz = peak_of(amplitude[main], prediction.frequency_hz[main])
     if missing := used.size - int(np.count_nonzero(used)):
         notes.append(f"{missing} of {used.size} points of the reference are not compared")
     error = PredictionError(

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from identification import IdentificationError
 from rig.errors import RecordingError, RigError
 from rig.exchange.contents import Contents
 from rig.exchange.csv import write_csv
@@ -23,14 +24,17 @@ def export_file(
 
     Returns what was written. Raises `RecordingError` where it cannot be read or written; ``output`` is then as it was.
     """
-    found = [taken_apart(value) for value in read_objects(source, data, points)]
+    try:
+        found = [taken_apart(value) for value in read_objects(source, data, points)]
+    except IdentificationError as error:
+        raise RecordingError(f"{source}: {error}") from None
     if item and not 1 <= item <= len(found):
         raise RecordingError(f"--item = {item}: {source} holds 1 to {len(found)}")
     chosen = [found[item - 1]] if item else found
     loose = next((one for one in chosen if not one.rows), None)
     if loose is not None and format_ != "mat":
         raise RecordingError(
-            f"{source}: a {loose.kind} is matrices and no table, for which {format_} has no place; use mat"
+            f"{source}: {loose.kind} is matrices and no table, for which {format_} has no place; use mat"
         )
     write_contents(chosen, output, format_)
     return chosen

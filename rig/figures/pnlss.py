@@ -4,13 +4,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from identification.channels import MOTION_UNIT
+from rig.figures.style import MAIN, REJECTED, SECOND, plain_log, say_why_empty, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from identification import ErrorSpectra, PnlssFit
+    from identification import Channel, ErrorSpectra, PnlssFit
     from rig.models.pnlss import IdentifiedPnlss
 
 __all__ = ["draw_pnlss"]
@@ -22,7 +23,7 @@ _FLOOR = 1e-6  # of the largest amplitude: what lies below is not shown
 def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
     """Spectra on the left, one panel an output; on the right the fit's history, and the range that each run uses."""
     left, right = cast(Any, page.subfigures(1, 2, width_ratios=(1.5, 1.0)))
-    _spectra(left, found.spectra)
+    _spectra(left, found.spectra, {channel.name: _unit(channel) for channel in found.model.outputs})
     history, runs = right.subplots(2, 1)
     _history(history, found.fit)
     _runs(runs, found)
@@ -35,7 +36,12 @@ def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
     )
 
 
-def _spectra(area: Any, spectra: "ErrorSpectra | None") -> None:
+def _unit(channel: "Channel") -> str:
+    """Unit of a channel; none where it is unknown."""
+    return "N" if channel.role == "force" else MOTION_UNIT.get(channel.motion, "") if channel.motion else ""
+
+
+def _spectra(area: Any, spectra: "ErrorSpectra | None", units: dict[str, str]) -> None:
     """Amplitudes of what was measured, of the linear start's error and of the model's."""
     if spectra is None:
         say_why_empty(area.subplots(), "no periodic experiment, and so no spectra")
@@ -52,7 +58,8 @@ def _spectra(area: Any, spectra: "ErrorSpectra | None") -> None:
         top = float(spectra.measured[row].max())
         if top > 0.0:
             axis.set_ylim(_FLOOR * top, 2.0 * top)
-        axis.set(ylabel=f"{spectra.outputs[row]}, amplitude")
+        name = spectra.outputs[row]
+        axis.set(ylabel=f"{name}, amplitude{f', {units[name]}' if units.get(name) else ''}")
     largest = spectra.measured.max(axis=0)
     heard = spectra.frequency_hz[largest > 1e-3 * largest.max()]
     axes[-1].set(xlabel="frequency, Hz", xlim=(0.0, min(1.6 * heard.max(), spectra.frequency_hz[-1])))
@@ -68,6 +75,8 @@ def _positive(values: np.ndarray) -> np.ndarray:
 
 def _history(axis: "Axes", fit: "PnlssFit | None") -> None:
     """Training and validation error over the iterations, and the chosen one."""
+    from matplotlib.ticker import MaxNLocator
+
     if fit is None:
         say_why_empty(axis, "a model from elsewhere: no history")
         return
@@ -81,6 +90,8 @@ def _history(axis: "Axes", fit: "PnlssFit | None") -> None:
     for bad in at[np.isinf(past.validation_error)]:
         axis.axvline(bad, color=SECOND, lw=0.5, alpha=0.3)
     axis.set(xlabel="iteration", ylabel="relative error, %")
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+    plain_log(axis)
     axis.legend(fontsize=7)
 
 
@@ -104,4 +115,5 @@ def _runs(axis: "Axes", found: "IdentifiedPnlss") -> None:
     axis.axvline(1.0, color=REJECTED, lw=0.8, ls="--")
     lost = len(found.runs) - len(bounded)
     axis.set(xlabel="range use (1: the training data's)", ylabel="largest error of any output, %")
+    plain_log(axis)
     axis.legend(fontsize=7, title=f"{lost} runs unbounded" if lost else None, title_fontsize=7)

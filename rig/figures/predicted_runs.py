@@ -5,9 +5,11 @@ from typing import Any
 import numpy as np
 
 from identification import Predictions
-from rig.figures.style import REJECTED, say_why_empty
+from rig.figures.style import REJECTED, plain_log, say_why_empty
 
 __all__ = ["draw_runs"]
+
+_MARKS = "os^Dv"
 
 
 def draw_runs(area: Any, predictions: Predictions) -> None:
@@ -28,8 +30,10 @@ def draw_runs(area: Any, predictions: Predictions) -> None:
     across = use if known else np.arange(1, len(bounded) + 1)
     for row, name in enumerate(names):
         colour = colormaps["viridis"](0.85 * row / max(1, len(names) - 1))
-        axis.semilogy(across, [100.0 * run.error[row] for run in bounded], "o", ms=4, color=colour, label=name)
+        mark = _MARKS[row % len(_MARKS)]
+        axis.semilogy(across, [100.0 * run.error[row] for run in bounded], mark, ms=4, color=colour, label=name)
     if known:
-        axis.axvline(1.0, color=REJECTED, lw=0.8, ls="--")
-    axis.set(xlabel="range use (1: the training data's)" if known else "run", ylabel="relative error, %")
+        axis.axvline(1.0, color=REJECTED, lw=0.8, ls="--", label="training data")
+    axis.set(xlabel="range use" if known else "run", ylabel="relative error, %")
+    plain_log(axis)
     axis.legend(fontsize=7)

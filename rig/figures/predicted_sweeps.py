@@ -43,7 +43,7 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
         axes[1].plot(recorded.frequency_hz, np.abs(recorded.force), color=REJECTED, lw=2.4)
     axes[0].plot(sweep.frequency_hz, scale * amplitude, color=MAIN, lw=1.0, label=_origin(sweep.origin))
     axes[1].plot(sweep.frequency_hz, force, color=MAIN, lw=1.0)
-    if np.isfinite(sweep.range_use):
+    if np.isfinite(sweep.largest_identified):
         limit = scale * top / sweep.range_use
         axes[0].axhline(limit, color=SECOND, lw=0.7, ls="--", label="identified up to")
     if sweep.unbounded_at_s is not None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_predictions"]
 
 _BEYOND = 1.0
-_WIDTHS = {"steady": 1.2, "sweeps": 1.2, "runs": 0.6}
+_WIDTHS = {"steady": 1.2, "sweeps": 1.2, "runs": 0.7}
 _MOST_NAMED = 12
 _NEAR = 1.3
 _MARGIN = 0.15
@@ -96,7 +96,7 @@ def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> 
     highest = max(predictions.steady, key=lambda response: float(response.range_use.max()))
     where = int(np.argmax(highest.range_use))
     limit = scale * float(highest.amplitude_m()[where] / highest.range_use[where])
-    if limit < _NEAR * top:
+    if limit < _NEAR * top and np.isfinite(highest.modal_amplitude).all():  # states are no amplitude of the drive point
         size.axhline(limit, color=REJECTED, lw=0.8, ls="--", label="identified up to")
 
 

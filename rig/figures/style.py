@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["MAIN", "REJECTED", "SECOND", "STYLE", "TRACE_BINS", "engineering", "say_why_empty", "title"]
+__all__ = ["MAIN", "REJECTED", "SECOND", "STYLE", "TRACE_BINS", "engineering", "plain_log", "say_why_empty", "title"]
 
 MAIN, SECOND, REJECTED = "#1f4e79", "#c0504d", "#9a9a9a"
 STYLE: dict[Any, Any] = {
@@ -44,3 +44,16 @@ def say_why_empty(axis: "Axes", text: str) -> None:
 def title(page: "Figure", text: str) -> None:
     """Title at the top left."""
     page.suptitle(text, fontsize=11, x=0.01, ha="left")
+
+
+def plain_log(axis: "Axes") -> None:
+    """Plain numbers at a logarithmic axis of errors, a few of them in between where it spans little."""
+    from matplotlib.ticker import LogLocator, StrMethodFormatter
+
+    low, high = axis.get_ylim()
+    axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    if high < 30.0 * low:
+        axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 3.0, 5.0, 7.0)))
+        axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))
+    else:
+        axis.yaxis.set_minor_formatter("")

@@ -1,7 +1,9 @@
 """From models to predictions, beside the recordings they are compared with."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import cast, get_args
 
@@ -25,6 +27,7 @@ from identification import (
 from identification.prediction.comparison import Over
 from identification.prediction.frequency_response import HeldForce
 from identification.prediction.properties import FLAGGED_BEYOND
+from rig.campaigns.evaluate import as_complex
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import STEPPED, frequency_responses
 from rig.models.exciter import EXCITER
@@ -35,6 +38,7 @@ from rig.models.identify import modes_in
 from rig.models.nonlinear_mode import NONLINEAR_MODE
 from rig.models.pnlss import PNLSS
 from rig.models.predict_pnlss import pnlss_predictions
+from rig.models.predict_pnlss_steady import Reference
 from rig.models.predict_surface import surface_predictions
 from rig.models.predict_sweeps import CROSSINGS, SweepModels, Swept, planned_sweeps, recorded_sweeps
 from rig.recording.arrays import kind_of
@@ -54,6 +58,8 @@ class PredictionRequest:
 
     forces_n: tuple[float, ...] = ()
     """Constant forces of frequency responses."""
+    voltages_v: tuple[float, ...] = ()
+    """Constant voltages of frequency responses."""
     held: str | None = None
     """What of the force is constant: ``fundamental``, ``rms`` or ``pure-sine``; if not given, the first that the model can."""
     sweeps: tuple[Path, ...] = ()
@@ -76,10 +82,26 @@ class PredictionRequest:
     """Whether to answer beyond twice the largest modal amplitude identified."""
 
     def __post_init__(self) -> None:
-        if not (self.forces_n or self.sweeps or self.multisines or self.planned or self.references):
+        if not (self.forces_n or self.voltages_v or self.sweeps or self.multisines or self.planned or self.references):
             raise ConfigurationError(
-                "nothing to predict: give --frequency-response, --sweep, --planned-sweep, --multisine or --reference"
+                "nothing to predict: give --frequency-response, --voltage-response, --sweep, --planned-sweep, --multisine or "
+                "--reference"
             )
+        for name, values, unit in (
+            ("--frequency-response", self.forces_n, "N"),
+            ("--voltage-response", self.voltages_v, "V"),
+        ):
+            for level in values:
+                if not 0.0 < level < math.inf:
+                    raise ConfigurationError(f"{name} = {level:g}: allowed is any number above 0, {unit}")
+        for name, paths in (
+            ("--sweep", self.sweeps),
+            ("--multisine", self.multisines),
+            ("--reference", self.references),
+        ):
+            for one, other in combinations(paths, 2):
+                if one.exists() and other.exists() and one.samefile(other):
+                    raise ConfigurationError(f"{name} = {other}: is given twice; each file once")
         for name, value, allowed in (
             ("--force", self.held, (None, *get_args(HeldForce))),
             ("--over", self.over, (None, *get_args(Over))),
@@ -93,8 +115,6 @@ class PredictionRequest:
             )
         if self.zero_crossings is not None and not self.sweeps:
             raise ConfigurationError("--zero-crossings: is for recorded sweeps; add --sweep, or leave it out")
-        if self.exciter is None and self.planned:
-            raise ConfigurationError("--planned-sweep: gives a voltage, which needs an exciter; add --exciter")
 
 
 def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
@@ -104,13 +124,21 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     `identification.IdentificationError` where the model cannot answer, in particular beyond twice the largest amplitude
     that it was identified with.
     """
-    if kind_of(model) == FORCE_SURFACE.name:
+    kind = kind_of(model)
+    if kind not in (NONLINEAR_MODE.name, PNLSS.name, FORCE_SURFACE.name):
+        raise RecordingError(
+            f"{model}: is a file of kind {kind}; predictions are made with a {NONLINEAR_MODE.name}, a {PNLSS.name} model or a "
+            f"{FORCE_SURFACE.name}"
+        )
+    if kind == PNLSS.name:
+        return pnlss_predictions(
+            model, request, [one for path in request.references for one in _references(path, request)]
+        )
+    if request.voltages_v:
+        raise ConfigurationError(f"--voltage-response: means nothing to a {kind}; a PNLSS model answers it")
+    if kind == FORCE_SURFACE.name:
         references = [measured for path in request.references for measured in _stepped_sines(path)]
         return surface_predictions(load_as(FORCE_SURFACE, model), request, references)
-    if kind_of(model) == PNLSS.name:
-        return pnlss_predictions(
-            model, request, [(one, _over(one, request)) for path in request.references for one in _stepped_sines(path)]
-        )
     _check_mode(request)
     mode = cast(NonlinearMode, load_as(NONLINEAR_MODE, model))
     modes = None if request.modes is None else modes_in(request.modes)
@@ -136,6 +164,8 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
 
 def _check_mode(request: PredictionRequest) -> None:
     """Refuse what is asked of other models than a nonlinear mode."""
+    if request.exciter is None and request.planned:
+        raise ConfigurationError("--planned-sweep: gives a voltage, which needs an exciter; add --exciter")
     if request.exciter is not None and not (request.sweeps or request.planned):
         raise ConfigurationError(
             "--exciter: is for sweeps, and none is given; add --sweep or --planned-sweep, or leave it out"
@@ -198,6 +228,24 @@ def _turns_back(frequency_hz: np.ndarray) -> bool:
     """Whether a branch has more than one vibration at a frequency: then only the phase tells them apart."""
     steps = np.diff(frequency_hz)
     return bool((steps > 0.0).any() and (steps < 0.0).any())
+
+
+def _references(path: Path, request: PredictionRequest) -> list[Reference]:
+    """Stepped sines with the second harmonic of their force, as far as it was recorded."""
+    ratios: dict[tuple[float, float], float] = {}
+    if kind_of(path) in STEPPED:
+        with Recording(path) as recording:
+            row = [channel["role"] for channel in recording.channels].index("force")
+            for point in (point for point in recording.latest.values() if point["accepted"]):
+                force = np.abs(as_complex(point["harmonics"])[row])
+                if force.size > 2 and force[1] > 0.0:
+                    ratios[point["level"], point["frequency_hz"]] = float(force[2] / force[1])
+    found = []
+    for measured in _stepped_sines(path):
+        top = float(measured.frequency_hz[int(np.argmax(measured.amplitude_m))])
+        over = _over(measured, request)
+        found.append(Reference(measured, over, request.over is not None, ratios.get((measured.level, top))))
+    return found
 
 
 def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:

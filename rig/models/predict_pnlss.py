@@ -1,34 +1,31 @@
 """Predictions of nonlinear state-space models: steady vibrations, recorded sweeps, recorded multisines."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
-
-import numpy as np
+from typing import TYPE_CHECKING, cast
 
 from identification import (
     Exciter,
     FrequencyResponse,
-    IdentificationError,
     PnlssModel,
     PredictionError,
     Predictions,
     SimulatedRun,
     SteadyPrediction,
-    SteadyStates,
-    compare,
     pnlss_frequency_response,
-    pnlss_steady_state,
     simulated_run,
 )
-from identification.prediction.comparison import Over
 from rig.errors import ConfigurationError, RecordingError
 from rig.experiments import experiments
+from rig.measurements import bench_of_recording
 from rig.models.exciter import EXCITER
 from rig.models.files import load_as
 from rig.models.pnlss import PNLSS, IdentifiedPnlss
-from rig.models.predict_pnlss_sweeps import pnlss_sweeps
+from rig.models.pnlss_sweep_models import PnlssSweepModels
+from rig.models.predict_pnlss_steady import Held, Reference, compared, default_held
+from rig.models.predict_pnlss_sweeps import planned_pnlss_sweeps, recorded_pnlss_sweeps
+from rig.models.predict_sweeps import strangers
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -36,31 +33,35 @@ if TYPE_CHECKING:
 
 __all__ = ["pnlss_predictions"]
 
-Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
-_MARGIN = 0.02
-"""How far beyond a reference's frequencies a response is followed."""
 
-
-def pnlss_predictions(
-    path: Path, request: "PredictionRequest", references: Sequence[tuple[FrequencyResponse, Over]]
-) -> Predictions:
+def pnlss_predictions(path: Path, request: "PredictionRequest", references: Sequence[Reference]) -> Predictions:
     """What is asked for, with errors where there is something to compare with; unbounded runs are results like others.
 
     Raises `ConfigurationError` for what a nonlinear state-space model does not answer, `identification.IdentificationError`
     where it has no periodic vibration, or channels that do not fit.
     """
-    _check(request)
     found: IdentifiedPnlss = load_as(PNLSS, path)
     model = found.model
+    _check(request, model, path)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
-    held = _held(model, exciter, request.held)
+    held = cast(Held, request.held or default_held(model, exciter))
     steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
-        (pnlss_frequency_response(model, force_n, force=held, exciter=exciter), None, None)
-        for force_n in request.forces_n
+        (pnlss_frequency_response(model, level, force=one, exciter=exciter), None, None)
+        for one, levels in ((held, request.forces_n), ("voltage", request.voltages_v))
+        for level in levels
     ]
-    steady += [_compared(model, exciter, *reference) for reference in references]
-    swept = [one for sweep in request.sweeps for one in pnlss_sweeps(sweep, model)]
-    runs = [run for recording in request.multisines for run in _multisine(recording, found)]
+    steady += [compared(model, exciter, reference) for reference in references]
+    models = PnlssSweepModels(model, exciter)
+    swept = [one for recording in request.sweeps for one in recorded_pnlss_sweeps(recording, models)]
+    swept += [one for plan in request.planned for one in planned_pnlss_sweeps(plan, models)]
+    runs: list[SimulatedRun] = []
+    notes = list(_default(request, held) if request.forces_n else ())
+    for recording in request.multisines:
+        more, said = _multisine(recording, found)
+        runs += more
+        notes += said
+    notes += _strangers(model, [reference.measured for reference in references])
+    notes += [note for one in swept for note in one.notes]
     return Predictions(
         steady=tuple(one for one, _, _ in steady),
         steady_references=tuple(reference for _, reference, _ in steady),
@@ -70,43 +71,46 @@ def pnlss_predictions(
         sweep_errors=tuple(one.error for one in swept),
         runs=tuple(runs),
         specimen=model.specimen,
-        notes=tuple(
-            dict.fromkeys(
-                [
-                    *(_default(request, held) if request.forces_n else ()),
-                    *_strangers(model, [reference for reference, _ in references]),
-                    *(note for one in swept for note in one.notes),
-                ]
-            )
-        ),
+        notes=tuple(dict.fromkeys(notes)),
     )
 
 
-def _check(request: "PredictionRequest") -> None:
-    """Refuse what is asked of a nonlinear mode alone."""
+def _check(request: "PredictionRequest", model: PnlssModel, path: Path) -> None:
+    """Refuse what is asked of a nonlinear mode alone, and what the model's channels do not allow."""
     given = {
-        "--planned-sweep": bool(request.planned),
         "--zero-crossings": request.zero_crossings is not None,
         "--modes": request.modes is not None,
         "--allow-extrapolation": request.allow_extrapolation,
     }
     for name in (name for name, is_given in given.items() if is_given):
         raise ConfigurationError(
-            f"{name}: means nothing to a PNLSS model, which answers --frequency-response, --reference, --sweep and --multisine"
+            f"{name}: means nothing to a PNLSS model, which answers --frequency-response, --voltage-response, --reference, "
+            "--sweep, --planned-sweep and --multisine"
         )
-    if request.exciter is not None and not (request.forces_n or request.references):
+    steady = bool(request.forces_n or request.voltages_v or request.references)
+    swept = bool(request.sweeps or request.planned)
+    inputs, outputs = ([channel.role for channel in channels] for channels in (model.inputs, model.outputs))
+    named = ", ".join(channel.name for channel in (*model.inputs, *model.outputs))
+    if (steady or swept) and "force" not in (*inputs, *outputs):
         raise ConfigurationError(
-            "--exciter: is for frequency responses of a PNLSS model, and none is asked for; a sweep is predicted from the "
-            "model's own input"
+            f"{path}: has no force among its channels ({named}), without which it answers --multisine alone; identify it with "
+            "the force among --outputs"
         )
-
-
-def _held(model: PnlssModel, exciter: Exciter | None, asked: str | None) -> Held:
-    """What is constant: as asked, else what the model can hold."""
-    if asked is not None:
-        return cast(Held, asked)
-    force_driven = any(channel.role == "force" for channel in model.inputs)
-    return "pure-sine" if force_driven and exciter is None else "fundamental"
+    if swept and "drive" not in outputs:
+        raise ConfigurationError(
+            f"{path}: has no drive point among its channels ({named}), which sweeps are compared at; identify it with the "
+            "drive point among --outputs"
+        )
+    if request.exciter is None and "force" in inputs:
+        for name, asked in (("--voltage-response", request.voltages_v), ("--planned-sweep", request.planned)):
+            if asked:
+                raise ConfigurationError(f"{name}: gives a voltage, and {path} is driven by a force; add --exciter")
+    if request.exciter is not None and "force" not in inputs:
+        raise ConfigurationError(f"--exciter: is inside {path}, whose input is the voltage; leave it out")
+    if request.exciter is not None and not (steady or swept):
+        raise ConfigurationError(
+            "--exciter: means nothing to --multisine, which takes the recorded force; leave it out"
+        )
 
 
 def _default(request: "PredictionRequest", held: Held) -> tuple[str, ...]:
@@ -119,77 +123,8 @@ def _default(request: "PredictionRequest", held: Held) -> tuple[str, ...]:
     )
 
 
-def _compared(
-    model: PnlssModel, exciter: Exciter | None, measured: FrequencyResponse, over: Over
-) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
-    """At the level that was held, where the model can hold it, else at the force that each point had."""
-    held = _held(model, exciter, None)
-    low, high = (
-        (1.0 - _MARGIN) * float(measured.frequency_hz.min()),
-        (1.0 + _MARGIN) * float(measured.frequency_hz.max()),
-    )
-    if measured.controlled == "force":
-        predicted = pnlss_frequency_response(
-            model, measured.level, force=held, exciter=exciter, lowest_hz=low, highest_hz=high
-        )
-    elif measured.controlled == "voltage" and held == "fundamental":
-        predicted = pnlss_frequency_response(
-            model, measured.level, force="voltage", exciter=exciter, lowest_hz=low, highest_hz=high
-        )
-    else:
-        predicted = _point_by_point(model, exciter, held, measured)
-        over = "frequency"
-    return predicted, measured, compare(predicted, measured, over=over).error
-
-
-def _point_by_point(
-    model: PnlssModel, exciter: Exciter | None, held: Held, measured: FrequencyResponse
-) -> SteadyPrediction:
-    """The vibration at each point's own force; where several are found, the one whose amplitude is nearest to the measured.
-
-    Tried are the one that rest leads to, and the one next to that of the point before. Points without any are left out.
-    """
-    states: list[SteadyStates] = []
-    near: SteadyStates | None = None
-    for frequency, force, amplitude in zip(
-        measured.frequency_hz.tolist(), np.abs(measured.force).tolist(), measured.amplitude_m.tolist(), strict=True
-    ):
-        tried: list[SteadyStates] = []
-        for start in (near, None) if near is not None else (None,):
-            try:
-                tried.append(pnlss_steady_state(model, force, frequency, force=held, exciter=exciter, near=start))
-            except IdentificationError:
-                continue
-        if tried:
-            near = min(tried, key=lambda one: abs(abs(complex(one.displacement_m[0, 1, 0])) - amplitude))
-            states.append(near)
-    if not states:
-        raise IdentificationError(
-            f"reference '{measured.label}': the model has no periodic vibration at any of its points"
-        )
-    missing = measured.frequency_hz.size - len(states)
-    notes = (f"at {missing} of {measured.frequency_hz.size} points no vibration was found",) if missing else ()
-    none = np.zeros(0)
-    return SteadyPrediction(
-        force_n=float(np.median(np.abs(measured.force))),
-        force="recorded",
-        channels=states[0].channels,
-        frequency_hz=np.concatenate([one.frequency_hz for one in states]),
-        modal_amplitude=np.full(len(states), np.nan),
-        fundamental_n=np.concatenate([np.abs(one.force_n[:, 1]) for one in states]),
-        displacement_m=np.concatenate([one.displacement_m[:, 1] for one in states]),
-        stable=np.concatenate([one.stable for one in states]),
-        branch=np.zeros(len(states), dtype=np.int64),
-        range_use=np.concatenate([np.asarray(one.range_use) for one in states]),
-        fold_frequency_hz=none,
-        fold_amplitude_m=none,
-        fold_modal_amplitude=none,
-        notes=notes,
-    )
-
-
-def _multisine(path: Path, identified: IdentifiedPnlss) -> Iterator[SimulatedRun]:
-    """Every realisation of a recording, simulated, and what it was to the model, as far as its name says."""
+def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedRun], tuple[str, ...]]:
+    """Every realisation of a recording, simulated, what it was to the model as far as its name says, and notes."""
     model = identified.model
     with Recording(path) as recording:
         if recording.kind != "multisine":
@@ -200,9 +135,9 @@ def _multisine(path: Path, identified: IdentifiedPnlss) -> Iterator[SimulatedRun
             outputs=[channel.name for channel in model.outputs],
             rate_hz=model.sample_rate_hz,
         )
+        notes = strangers(bench_of_recording(recording), model.specimen, None, str(path))
     uses = {run.name: run.use for run in identified.runs}
-    for one in found:
-        yield replace(simulated_run(model, one), use=uses.get(one.name, "test"))
+    return [replace(simulated_run(model, one), use=uses.get(one.name, "test")) for one in found], notes
 
 
 def _strangers(model: PnlssModel, references: Sequence[FrequencyResponse]) -> list[str]:

@@ -1,71 +1,110 @@
-"""Recorded sweeps as a nonlinear state-space model simulates them, demodulated by the recording's own oscillator."""
+"""Sweeps, recorded ones and planned ones, as a nonlinear state-space model simulates them, from force or from voltage."""
 
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification import (
-    Channel,
-    Experiment,
     IdentificationError,
     PnlssModel,
-    Simulation,
-    SweepPrediction,
-    Transient,
     compare_sweep,
-    demodulate,
 )
-from identification.channels import MOTION_ORDER, find_role
+from identification.channels import find_role
 from identification.prediction.simulated_runs import estimated_initial_state
 from rig.campaigns.gaps import bridged, lost_rows
-from rig.errors import RecordingError
-from rig.experiments.build import rows_from_rest
+from rig.campaigns.plans import bench_of
+from rig.campaigns.sweep import SweepPlan
+from rig.errors import ConfigurationError, RecordingError
+from rig.experiments.build import FEWEST_SAMPLES_PER_PERIOD, rows_from_rest
 from rig.experiments.records import sweep_pieces
 from rig.experiments.signals import Signals
 from rig.measurements import bench_of_recording, point_rows, sweeps
-from rig.models.predict_sweeps import Swept, force_and_drive
+from rig.models.pnlss_sweep_models import PnlssSweepModels, SweepGiven
+from rig.models.predict_sweeps import Swept, force_and_drive, planned, strangers
 from rig.recording.reader import Recording
 from rig.tick.layout import SAMPLE_LOST
 
-__all__ = ["pnlss_sweeps"]
+__all__ = ["planned_pnlss_sweeps", "recorded_pnlss_sweeps"]
 
-_SHOWN = 10.0
-"""Of an unbounded run is shown what is below this many times the largest recorded amplitude."""
+Float = NDArray[np.float64]
 
 
-def pnlss_sweeps(path: Path, model: PnlssModel) -> Iterator[Swept]:
-    """Every accepted sweep of a recording, simulated from rest with the model's own input as it was recorded.
+def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swept]:
+    """Every accepted sweep of a recording, simulated from rest: from its force, or from its voltage.
 
-    The fundamentals are those of the predicted drive point, and of the force: imposed, or predicted where the voltage is.
-    Raises `RecordingError` where the file holds something else, `identification.IdentificationError` where the model has
-    no drive point or no force.
+    Raises `RecordingError` where the file holds something else, `identification.IdentificationError` where channels or rate
+    do not fit.
     """
-    find_role(model.outputs, "drive")
     with Recording(path) as recording:
         if recording.kind != "sweep":
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
-        bench = bench_of_recording(recording)
-        same = model.specimen in ("", bench.specimen.name)
-        notes = (
-            ()
-            if same
-            else (f"the model is of {model.specimen}, {path} of {bench.specimen.name}: not the same specimen",)
-        )
+        notes = strangers(bench_of_recording(recording), models.model.specimen, models.exciter, str(path))
         recorded = sweeps(recording)
         for number, sweep in recorded.items():
             name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
-            experiment, theta, more = _record(recording, number, model)
-            predicted = _predicted(model, experiment, theta, sweep)
+            given, more = _recorded(recording, number, models)
+            predicted = models.predict(given)
             yield Swept(predicted, force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), (*notes, *more))
 
 
-def _record(recording: Recording, number: int, model: PnlssModel) -> tuple[Experiment, np.ndarray, tuple[str, ...]]:
+def planned_pnlss_sweeps(plan_source: str, models: PnlssSweepModels) -> Iterator[Swept]:
+    """Every level of a plan's sweep; `ConfigurationError` where it is none of constant voltage, or too fast for the model."""
+    plan, rate_hz = planned(plan_source), models.model.sample_rate_hz
+    highest = max(plan.start_hz, plan.stop_hz)
+    if FEWEST_SAMPLES_PER_PERIOD * highest >= rate_hz:
+        raise ConfigurationError(
+            f"{plan_source}: goes up to {highest:g} Hz; a model at {rate_hz:g} Hz allows below "
+            f"{rate_hz / FEWEST_SAMPLES_PER_PERIOD:g} Hz"
+        )
+    notes = strangers(bench_of(plan, plan_source), models.model.specimen, models.exciter, plan_source)
+    row = find_role(models.model.outputs, "drive")
+    for level_v in plan.levels:
+        theta, envelope, first = _waveform(plan, rate_hz)
+        rate = f"{plan.rate_hz_per_s:g} Hz/s" if plan.rate_hz_per_s else f"{plan.rate_octaves_per_min:g} octaves/min"
+        given = SweepGiven(
+            inputs=(level_v * envelope * np.cos(theta))[None],
+            first=first,
+            theta=theta[first:],
+            frequencies_hz=(plan.start_hz, plan.stop_hz),
+            largest=_largest_in_training(models.model, row),
+            initial_state=None,
+            origin=f"planned {level_v:g} V, {plan.start_hz:g} to {plan.stop_hz:g} Hz, {rate}",
+        )
+        yield Swept(models.predict(given), None, None, notes)
+
+
+def _waveform(plan: SweepPlan, rate_hz: float) -> tuple[Float, Float, int]:
+    """Phase and envelope of a planned sweep with ramp and hold ahead of it, at the model's rate, and where it begins."""
+    first = round((plan.ramp_periods + plan.hold_periods) / plan.start_hz * rate_hz)
+    time_s = np.arange(first + round(plan.duration_s * rate_hz)) / rate_hz
+    swept = np.maximum(time_s - time_s[first], 0.0)
+    before = 2.0 * np.pi * plan.start_hz * np.minimum(time_s, time_s[first])
+    if plan.rate_hz_per_s is not None:
+        way = np.sign(plan.stop_hz - plan.start_hz)
+        turned = plan.start_hz * swept + 0.5 * way * plan.rate_hz_per_s * swept**2
+    else:
+        growth = np.log(plan.stop_hz / plan.start_hz) / plan.duration_s
+        turned = plan.start_hz * np.expm1(growth * swept) / growth
+    risen = np.clip(time_s * plan.start_hz / plan.ramp_periods, 0.0, 1.0)
+    return before + 2.0 * np.pi * turned, 0.5 - 0.5 * np.cos(np.pi * risen), first
+
+
+def _largest_in_training(model: PnlssModel, row: int) -> float:
+    """About the largest that an output can be within the range of the training data; infinite where that is unknown."""
+    found = float(np.sum(np.abs(model.c[row]) * model.state_range) + np.sum(np.abs(model.d[row]) * model.input_range))
+    return found if np.isfinite(found) and found > 0.0 else float("inf")
+
+
+def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tuple[SweepGiven, tuple[str, ...]]:
     """A sweep at the model's rate, with the oscillator's phase at its counted samples; gaps are bridged."""
-    bench = bench_of_recording(recording)
-    signals = Signals.chosen(bench, [c.name for c in model.inputs], [c.name for c in model.outputs])
+    bench, model = bench_of_recording(recording), models.model
+    try:
+        signals = Signals.chosen(bench, [c.name for c in models.inputs], [c.name for c in model.outputs])
+    except IdentificationError as error:
+        raise IdentificationError(f"{recording.path}: {error}") from None
     fs, rate_hz = bench.sample_rate_hz, model.sample_rate_hz
     own = point_rows(recording, number)
     lead = rows_from_rest(recording, number, Fraction(rate_hz / fs))
@@ -74,77 +113,37 @@ def _record(recording: Recording, number: int, model: PnlssModel) -> tuple[Exper
     if lost:
         rows["inputs"] = bridged(rows)
         rows["flags"] &= ~np.uint32(SAMPLE_LOST)
-    point = dict(recording.latest[number])
-    start_hz = float(recording.configuration["plan"]["start_hz"])
-    pieces = sweep_pieces(signals, point, rows, lead.size, start_hz=start_hz, rate_hz=rate_hz, name=f"sweep {number}")
+    plan = recording.configuration["plan"]
+    ends = (float(plan["start_hz"]), float(plan["stop_hz"]))
+    pieces = sweep_pieces(
+        signals,
+        dict(recording.latest[number]),
+        rows,
+        lead.size,
+        start_hz=ends[0],
+        rate_hz=rate_hz,
+        name=f"sweep {number}",
+    )
     found = next(pieces, None)
     if found is None:
         raise IdentificationError(f"{recording.path}: sweep {number} is too short to be predicted")
     turned = np.unwrap(own["theta_rad"].astype(float))
     theta = np.interp(np.arange(found.counted) * fs / rate_hz, np.arange(turned.size), turned)
-    said = (f"{recording.path}: {lost} samples of sweep {number} were lost and are bridged",) if lost else ()
-    return found, theta, said
-
-
-def _predicted(model: PnlssModel, experiment: Experiment, theta: np.ndarray, sweep: Transient) -> SweepPrediction:
-    """The simulated sweep as fundamentals; of an unbounded one what came before."""
-    begin = estimated_initial_state(model, experiment) if experiment.initial_state == "estimated" else None
-    run = model.simulate(experiment.inputs, initial_state=begin)
-    first = experiment.counted_from
-    force, force_channel = _force(model, experiment, run)
+    said = [f"{recording.path}: {lost} samples of sweep {number} were lost and are bridged"] if lost else []
+    begin = None
+    if found.initial_state == "estimated":
+        if models.exciter is None:
+            begin = estimated_initial_state(model, found)
+        else:
+            said.append(f"{recording.path}: sweep {number} does not begin at rest, but is simulated as if it did")
     row = find_role(model.outputs, "drive")
-    signals = np.vstack([force, run.outputs[row]])[:, first:]
-    stop, notes = signals.shape[1], []
-    if run.unbounded_at is not None:
-        recorded = float(np.abs(experiment.outputs[row]).max())
-        beyond = np.flatnonzero(~(np.abs(signals[1]) <= _SHOWN * recorded))
-        stop = int(beyond[0]) if beyond.size else stop
-        notes.append(
-            f"the run left all bounds {max(run.unbounded_at - first, 0) / model.sample_rate_hz:.2f} s into the sweep: "
-            "no errors are given"
-        )
-    elif run.range_use > 1.0:
-        notes.append(f"states or input reach {run.range_use:.2f} times the training data: extrapolated")
-    found = _fundamentals(theta[:stop], signals[:, :stop], (force_channel, model.outputs[row]), model, sweep)
-    order = MOTION_ORDER[model.outputs[row].motion]
-    s = 2j * np.pi * found.frequency_hz
-    drive_m = found.fundamentals[1] / s**order
-    return SweepPrediction(
-        time_s=found.time_s,
-        frequency_hz=found.frequency_hz,
-        modal_amplitude=np.full(found.time_s.size, complex(np.nan)),
-        drive_m=drive_m,
-        drive_m_s=s * drive_m,
-        drive_m_s2=s**2 * drive_m,
-        force=found.fundamentals[0],
-        largest_identified=float("nan"),
-        window_periods=found.window_periods,
-        origin=f"the recorded {', '.join(channel.name for channel in model.inputs)}",
-        notes=tuple(notes),
-        simulated_range_use=run.range_use,
-        unbounded_at_s=None if run.unbounded_at is None else max(run.unbounded_at - first, 0) / model.sample_rate_hz,
+    given = SweepGiven(
+        inputs=found.inputs,
+        first=found.counted_from,
+        theta=theta,
+        frequencies_hz=ends,
+        largest=float(np.abs(found.outputs[row]).max()),
+        initial_state=begin,
+        origin=f"the recorded {', '.join(channel.name for channel in models.inputs)}",
     )
-
-
-def _force(model: PnlssModel, experiment: Experiment, run: Simulation) -> tuple[Any, Channel]:
-    """The force at the drive point: imposed, or predicted."""
-    for channels, values in ((model.inputs, experiment.inputs), (model.outputs, run.outputs)):
-        for channel, row in zip(channels, values, strict=True):
-            if channel.role == "force":
-                return row, channel
-    raise IdentificationError(
-        "model: has the force neither among its inputs nor its outputs; identify it with the force"
-    )
-
-
-def _fundamentals(
-    theta: np.ndarray, signals: np.ndarray, channels: tuple[Channel, Channel], model: PnlssModel, sweep: Transient
-) -> Transient:
-    """Demodulated as the recording was; a single instant at rest where a run ended before there was a period to see."""
-    try:
-        return demodulate(theta, signals, channels, sample_rate_hz=model.sample_rate_hz)
-    except IdentificationError:
-        if theta.size >= 0.5 * sweep.time_s[-1] * model.sample_rate_hz:
-            raise
-        nothing = np.zeros((2, 1), dtype=np.complex128)
-        return Transient(channels, np.zeros(1), sweep.frequency_hz[:1], nothing, sweep.window_periods)
+    return given, tuple(said)

@@ -25,7 +25,16 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.recording.reader import Recording
 
-__all__ = ["CROSSINGS", "SweepModels", "Swept", "force_and_drive", "planned_sweeps", "recorded_sweeps"]
+__all__ = [
+    "CROSSINGS",
+    "SweepModels",
+    "Swept",
+    "force_and_drive",
+    "planned",
+    "planned_sweeps",
+    "recorded_sweeps",
+    "strangers",
+]
 
 CROSSINGS = ("half-periods", "periods")
 """Between which zero crossings a force can be read: all of them, or those in the same direction."""
@@ -76,7 +85,7 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
     with Recording(path) as recording:
         if recording.kind != "sweep":
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
-        notes = _strangers(bench_of_recording(recording), models, str(path))
+        notes = strangers(bench_of_recording(recording), models.mode.specimen, models.exciter, str(path))
         recorded = sweeps(recording)
         rejected = set(recording.latest) - set(recorded)
         if rejected or not recording.complete:
@@ -90,30 +99,38 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
 
 def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
     """Every level of a plan's sweep; `ConfigurationError` where it is no sweep, or not linear in time."""
-    plan = load_plan(plan_source)
-    if not isinstance(plan, SweepPlan):
-        raise ConfigurationError(f"{plan_source}: is a plan of kind {plan.kind}, wanted is a sweep")
+    plan = planned(plan_source)
     if plan.rate_hz_per_s is None:
         raise ConfigurationError(
             f"{plan_source}: rate_octaves_per_min: a logarithmic sweep cannot be predicted; give rate_hz_per_s"
         )
-    notes = _strangers(bench_of(plan, plan_source), models, plan_source)
+    notes = strangers(bench_of(plan, plan_source), models.mode.specimen, models.exciter, plan_source)
     for level_v in plan.levels:
         predicted = models.predict(VoltageSweep(plan.start_hz, plan.stop_hz, plan.rate_hz_per_s, level_v))
         yield Swept(predicted, None, None, notes)
 
 
-def _strangers(bench: Bench, models: SweepModels, source: str) -> tuple[str, ...]:
+def planned(plan_source: str) -> SweepPlan:
+    """A plan of sweeps of constant voltage; `ConfigurationError` for any other."""
+    plan = load_plan(plan_source)
+    if not isinstance(plan, SweepPlan):
+        raise ConfigurationError(f"{plan_source}: is a plan of kind {plan.kind}, wanted is a sweep")
+    if plan.level_unit != "V":
+        raise ConfigurationError(
+            f"{plan_source}: has levels in {plan.level_unit}, whose voltage only the test can tell; give levels_v"
+        )
+    return plan
+
+
+def strangers(bench: Bench, specimen: str, exciter: Exciter | None, source: str) -> tuple[str, ...]:
     """Models of another rig: an exciter may move on to another structure, but that only its user knows."""
     notes = []
-    if models.mode.specimen not in ("", bench.specimen.name):
-        notes.append(
-            f"the model is of {models.mode.specimen}, {source} of {bench.specimen.name}: not the same specimen"
-        )
+    if specimen not in ("", bench.specimen.name):
+        notes.append(f"the model is of {specimen}, {source} of {bench.specimen.name}: not the same specimen")
     here = f"{bench.name}, {bench.specimen.name}"  # as the identification of an exciter calls it
-    if models.exciter is not None and models.exciter.source not in ("", here):
+    if exciter is not None and exciter.source not in ("", here):
         notes.append(
-            f"the exciter model is of {models.exciter.source}, {source} of {here}: right only if amplifier, exciter and "
+            f"the exciter model is of {exciter.source}, {source} of {here}: right only if amplifier, exciter and "
             "stinger are the same"
         )
     return tuple(notes)

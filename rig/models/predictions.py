@@ -18,7 +18,8 @@ def _steady(
     peak = response.peak()
     return {
         "name": (reference.label if reference else "") or response.name,
-        "force_n": response.force_n,
+        "force_n": None if response.force == "voltage" else response.force_n,
+        "voltage_v": response.force_n if response.force == "voltage" else None,
         "force": response.force,
         "peak_m": peak.amplitude_m,
         "peak_frequency_hz": peak.frequency_hz,
@@ -132,7 +133,7 @@ def _say(summary: dict[str, Any]) -> None:
             ],
         )
     shown = set()
-    for part in (*summary["frequency_responses"], *summary["sweeps"]):
+    for part in (*summary["frequency_responses"], *summary["sweeps"], *summary["errors"]):
         for note in part["notes"]:
             if note not in shown:
                 print(f"note: {part['name']}: {note}")

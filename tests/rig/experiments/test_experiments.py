@@ -104,8 +104,8 @@ def test_a_sweep_begins_at_rest_and_counts_from_its_own_beginning():
 
 def test_periods_and_stretches_with_lost_samples_are_left_out(monkeypatch):
     fs = 5000
-    lose(monkeypatch, [(k * fs, k * fs + 3) for k in (5, 16)])
-    with rig.run(plan_from(LINES, "lines"), seed=1) as run:
+    lose(monkeypatch, [(k * fs // 10, k * fs // 10 + 3) for k in (36, 86)])
+    with rig.run(plan_from(LINES | {"resolution_hz": 1.0}, "lines"), seed=1) as run:
         kept = [one.counted // one.period_samples for one in run.experiments(periods="all")]
         assert kept == [2, 2]  # of three each
     with rig.run(plan_from(SWEEP | {"levels_v": [0.4]}, "sweep"), seed=1) as run:

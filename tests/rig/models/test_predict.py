@@ -157,13 +157,16 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
     [
         (
             "NM.h5",
-            "nothing to predict: give --frequency-response, --sweep, --planned-sweep, --multisine or --reference",
+            "nothing to predict: give --frequency-response, --voltage-response, --sweep, ",
         ),
         ("nothing.h5 --frequency-response 0.1", "nothing.h5"),
-        ("LIN.h5 --frequency-response 0.1", "LIN.h5: is a file of kind linear-modes, wanted is one of kind "),
-        ("NM.h5 --frequency-response 0", "force_n: is 0 N"),
-        ("NM.h5 --frequency-response nan", "force_n: is nan N"),
-        ("NM.h5 --frequency-response -0.1", "force_n: is -0.1 N"),
+        (
+            "LIN.h5 --frequency-response 0.1",
+            "LIN.h5: is a file of kind linear-modes; predictions are made with a nonlinear-mode, ",
+        ),
+        ("NM.h5 --frequency-response 0", "--frequency-response = 0: allowed is any number above 0, N"),
+        ("NM.h5 --frequency-response nan", "--frequency-response = nan: allowed is any number above 0, N"),
+        ("NM.h5 --frequency-response -0.1", "--frequency-response = -0.1: allowed is any number above 0, N"),
         ("NM.h5 --frequency-response 1e-12", "force_n: is 1e-12 N, too small"),
         (
             "NM.h5 --frequency-response 2",
@@ -178,7 +181,10 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
             "NM.h5 --sweep sweep.h5 --exciter EX.h5 --zero-crossings periods",
             "--zero-crossings: are those of an imposed force",
         ),
-        ("NM.h5 --sweep sweep.h5 --exciter LIN.h5", "LIN.h5: is a file of kind linear-modes, wanted is one of kind "),
+        (
+            "NM.h5 --sweep sweep.h5 --exciter LIN.h5",
+            "LIN.h5: is a file of kind linear-modes, wanted is one of kind exciter",
+        ),
         (
             "NM.h5 --sweep sweep.h5 --modes EX.h5",
             "EX.h5: is a file of kind exciter, wanted is one of kind linear-modes",

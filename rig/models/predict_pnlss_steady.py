@@ -1,0 +1,126 @@
+"""Steady vibrations of nonlinear state-space models, beside the stepped sines that they are compared with."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from identification import (
+    Exciter,
+    FrequencyResponse,
+    IdentificationError,
+    PnlssModel,
+    PredictionError,
+    SteadyPrediction,
+    SteadyStates,
+    compare,
+    pnlss_frequency_response,
+    pnlss_steady_state,
+)
+from identification.prediction.comparison import Over
+
+__all__ = ["Held", "Reference", "compared", "default_held"]
+
+Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
+_MARGIN = 0.02
+"""How far beyond a reference's frequencies a response is followed."""
+_HARMONIC = 0.01
+"""Second harmonic of a reference's force, over its fundamental, from which a force without any is said to be another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A measured response, and how it is to be compared."""
+
+    measured: FrequencyResponse
+    """What was measured."""
+    over: Over
+    """What it is compared over."""
+    over_asked: bool = False
+    """Whether that was asked for."""
+    second_harmonic: float | None = None
+    """Second harmonic of the force over its fundamental, where the response is largest; None if unknown."""
+
+
+def default_held(model: PnlssModel, exciter: Exciter | None) -> Held:
+    """What of a force the model can hold."""
+    force_driven = any(channel.role == "force" for channel in model.inputs)
+    return "pure-sine" if force_driven and exciter is None else "fundamental"
+
+
+def compared(
+    model: PnlssModel, exciter: Exciter | None, reference: Reference
+) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
+    """At the level that was held, where the model can hold it, else at the force that each point had."""
+    measured, over = reference.measured, reference.over
+    held, notes = default_held(model, exciter), []
+    low, high = (
+        (1.0 - _MARGIN) * float(measured.frequency_hz.min()),
+        (1.0 + _MARGIN) * float(measured.frequency_hz.max()),
+    )
+    if measured.controlled == "force":
+        predicted = pnlss_frequency_response(
+            model, measured.level, force=held, exciter=exciter, lowest_hz=low, highest_hz=high
+        )
+    elif measured.controlled == "voltage" and held == "fundamental":
+        predicted = pnlss_frequency_response(
+            model, measured.level, force="voltage", exciter=exciter, lowest_hz=low, highest_hz=high
+        )
+    else:
+        predicted = _point_by_point(model, exciter, held, measured)
+        over = "frequency"
+        if reference.over_asked and reference.over != over:
+            notes.append(f"compared point by point, not over {reference.over}: each point has its own force")
+    if held == "pure-sine" and (reference.second_harmonic or 0.0) > _HARMONIC:
+        notes.append(
+            f"the forces differ: the reference's has F2/F1 = {reference.second_harmonic:.2g} where it responds most, the "
+            "predicted one has no harmonics; --exciter makes them"
+        )
+    predicted = replace(predicted, notes=(*predicted.notes, *notes))
+    return predicted, measured, compare(predicted, measured, over=over).error
+
+
+def _point_by_point(
+    model: PnlssModel, exciter: Exciter | None, held: Held, measured: FrequencyResponse
+) -> SteadyPrediction:
+    """The vibration at each point's own force; where several are found, the one whose amplitude is nearest to the measured.
+
+    Tried are the one that rest leads to, and the one next to that of the point before. Points without any are left out.
+    """
+    states: list[SteadyStates] = []
+    near: SteadyStates | None = None
+    for frequency, force, amplitude in zip(
+        measured.frequency_hz.tolist(), np.abs(measured.force).tolist(), measured.amplitude_m.tolist(), strict=True
+    ):
+        tried: list[SteadyStates] = []
+        for start in (near, None) if near is not None else (None,):
+            try:
+                tried.append(pnlss_steady_state(model, force, frequency, force=held, exciter=exciter, near=start))
+            except IdentificationError:
+                continue
+        if tried:
+            near = min(tried, key=lambda one: abs(abs(complex(one.displacement_m[0, 1, 0])) - amplitude))
+            states.append(near)
+    if not states:
+        raise IdentificationError(
+            f"reference '{measured.label}': the model has no periodic vibration at any of its points"
+        )
+    missing = measured.frequency_hz.size - len(states)
+    notes = (f"at {missing} of {measured.frequency_hz.size} points no vibration was found",) if missing else ()
+    none = np.zeros(0)
+    return SteadyPrediction(
+        force_n=float(np.median(np.abs(measured.force))),
+        force="recorded",
+        channels=states[0].channels,
+        frequency_hz=np.concatenate([one.frequency_hz for one in states]),
+        modal_amplitude=np.full(len(states), np.nan),
+        fundamental_n=np.concatenate([np.abs(one.force_n[:, 1]) for one in states]),
+        displacement_m=np.concatenate([one.displacement_m[:, 1] for one in states]),
+        stable=np.concatenate([one.stable for one in states]),
+        branch=np.zeros(len(states), dtype=np.int64),
+        range_use=np.concatenate([np.asarray(one.range_use) for one in states]),
+        fold_frequency_hz=none,
+        fold_amplitude_m=none,
+        fold_modal_amplitude=none,
+        notes=notes,
+    )
