@@ -23,6 +23,7 @@ from rig.models.exciter import EXCITER
 from rig.models.files import load_as
 from rig.models.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.pnlss_sweep_models import PnlssSweepModels
+from rig.models.points_left_out import points_left_out
 from rig.models.predict_pnlss_steady import Held, Reference, compared, default_held
 from rig.models.predict_pnlss_sweeps import planned_pnlss_sweeps, recorded_pnlss_sweeps
 from rig.models.predict_sweeps import strangers
@@ -135,7 +136,10 @@ def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedR
             outputs=[channel.name for channel in model.outputs],
             rate_hz=model.sample_rate_hz,
         )
-        notes = strangers(bench_of_recording(recording), model.specimen, None, str(path))
+        notes = (
+            *strangers(bench_of_recording(recording), model.specimen, None, str(path)),
+            *points_left_out(recording),
+        )
     uses = {run.name: run.use for run in identified.runs}
     return [replace(simulated_run(model, one), use=uses.get(one.name, "test")) for one in found], notes
 

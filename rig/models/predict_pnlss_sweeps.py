@@ -23,6 +23,7 @@ from rig.experiments.records import sweep_pieces
 from rig.experiments.signals import Signals
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.models.pnlss_sweep_models import PnlssSweepModels, SweepGiven
+from rig.models.points_left_out import points_left_out
 from rig.models.predict_sweeps import Swept, force_and_drive, planned, strangers
 from rig.recording.reader import Recording
 from rig.tick.layout import SAMPLE_LOST
@@ -41,7 +42,10 @@ def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swep
     with Recording(path) as recording:
         if recording.kind != "sweep":
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
-        notes = strangers(bench_of_recording(recording), models.model.specimen, models.exciter, str(path))
+        notes = (
+            *strangers(bench_of_recording(recording), models.model.specimen, models.exciter, str(path)),
+            *points_left_out(recording),
+        )
         recorded = sweeps(recording)
         for number, sweep in recorded.items():
             name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
