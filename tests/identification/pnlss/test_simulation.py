@@ -41,15 +41,14 @@ def test_a_run_with_an_exciter_ends_there_too() -> None:
         f=np.vstack([plain.f, np.zeros(plain.f.shape[1])]),
         state_range=np.array([0.0, 1.0]),
     )
-    voltage = 0.2 * np.cos(2 * np.pi * 25.0 / 800.0 * np.arange(2000))
+    voltage = 2.0 * np.cos(2 * np.pi * 25.0 / 800.0 * np.arange(2000))
     bounded = pnlss_coupled_run(model, shaker(), voltage, lowest_hz=10.0)
     assert bounded.bounded
     assert np.isnan(bounded.state_use[0])
     assert np.isfinite(bounded.range_use)
-    largest = np.abs(bounded.outputs[2]).max()
-    strain = np.array(model.f)
-    strain[3, 0] = 1e308 / (0.3 * largest) ** 2 * 10.0  # of the square: beyond all numbers at a third of the largest
-    found = pnlss_coupled_run(replace(model, f=strain), shaker(), voltage, lowest_hz=10.0)
-    assert found.unbounded_at is not None
-    assert np.abs(bounded.outputs[2, : found.unbounded_at]).max() < 0.4 * largest
+    reached = 0.5 * np.abs(bounded.force_n).max()
+    strain = np.array(model.d)
+    strain[3] = np.finfo(float).max / reached  # beyond all numbers at a larger force
+    found = pnlss_coupled_run(replace(model, d=strain), shaker(), voltage, lowest_hz=10.0)
+    assert found.unbounded_at == int(np.argmax(np.abs(bounded.force_n) > reached))
     assert np.isnan(found.force_n[found.unbounded_at :]).all()
