@@ -52,7 +52,7 @@ def continued(
     steps
         Step control.
     stop
-        Asked at every point; a text ends the path there and is its ``reason``.
+        Asked at every point, the first and the last too; a text ends the path there and is its ``reason``.
 
     Raises
     ------
@@ -71,8 +71,8 @@ def continued(
     walk = Walk(system, np.append(size, positive("parameter_scale", parameter_scale)), allowed)
     first = walk.first(np.append(begin, parameter), direction)
     found, turns, length = [first], list[tuple[int, Float]](), allowed.first
-    ending: Ending = "points"
-    reason = ""
+    reason = "" if stop is None else stop(begin, float(parameter))
+    ending: Ending = "stopped" if reason else "points"
     while len(found) < points and not reason:
         last = found[-1]
         new, length = walk.next(last, length)
@@ -92,10 +92,10 @@ def continued(
         if new.tangent[-1] * last.tangent[-1] < 0.0 and (turn := walk.turn(last, step)) is not None:
             turns.append((len(found) - 1, turn))
         found.append(new)
-        if ending in ("closed", "range"):
-            break
         if stop is not None and (reason := stop(new.v[:-1], float(new.v[-1]))):
             ending = "stopped"
+        if ending in ("closed", "range"):
+            break
     return _path(found, turns, ending, reason)
 
 

@@ -29,7 +29,7 @@ class PredictionError:
     name
         What was predicted.
     peak_error, peak_frequency_error
-        Of the largest amplitude, and of the frequency at which it occurs.
+        Of the largest amplitude, and of the frequency at which it occurs; NaN where the prediction was cut off before it.
     envelope_error
         RMS of the difference of the amplitudes over the common part of both, over the reference's largest amplitude.
     range_use
@@ -57,12 +57,12 @@ class PredictionError:
             return "inside the identified range"
         return "extrapolated" if self.range_use <= FLAGGED_BEYOND else "extrapolated far"
 
-    def row(self) -> dict[str, float | str | list[str]]:
-        """The errors by name, verdict included: ready for JSON."""
+    def row(self) -> dict[str, float | str | list[str] | None]:
+        """The errors by name, verdict included, ready for JSON: peak errors are None where there are none."""
         return {
             "name": self.name,
-            "peak_error": self.peak_error,
-            "peak_frequency_error": self.peak_frequency_error,
+            "peak_error": None if np.isnan(self.peak_error) else self.peak_error,
+            "peak_frequency_error": None if np.isnan(self.peak_frequency_error) else self.peak_frequency_error,
             "envelope_error": self.envelope_error,
             "range_use": self.range_use,
             "verdict": self.verdict,
@@ -78,8 +78,12 @@ def error_table(errors: Iterable[PredictionError]) -> str:
     width = max(len("prediction"), *(len(row.name) for row in rows))
     lines = [f"{'prediction':{width}}   peak %  frequency %  envelope %  range use  verdict"]
     for row in rows:
+        peak, peak_hz = (
+            "-" if np.isnan(error) else format(100 * error, pattern)
+            for error, pattern in ((row.peak_error, "+.2f"), (row.peak_frequency_error, "+.3f"))
+        )
         lines.append(
-            f"{row.name:{width}}  {100 * row.peak_error:+7.2f}  {100 * row.peak_frequency_error:+11.3f}  "
+            f"{row.name:{width}}  {peak:>7}  {peak_hz:>11}  "
             f"{100 * row.envelope_error:10.2f}  {row.range_use:9.2f}  {row.verdict}"
         )
     return "\n".join(lines)
@@ -156,7 +160,10 @@ def compare(
     notes = list(prediction.notes)
     top, top_hz = peak_of(measured, reference.frequency_hz)
     main = prediction.branch == 0
-    if over == "frequency" and top_hz in (reference.frequency_hz.min(), reference.frequency_hz.max()):
+    if not prediction.peak_reached(channel, order=order):
+        peak = peak_hz = float("nan")
+        notes.append("the prediction is largest where it was cut off: it has no peak to compare")
+    elif over == "frequency" and top_hz in (reference.frequency_hz.min(), reference.frequency_hz.max()):
         where = int(np.argmax(np.where(used, predicted, -np.inf)))
         peak, peak_hz = float(predicted[where]), float(reference.frequency_hz[where])
         notes.append("the reference is largest at an end of its frequencies: compared is the largest within them")

@@ -55,6 +55,8 @@ class SteadyPrediction:
         float[n_folds], points where the response turns back in frequency; amplitude of the drive point.
     notes
         What a user should know about these numbers, one line each.
+    complete
+        Whether every path reached the far end of the band; else it was cut off, and a note says where and why.
     """
 
     force_n: float
@@ -71,6 +73,7 @@ class SteadyPrediction:
     fold_amplitude_m: Float
     fold_modal_amplitude: Float
     notes: tuple[str, ...] = ()
+    complete: bool = True
 
     @property
     def name(self) -> str:
@@ -101,7 +104,23 @@ class SteadyPrediction:
         return np.asarray(np.degrees(-np.angle(self.motion_m(channel))) % 360.0)
 
     def peak(self, channel: str | None = None) -> Peak:
-        """Largest amplitude on the main branch, by a parabola through the three highest points."""
+        """Largest amplitude on the main branch, by a parabola through the three highest points.
+
+        Of a response that was cut off it is no peak unless `peak_reached`.
+        """
         main = self.branch == 0
         columns = (self.amplitude_m(channel), self.frequency_hz, self.phase_lag_deg(channel), self.modal_amplitude)
         return Peak(*peak_of(*(column[main] for column in columns)))
+
+    def peak_reached(self, channel: str | None = None, *, order: int = 0) -> bool:
+        """Whether the largest amplitude is a peak: not so where a response was cut off on its way up.
+
+        That is where the largest of all branches, of the displacement differentiated ``order`` times, is the last point of
+        one, or not on the main one, of which alone `peak` tells.
+        """
+        if self.complete:
+            return True
+        amplitude = self.amplitude_m(channel) * (2.0 * np.pi * self.frequency_hz) ** order
+        top = int(np.argmax(amplitude))
+        last = top + 1 == amplitude.size or self.branch[top + 1] != self.branch[top]
+        return bool(self.branch[top] == 0 and not last)

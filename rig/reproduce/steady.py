@@ -40,8 +40,8 @@ class Steady:
 
     @property
     def complete(self) -> bool:
-        """Whether the response is one from the lowest frequency to the highest: else its largest amplitude is no peak."""
-        return self.prediction is not None and not np.any(self.prediction.branch)
+        """Whether the response goes from one end of the band to the other: else its largest amplitude may be no peak."""
+        return self.prediction is not None and self.prediction.complete
 
     def row(self) -> dict[str, Any]:
         """Numbers for tables and JSON."""
@@ -60,17 +60,18 @@ class Steady:
                 "peak_m": None,
                 "peak_hz": None,
                 "error": None,
+                "frequency_error": None,
                 "range_use": None,
                 "complete": False,
                 "notes": [self.reason],
             }
-        peak = self.prediction.peak()
+        peak, reached = self.prediction.peak(), self.prediction.peak_reached()
         return {
             **head,
             "peak_m": peak.amplitude_m,
             "peak_hz": peak.frequency_hz,
-            "error": peak.amplitude_m / self.truth.amplitude_m - 1.0,
-            "frequency_error": peak.frequency_hz / self.truth.frequency_hz - 1.0,
+            "error": peak.amplitude_m / self.truth.amplitude_m - 1.0 if reached else None,
+            "frequency_error": peak.frequency_hz / self.truth.frequency_hz - 1.0 if reached else None,
             "range_use": float(np.max(self.prediction.range_use)),
             "complete": self.complete,
             "notes": list(self.prediction.notes),

@@ -125,7 +125,8 @@ def pnlss_response(
         points=every,
         folds=folds[0] if len(folds) == 1 else folds[0].joined(folds[1]),
         branch=np.repeat(np.arange(len(states)), [each.count for each in states]),
-        notes=(*notes_of(model, every, force, exciter), *more, *_at_the_edge(every, low, high)),
+        notes=(*notes_of(model, every, force, exciter), *_at_the_edge(every, low, high), *more),
+        complete=not any(each.note for each in found),
     )
 
 

@@ -26,6 +26,8 @@ class PnlssResponse:
         where the first did not get there.
     notes
         What a user should know about these numbers, one line each.
+    complete
+        Whether every path reached the far end of the band; else a note says where it ended and why.
     """
 
     force_n: float
@@ -34,6 +36,7 @@ class PnlssResponse:
     folds: SteadyStates
     branch: NDArray[np.int64]
     notes: tuple[str, ...]
+    complete: bool = True
 
     @property
     def prediction(self) -> SteadyPrediction:
@@ -54,4 +57,5 @@ class PnlssResponse:
             fold_amplitude_m=np.abs(self.folds.displacement_m[:, 1, 0]),
             fold_modal_amplitude=np.full(folds, np.nan),
             notes=self.notes,
+            complete=self.complete,
         )

@@ -115,6 +115,10 @@ def test_a_path_ends_where_it_was_told_to() -> None:
     stopped = end(stop=lambda z, p: "too far" if p > 0.0 else "")
     assert (stopped.ending, stopped.reason) == ("stopped", "too far")
     assert stopped.parameter[-1] > 0.0 >= stopped.parameter[-2]
+    last = end(highest=0.0, stop=lambda z, p: "at the end" if p == 0.0 else "")
+    assert (last.ending, last.reason, last.parameter[-1]) == ("stopped", "at the end", 0.0)
+    first = end(stop=lambda z, p: "at once")
+    assert (first.ending, first.parameter.tolist()) == ("stopped", [-18.0])
 
 
 def test_a_system_that_has_no_answer_any_more_ends_the_path() -> None:

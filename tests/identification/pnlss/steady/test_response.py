@@ -106,9 +106,54 @@ def test_a_path_that_leaves_the_trained_range_ends_there_and_is_met_from_above()
     ends = [note for note in found.notes if "beyond 3 times those of the training data" in note]
     assert len(ends) == 2
     assert any("extrapolated" in note for note in found.notes)
+    assert not found.complete
+    assert not found.prediction.complete
     farther = pnlss_response(model, FORCE_N, force="pure-sine", largest_range_use=20.0)
     assert set(farther.branch.tolist()) == {0}
     assert np.max(farther.points.range_use) > 3.5
+    assert farther.complete
+    assert farther.prediction.peak_reached()
+
+
+def test_a_peak_where_the_curve_was_cut_off_has_no_error() -> None:
+    whole = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine")
+    cut = pnlss_frequency_response(oscillator(CUBIC, largest_m=5e-4), FORCE_N, force="pure-sine")
+    alone = replace(
+        cut,
+        **{
+            name: getattr(cut, name)[cut.branch == 0]
+            for name in (
+                "frequency_hz",
+                "modal_amplitude",
+                "fundamental_n",
+                "displacement_m",
+                "stable",
+                "branch",
+                "range_use",
+            )
+        },
+    )
+    reference = FrequencyResponse(
+        whole.frequency_hz, np.full(whole.frequency_hz.size, 1j), whole.motion_m(), "displacement", "force", FORCE_N
+    )
+    for found in (cut, alone):
+        assert found.peak().amplitude_m < 0.9 * whole.peak().amplitude_m
+        assert not found.peak_reached()
+        error = compare(found, reference).error
+        assert "the prediction is largest where it was cut off: it has no peak to compare" in error.notes
+        assert (error.row()["peak_error"], error.row()["peak_frequency_error"]) == (None, None)
+        assert error_table([error]).splitlines()[1].split()[4:6] == ["-", "-"]
+    arrays, attributes = Predictions(steady=(cut,), steady_references=(None,), steady_errors=(None,)).to_arrays()
+    assert not Predictions.from_arrays(arrays, attributes).steady[0].complete
+    del attributes["steady"][0]["complete"]  # as files without it have it
+    assert Predictions.from_arrays(arrays, attributes).steady[0].complete
+
+
+def test_a_vibration_beyond_the_range_is_found_nowhere_along_the_way() -> None:
+    model = oscillator(CUBIC)
+    use = pnlss_steady_state(model, FORCE_N, 25.0, force="pure-sine").range_use[0]  # type: ignore[index]
+    with pytest.raises(IdentificationError, match="no periodic vibration was found at 25 Hz"):
+        pnlss_steady_state(model, FORCE_N, 25.0, force="pure-sine", largest_range_use=0.99 * use)
 
 
 def test_a_model_without_a_periodic_vibration_is_reported_in_one_line() -> None:
