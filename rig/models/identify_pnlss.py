@@ -14,6 +14,7 @@ from identification import (
     simulated_run,
 )
 from rig.errors import ConfigurationError, RecordingError
+from rig.models.data_fingerprints import uses_of
 from rig.models.files import load_as
 from rig.models.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.pnlss_data import PnlssData, pnlss_data
@@ -52,7 +53,7 @@ def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Pro
             states=2 if options.states is None else options.states,
             degrees=options.chosen_degrees,
             output_degrees=() if options.output_polynomials is False else None,
-            saturating=options.saturating or 0,
+            saturating=options.saturating_features,
             validation=data.validation,
             settings=settings,
             progress=progress,
@@ -107,4 +108,5 @@ def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPn
         seconds=seconds,
         notes=data.notes,
         data=data.fingerprint,
+        uses=uses_of(data.training, data.validation),
     )

@@ -24,6 +24,8 @@ __all__ = ["Held", "Reference", "compared", "default_held"]
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 _MARGIN = 0.02
 """How far beyond a reference's frequencies a response is followed."""
+_ALIKE = 0.01
+"""Relative difference of amplitudes below which two vibrations are one."""
 _HARMONIC = 0.01
 """Second harmonic of a reference's force, over its fundamental, from which a force without any is said to be another."""
 
@@ -88,6 +90,7 @@ def _point_by_point(
     Tried are the one that rest leads to, and the one next to that of the point before. Points without any are left out.
     """
     states: list[SteadyStates] = []
+    several = 0
     near: SteadyStates | None = None
     for frequency, force, amplitude in zip(
         measured.frequency_hz.tolist(), np.abs(measured.force).tolist(), measured.amplitude_m.tolist(), strict=True
@@ -99,14 +102,16 @@ def _point_by_point(
             except IdentificationError:
                 continue
         if tried:
-            near = min(tried, key=lambda one: abs(abs(complex(one.displacement_m[0, 1, 0])) - amplitude))
+            found = [abs(complex(one.displacement_m[0, 1, 0])) for one in tried]
+            several += max(found) > (1.0 + _ALIKE) * min(found)
+            near = tried[int(np.argmin(np.abs(np.array(found) - amplitude)))]
             states.append(near)
     if not states:
         raise IdentificationError(
             f"reference '{measured.label}': the model has no periodic vibration at any of its points"
         )
-    missing = measured.frequency_hz.size - len(states)
-    notes = (f"at {missing} of {measured.frequency_hz.size} points no vibration was found",) if missing else ()
+    stable = np.concatenate([one.stable for one in states])
+    range_use = np.concatenate([np.asarray(one.range_use) for one in states])
     none = np.zeros(0)
     return SteadyPrediction(
         force_n=float(np.median(np.abs(measured.force))),
@@ -116,11 +121,27 @@ def _point_by_point(
         modal_amplitude=np.full(len(states), np.nan),
         fundamental_n=np.concatenate([np.abs(one.force_n[:, 1]) for one in states]),
         displacement_m=np.concatenate([one.displacement_m[:, 1] for one in states]),
-        stable=np.concatenate([one.stable for one in states]),
+        stable=stable,
         branch=np.zeros(len(states), dtype=np.int64),
-        range_use=np.concatenate([np.asarray(one.range_use) for one in states]),
+        range_use=range_use,
         fold_frequency_hz=none,
         fold_amplitude_m=none,
         fold_modal_amplitude=none,
-        notes=notes,
+        notes=_said(measured.frequency_hz.size, several, stable, range_use),
     )
+
+
+def _said(points: int, several: int, stable: np.ndarray, range_use: np.ndarray) -> tuple[str, ...]:
+    """What to know of vibrations that were taken point by point."""
+    missing, unstable = points - stable.size, int(np.count_nonzero(~stable))
+    notes = [f"at {missing} of {points} points no vibration was found"] if missing else []
+    if several:
+        notes.append(
+            f"at {several} of {points} points several vibrations were found: the one nearest to the measured amplitude was "
+            "taken, which the model does not tell by itself"
+        )
+    if unstable:
+        notes.append(f"{unstable} of {stable.size} vibrations are unstable")
+    if np.nanmax(range_use, initial=0.0) > 1.0:
+        notes.append(f"states reach {np.nanmax(range_use):.2f} times the training data: extrapolated")
+    return tuple(notes)
