@@ -101,7 +101,7 @@ def _shaped(array: Float, name: str, shape: tuple[int, int]) -> Float:
 
 def _powers(data: Any, mapping: PnlssMapping, name: str, variables: int) -> NDArray[np.int64]:
     array = _array(data, mapping, name)
-    if array.size % variables:
+    if array.size and array.shape[-1:] != (variables,):
         raise IdentificationError(f"{name}: shape {array.shape}, needs {variables} columns: states, then inputs")
     powers = np.round(array).astype(np.int64)
     if not np.array_equal(powers, array):

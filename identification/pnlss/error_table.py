@@ -50,7 +50,7 @@ class ErrorCell:
     unbounded_runs: int
     unbounded_models: int
     range_use: float
-    """Largest of the bounded runs."""
+    """Largest known one of the bounded runs; NaN where none is."""
 
     @classmethod
     def of(cls, tests: Iterable[ModelTest]) -> "ErrorCell":
@@ -66,20 +66,30 @@ class ErrorCell:
             runs=len(rows),
             unbounded_runs=len(rows) - len(bounded),
             unbounded_models=len({row.model for row in rows if not row.bounded}),
-            range_use=max((row.range_use for row in bounded), default=float("nan")),
+            range_use=max((row.range_use for row in bounded if np.isfinite(row.range_use)), default=float("nan")),
         )
 
+    @property
+    def extrapolated(self) -> bool:
+        """Whether a bounded run went beyond the range of the training data."""
+        return self.range_use > 1.0
+
     def row(self) -> dict[str, Any]:
-        """The numbers by name, ready for JSON."""
-        return dict(vars(self))
+        """The numbers by name, ready for JSON: None for what there is none of."""
+        return {name: value if np.isfinite(value) else None for name, value in vars(self).items()}
 
     def __str__(self) -> str:
-        """As the paper writes it: mean and, in brackets, deviation; what is unbounded is counted and not called unstable."""
+        """As the paper writes it: mean and, in brackets, deviation; what is unbounded is counted and not called unstable.
+
+        An asterisk says that a bounded run went beyond the range of the training data.
+        """
         if not self.runs:
             return "-"
         text = f"{100 * self.mean:.2f} %"
         if np.isfinite(self.standard_deviation):
             text += f" ({100 * self.standard_deviation:.2f} %)"
+        if self.extrapolated:
+            text += " *"
         if not self.unbounded_runs:
             return text
         counted = f"unbounded {self.unbounded_runs} of {self.runs}"
@@ -187,6 +197,9 @@ class ErrorTable:
         chosen = [self.selected.get(name, "none bounded") for name in self.training_sets]
         lines += ["selected: the smallest same-level error among the bounded"]
         lines += _aligned(["model", *chosen], self._part(self.selected))
+        tests = (SAME_LEVEL, *self.levels)
+        if any(self.cell(name, test).extrapolated for name in self.training_sets for test in tests):
+            lines.append("* beyond the range of the training data: extrapolated")
         return "\n".join([*lines, *(f"not identified: {name}: {why}" for name, why in self.failures.items())])
 
     def _part(self, models: Mapping[str, str]) -> list[list[str]]:

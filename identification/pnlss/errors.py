@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
-from identification.pnlss.fitting.checks import belongs
+from identification.pnlss.fitting.checks import belongs, check_not_zero
 from identification.pnlss.fitting.initial_states import SAMPLES, fitted_initial_state
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import records_of
@@ -18,6 +18,9 @@ from identification.validation import read_only
 __all__ = ["PnlssErrors", "estimated_initial_state", "pnlss_errors"]
 
 Float = NDArray[np.float64]
+
+_ENOUGH = 1e3
+"""Growth of what outputs see of the states, relative to the largest before, that ends the search for their sizes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,12 +81,8 @@ def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, sample
     for index, experiment in enumerate(experiments):
         what = f"experiments[{index}]{f' ({experiment.name})' if experiment.name else ''}"
         belongs(model, experiment, what)
+        check_not_zero(experiment, what)
         scale = np.max(np.abs(experiment.counted_outputs), axis=1)
-        if not np.all(scale > 0.0):
-            dead = experiment.output_channels[int(np.argmin(scale))].name
-            raise IdentificationError(
-                f"{what}: output '{dead}' is zero where it counts, and errors relative to it have no meaning"
-            )
         begin = None
         if experiment.initial_state == "estimated":
             begin = estimated_initial_state(model, experiment, samples=samples)
@@ -109,20 +108,43 @@ def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, sample
 def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, samples: int = SAMPLES) -> Float:
     """float[n_states] before the first sample, by least squares on the first ``samples`` that count, each output over its RMS.
 
+    What outputs do not tell of stays near zero, in states of which each alone moves the outputs alike: whatever the units of
+    the states are, and whether or not their range is known.
+
     Raises `IdentificationError` on other channels, another sample rate, too few samples.
     """
     belongs(model, experiment, f"experiment{f' ({experiment.name})' if experiment.name else ''}")
     if not samples * len(model.outputs) >= model.states:
         raise IdentificationError(f"samples: is {samples}, too few for {model.states} states")
     part = replace(experiment, period_samples=0)
-    inputs, outputs = (np.sqrt(np.mean(values**2, axis=1)) for values in (part.inputs, part.counted_outputs))
-    states = np.where(np.isfinite(model.state_range) & (model.state_range > 0.0), model.state_range, np.nan)
-    if np.any(np.isnan(states)):
-        run = model.simulate(part.inputs)
-        states = np.sqrt(np.mean(run.states**2, axis=1)) if run.bounded else np.ones(model.states)
-    inputs, outputs, states = (np.where(values > 0.0, values, 1.0) for values in (inputs, outputs, states))
+    inputs, outputs = (
+        np.where(rms > 0.0, rms, 1.0)
+        for rms in (np.sqrt(np.mean(values**2, axis=1)) for values in (part.inputs, part.counted_outputs))
+    )
+    states = _seen_alike(model, outputs, samples)
     scaled = model.scaled(states=states, inputs=inputs, outputs=outputs)
     parameters = Parameters(scaled)
     system = parameters.system(parameters.vector(scaled, np.zeros((0, model.states))))
     (record,) = records_of([part], inputs, outputs)
     return states * fitted_initial_state(system, record, np.ones(len(outputs)), samples)
+
+
+def _seen_alike(model: PnlssModel, outputs: Float, samples: int) -> Float:
+    """float[n_states]: sizes at which each state alone, near rest, makes an output reach its own size within so many samples.
+
+    Of a state that outputs do not see its range; where that is unknown, the smallest size of the others.
+    """
+    rest = np.zeros((model.states + len(model.inputs), 1))
+    by_state, by_output = (
+        coefficients @ features.derivatives(rest)[:, : model.states, 0]
+        for coefficients, features in ((model.e, model.state_features), (model.f, model.output_features))
+    )
+    row, seen = (model.c + by_output) / outputs[:, None], np.zeros(model.states)
+    for _ in range(samples):
+        seen = np.fmax(seen, np.max(np.abs(row), axis=0))
+        row = row @ (model.a + by_state)
+        if not np.max(np.abs(row)) < _ENOUGH * np.max(seen, initial=1e-300):
+            break  # unstable at rest: what a state does later is the growth's, not its own
+    known = np.isfinite(model.state_range) & (model.state_range > 0.0)
+    unseen = np.where(known, model.state_range, 1.0 / np.max(seen, initial=1e-300) if np.any(seen) else 1.0)
+    return np.divide(1.0, seen, out=unseen, where=seen > 0.0)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
-from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
 from identification.pnlss.fitting.checks import check_enough, check_signals
@@ -152,14 +151,37 @@ def _saturating(saturating: int | tuple[int, int], outputs: Sequence[Channel]) -
 
 
 def _with_scores(found: PnlssFit, begin: PnlssModel, experiments: Sequence[Experiment]) -> PnlssFit:
-    """The fit with notes on its errors and with its linear start."""
-    error = float(np.max(pnlss_errors(begin, experiments).overall))
-    note = f"linear model: error {100 * error:.2g} % over time, in the worst training experiment"
+    """The fit with notes on its errors, over all training data alike, and with its linear start.
+
+    Nothing that goes wrong here may lose the fit.
+    """
+    notes = []
+    try:
+        error = fit_pnlss(begin, experiments, settings=replace(found.settings, iterations=0)).training_error
+        notes.append(f"linear model: training error {100 * error:.2g} %")
+    except KeyboardInterrupt:
+        found = interrupted(found)
+    except IdentificationError as why:
+        notes.append(f"linear model: no training error ({why})")
     score = f"nonlinear model: training error {100 * found.training_error:.2g} %"
     if not np.isnan(found.validation_error):
         score += f", validation error {100 * found.validation_error:.2g} %"
     score += f", iteration {found.chosen} of {found.history.iterations} ({found.stopped})"
-    return replace(found, model=replace(found.model, notes=(*found.model.notes, note, score)), linear=begin)
+    notes += [score, *_unstable(found.model)]
+    return replace(found, model=replace(found.model, notes=(*found.model.notes, *notes)), linear=begin)
+
+
+def _unstable(model: PnlssModel) -> list[str]:
+    """A note where the linear part alone is unstable: a record that holds such a model may be followed by one that does not."""
+    poles = np.linalg.eigvals(model.a)
+    worst = complex(poles[int(np.argmax(np.abs(poles)))])
+    if abs(worst) < 1.0:
+        return []
+    hz = abs(np.angle(worst)) * model.sample_rate_hz / (2.0 * np.pi)
+    return [
+        f"the linear part is unstable: at {hz:.4g} Hz small vibrations grow at a rate of "
+        f"{np.log(abs(worst)) * model.sample_rate_hz:.3g} 1/s, and long runs such as sweeps may leave all bounds"
+    ]
 
 
 def _chosen(variables: Variables, states: int, varying: Sequence[int]) -> list[int]:

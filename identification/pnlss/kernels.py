@@ -167,8 +167,8 @@ def simulate(
 ) -> int:
     """Simulate from ``x0`` under ``u`` (float[n, n_inputs]); write ``x`` (float[n, n_states]) and ``y`` (float[n, n_outputs]).
 
-    Returns n, or the first sample at which a state is beyond its ``bound`` (float[n_states]) or not a number: from there on
-    nothing is written. The state after the last sample is in ``work.x``.
+    Returns n, or the first sample at which a state is beyond its ``bound`` (float[n_states]) or not a number, or an output is
+    not finite: what is written from there on means nothing. The state after the last sample is in ``work.x``.
     """
     n, count = m.a.shape[0], u.shape[0]
     for i in range(n):
@@ -183,6 +183,9 @@ def simulate(
             work.v[n + j] = u[k, j]
         feature_values(output_table, work.v, work.chi)
         outputs_at(m, work.chi, work.v, y[k])
+        for i in range(m.c.shape[0]):
+            if not np.isfinite(y[k, i]):
+                return int(k)
         feature_values(state_table, work.v, work.phi)
         state_after(m, work.phi, work.v, work.x)
     return int(count)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
+from identification.pnlss.experiment_groups import same_data
 
 __all__ = ["MIXED", "ModelJob", "realisation_combinations"]
 
@@ -38,8 +39,8 @@ class ModelJob:
     left_out: tuple[Experiment, ...]
 
     def seen(self, experiment: Experiment) -> bool:
-        """Whether the identification knows this very experiment, be it to fit or to choose."""
-        return any(experiment is own for own in (*self.training, *self.validation))
+        """Whether the identification knows the samples of this experiment, be it to fit or to choose."""
+        return any(same_data(experiment, own) for own in (*self.training, *self.validation))
 
 
 def realisation_combinations(

@@ -37,16 +37,18 @@ def random_start(
     counts: tuple[int, int],
     random: np.random.Generator,
 ) -> PnlssModel:
-    """The linear model with the monomials of ``phi`` and ``chi`` and so many saturating features in each equation.
+    """The linear model with the features of ``phi`` and ``chi`` and so many saturating ones more in each equation.
 
-    Weights and biases are normal, of deviation one for variables of RMS one. Coefficients of monomials are zero.
+    Weights and biases are normal, of deviation one for variables of RMS one. Coefficients of the features given are zero.
     """
     states = np.hstack([linear.simulate(e.inputs).states[:, e.counted_from :] for e in experiments])
     inputs, outputs = (np.hstack([getattr(e, name) for e in experiments]) for name in ("inputs", "counted_outputs"))
     size_x, size_u, size_y = (np.sqrt(np.mean(values**2, axis=1)) for values in (states, inputs, outputs))
     size = np.concatenate([size_x, size_u, [1.0]])
     weights = [random.normal(size=(count, size.size)) / size for count in counts]
-    start = linear.with_features(replace(phi, weights=weights[0]), replace(chi, weights=weights[1]))
+    start = linear.with_features(
+        *(replace(own, weights=np.vstack([own.weights, more])) for own, more in zip((phi, chi), weights, strict=True))
+    )
     e, f = np.array(start.e), np.array(start.f)
     e[:, phi.count :] = _COEFFICIENT * size_x[:, None] * random.normal(size=(len(e), counts[0]))
     f[:, chi.count :] = _COEFFICIENT * size_y[:, None] * random.normal(size=(len(f), counts[1]))

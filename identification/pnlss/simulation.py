@@ -13,7 +13,7 @@ from identification.validation import finite_array
 if TYPE_CHECKING:
     from identification.pnlss.model import PnlssModel
 
-__all__ = ["Simulation", "simulated_run"]
+__all__ = ["Simulation", "simulated_run", "use_of"]
 
 Float = NDArray[np.float64]
 
@@ -30,9 +30,9 @@ class Simulation:
         float[n_states, n], those before each sample's input acts; NaN from ``unbounded_at`` on.
     state_use, input_use
         float[n_states], float[n_inputs]: largest magnitude over the largest in the training data; NaN where that is
-        unknown. Beyond one a model extrapolates, and polynomials do that badly.
+        unknown, or zero: of what never moved nothing is known. Beyond one a model extrapolates, and polynomials do that badly.
     unbounded_at
-        First sample at which the states left all bounds; None if they never did.
+        First sample at which states or outputs left all bounds; None if they never did.
     """
 
     outputs: Float
@@ -55,6 +55,12 @@ class Simulation:
         return float(np.nanmax(both)) if np.any(np.isfinite(both)) else float(np.nan)
 
 
+def use_of(largest: Float, trained: Float) -> Float:
+    """Largest magnitudes over those in the training data; NaN where these are unknown or zero."""
+    known = np.isfinite(trained) & (trained > 0.0)
+    return np.asarray(np.divide(largest, trained, out=np.full(largest.shape, np.nan), where=known))
+
+
 def simulated_run(model: "PnlssModel", inputs: ArrayLike, initial_state: ArrayLike | None) -> Simulation:
     """What a model makes of inputs; see `PnlssModel.simulate`."""
     u = finite_array("inputs", inputs, np.float64, 2)
@@ -68,13 +74,10 @@ def simulated_run(model: "PnlssModel", inputs: ArrayLike, initial_state: ArrayLi
     m, tables = model.matrices, (model.state_features.table, model.output_features.table)
     count = simulate(m, *tables, np.ascontiguousarray(u.T), x0, model.bound, workspace(m), x, y)
     x[count:], y[count:] = np.nan, np.nan
-    with np.errstate(divide="ignore", invalid="ignore"):  # of what never moved in training
-        state_use = np.max(np.abs(x[:count]), axis=0, initial=0.0) / model.state_range
-        input_use = np.max(np.abs(u), axis=1, initial=0.0) / model.input_range
     return Simulation(
         outputs=y.T,
         states=x.T,
-        state_use=state_use,
-        input_use=input_use,
+        state_use=use_of(np.max(np.abs(x[:count]), axis=0, initial=0.0), model.state_range),
+        input_use=use_of(np.max(np.abs(u), axis=1, initial=0.0), model.input_range),
         unbounded_at=None if count == u.shape[1] else int(count),
     )

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from identification.pnlss.errors import estimated_initial_state
 from identification.pnlss.experiment import Experiment
-from identification.pnlss.fitting.initial_states import fitted_initial_state
-from identification.pnlss.fitting.layout import System
-from identification.pnlss.fitting.records import records_of
+from identification.pnlss.fitting.checks import check_not_zero
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulation import Simulation
 from identification.validation import read_only
@@ -37,7 +36,8 @@ class SimulatedRun:
         Largest state or input over the largest in the training data; beyond 1 the model extrapolates. inf for an
         unbounded run, NaN where the range is unknown.
     unbounded_at_s
-        When the states left all bounds; None if they never did.
+        When the run left all bounds, after the first sample of the record, of which the first may not count; None if it
+        never did.
     use
         What the experiment was to the model: ``training``, ``validation`` or ``test``.
     """
@@ -64,14 +64,14 @@ class SimulatedRun:
         return self.unbounded_at_s is None
 
     def row(self) -> dict[str, object]:
-        """The numbers by name, ready for JSON."""
-        errors = {name: float(value) for name, value in zip(self.outputs, self.error, strict=True)}
+        """The numbers by name, ready for JSON: None for what is not known or not finite."""
+        errors = {name: _finite(value) for name, value in zip(self.outputs, self.error, strict=True)}
         return {
             "name": self.name,
             "use": self.use,
-            "level": self.level,
+            "level": _finite(self.level),
             "errors": errors,
-            "range_use": self.range_use,
+            "range_use": _finite(self.range_use),
             "unbounded": not self.bounded,
             "unbounded_at_s": self.unbounded_at_s,
         }
@@ -117,12 +117,14 @@ def simulated_run(
 ) -> SimulatedRun:
     """Simulate an experiment from rest, or from ``initial_state``; it is estimated where the experiment asks for it.
 
-    Raises `IdentificationError` where the channels or rates of the two differ.
+    Raises `IdentificationError` where the channels or rates of the two differ, and where an output is zero where it counts.
     """
+    check_channels(model, experiment)
+    check_not_zero(experiment, f"experiment '{experiment.name}'")
     run = _simulated(model, experiment, initial_state)
     measured = experiment.counted_outputs
     size = np.linalg.norm(measured, axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         error = np.linalg.norm(run.outputs[:, experiment.counted_from :] - measured, axis=1) / size
     at = run.unbounded_at
     return SimulatedRun(
@@ -131,7 +133,7 @@ def simulated_run(
         outputs=tuple(channel.name for channel in experiment.output_channels),
         error=error if at is None else np.full(error.size, np.inf),
         range_use=run.range_use,
-        unbounded_at_s=None if at is None else (at - experiment.counted_from) / experiment.sample_rate_hz,
+        unbounded_at_s=None if at is None else at / experiment.sample_rate_hz,
         use=use,
     )
 
@@ -166,24 +168,8 @@ def error_spectra(model: PnlssModel, linear: PnlssModel | None, experiment: Expe
     )
 
 
-def estimated_initial_state(model: PnlssModel, experiment: Experiment) -> Float:
-    """float[n_states] from which the model's first counted outputs are nearest to the measured ones (least squares)."""
-    size = np.sqrt(np.mean(experiment.outputs**2, axis=1))
-    scaled = model.scaled(
-        states=_or_ones(model.state_range), inputs=_or_ones(model.input_range), outputs=_or_ones(size)
-    )
-    system = System(
-        np.hstack([scaled.a, scaled.b, scaled.e]),
-        np.hstack([scaled.c, scaled.d, scaled.f]),
-        scaled.state_features.table,
-        scaled.output_features.table,
-    )
-    record = records_of([experiment], _or_ones(model.input_range), _or_ones(size))[0]
-    return fitted_initial_state(system, record, np.ones(len(size))) * _or_ones(model.state_range)
-
-
-def _or_ones(values: Float) -> Float:
-    return np.where(np.isfinite(values) & (values > 0.0), values, 1.0)
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _simulated(model: PnlssModel, experiment: Experiment, initial_state: Float | None) -> Simulation:

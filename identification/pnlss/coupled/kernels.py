@@ -47,7 +47,7 @@ def simulate_coupled(
     Writes ``force`` (float[n]), ``x`` (float[n, n_states]) and ``y`` (float[n, n_outputs]); ``xi`` and ``after`` (float[n_xi])
     are room. At each sample the force solves a scalar equation, for the output answers to it at once: by the secant method,
     whose first step is exact where the features have no force in them. Returns n, or the first sample at which a state is
-    beyond its ``bound`` or no force was found; from there on nothing is written.
+    beyond its ``bound``, an output is not finite or no force was found; what is written from there on means nothing.
     """
     n, count, reacting = m.a.shape[0], given.size, xi.size
     largest = 0.0
@@ -84,6 +84,8 @@ def simulate_coupled(
                 break
             at, short = new, left
             new -= left / slope
+        for i in range(y.shape[1]):
+            found = found and bool(np.isfinite(y[k, i]))
         if not found:
             return int(k)
         force[k] = new

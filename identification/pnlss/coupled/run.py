@@ -19,7 +19,7 @@ from identification.pnlss.coupled.kernels import simulate_coupled
 from identification.pnlss.coupled.reaction import Reaction, chosen_filter
 from identification.pnlss.kernels import workspace
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.simulation import Simulation
+from identification.pnlss.simulation import Simulation, use_of
 from identification.pnlss.steady.excitation import linear_resonance_hz
 from identification.prediction.exciter import Exciter
 from identification.validation import finite_array, positive
@@ -69,7 +69,7 @@ def pnlss_coupled_run(
     Parameters
     ----------
     model
-        With one force among its inputs, of which others are zero, and the drive point's motion among its outputs.
+        With one force as its only input, and the drive point's motion among its outputs.
     exciter
         That of this very rig. No static force is made, as in harmonic balance (`pnlss_response`).
     voltage_v
@@ -88,6 +88,12 @@ def pnlss_coupled_run(
     if len(forces) != 1:
         raise IdentificationError(
             f"model: has {len(forces)} forces among its inputs, needs one, which the exciter makes"
+        )
+    others = [channel.name for row, channel in enumerate(model.inputs) if row != forces[0]]
+    if others:
+        raise IdentificationError(
+            f"model: has inputs beside its force ({', '.join(others)}), whose values a run with an exciter does not know; "
+            "needs a model of the force alone"
         )
     output = find_role(model.outputs, "drive")
     low = _lowest(model) if lowest_hz is None else positive("lowest_hz", lowest_hz, "Hz")
@@ -153,9 +159,6 @@ class _Run:
         x[reached:], y[reached:], force[reached:] = np.nan, np.nan, np.nan
         inputs = np.zeros(len(model.inputs))
         inputs[self._row] = np.max(np.abs(force[:reached]), initial=0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):  # of what never moved in training
-            state_use = np.max(np.abs(x[:reached]), axis=0, initial=0.0) / model.state_range
-            input_use = inputs / model.input_range
         notes = []
         if reached < n and passes > 1:
             notes.append(f"left all bounds in pass {passes} over the run, and in none before")
@@ -168,8 +171,8 @@ class _Run:
         return CoupledRun(
             outputs=y.T,
             states=x.T,
-            state_use=state_use,
-            input_use=input_use,
+            state_use=use_of(np.max(np.abs(x[:reached]), axis=0, initial=0.0), model.state_range),
+            input_use=use_of(inputs, model.input_range),
             unbounded_at=None if reached == n else reached,
             force_n=force,
             passes=passes,

@@ -6,12 +6,12 @@ import numpy as np
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
-from identification.pnlss.experiment_groups import same_channels
+from identification.pnlss.experiment_groups import same_channels, same_data
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.periods import check_periodic
 
-__all__ = ["belongs", "check_data", "check_enough", "check_resumed", "check_signals"]
+__all__ = ["belongs", "check_data", "check_enough", "check_not_zero", "check_resumed", "check_signals"]
 
 
 def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
@@ -72,6 +72,7 @@ def check_data(
             belongs(start, experiment, what)
             if by_frequency and experiment.period_samples:
                 check_periodic(experiment, what)
+    _check_validation(experiments, validation)
     check_enough(experiments, parameters)
     inputs = np.concatenate([e.inputs for e in experiments], axis=1)
     unit = inputs / np.max(np.abs(inputs), axis=1, keepdims=True)
@@ -84,7 +85,30 @@ def check_data(
         )
 
 
-def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int) -> None:
+def _check_validation(experiments: Sequence[Experiment], validation: Sequence[Experiment]) -> None:
+    """Refuse validation data that is trained on too, or has nothing in an output."""
+    for index, one in enumerate(validation):
+        twin = next((k for k, other in enumerate(experiments) if same_data(one, other)), None)
+        if twin is not None:
+            name = f" ({one.name})" if one.name else ""
+            raise IdentificationError(
+                f"validation[{index}]{name}: has the samples of experiments[{twin}]; validate on data that is not trained on"
+            )
+    for row, channel in enumerate(validation[0].output_channels if validation else ()):
+        if not any(np.any(one.counted_outputs[row]) for one in validation):
+            raise IdentificationError(f"output '{channel.name}': is zero throughout the validation data; leave it out")
+
+
+def check_not_zero(experiment: Experiment, what: str) -> None:
+    """Raise `IdentificationError` where an output is zero where it counts: no error is relative to that."""
+    for channel, values in zip(experiment.output_channels, experiment.counted_outputs, strict=True):
+        if not np.any(values):
+            raise IdentificationError(
+                f"{what}: output '{channel.name}' is zero where it counts, and errors relative to it have no meaning"
+            )
+
+
+def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int, validated: bool) -> None:
     """Raise `IdentificationError` unless a fit of just this structure can go on from ``resume``."""
     for name in ("a", "b", "c", "e", "f"):
         mine, theirs = getattr(start, name).shape, getattr(resume.last, name).shape
@@ -102,3 +126,7 @@ def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int) -> None:
             f"resume: has {len(resume.last_initial_states)} estimated initial states, the experiments {estimated}; "
             "give the same experiments"
         )
+    before = not bool(np.all(np.isnan(resume.history.validation_error)))
+    if before != validated:
+        had, has = ("validation data" if there else "no validation data" for there in (before, validated))
+        raise IdentificationError(f"resume: was fitted with {had}, now there is {has}; give the same validation")

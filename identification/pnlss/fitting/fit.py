@@ -74,7 +74,7 @@ def fit_pnlss(
     check_data(start, experiments, validation, parameters.count, settings.by_frequency)
     check_memory(parameters, [*experiments, *validation], settings.by_frequency)
     if resume is not None:
-        check_resumed(start, resume, estimated)
+        check_resumed(start, resume, estimated, bool(validation))
     scales = scales_of(experiments, _state_scale(start, experiments) if resume is None else resume.state_scale)
     parameters = Parameters(scales.model(start if resume is None else resume.last), estimated)
     problem = Problem(parameters, scales, experiments, validation, settings)

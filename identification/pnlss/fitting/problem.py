@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.frequency_lines import with_lines
 from identification.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
@@ -82,6 +83,8 @@ class Problem:
         self._held = np.zeros(parameters.count)
         self._held[parameters.ends[2] : parameters.ends[3]] = PRIOR / self._total
         self._validation_total = self._measured(self.validation)
+        if self.validation and not self._validation_total > 0.0:
+            raise IdentificationError("validation: its outputs are zero at all frequencies that count")
 
     @property
     def every(self) -> int:

@@ -50,7 +50,8 @@ class FitHistory:
     def best(self) -> int:
         """Iteration with the smallest validation error, or training error where there are no validation data."""
         validated = not bool(np.all(np.isnan(self.validation_error)))
-        return int(np.argmin(self.validation_error if validated else self.training_error))
+        errors = self.validation_error if validated else self.training_error
+        return int(np.argmin(np.where(np.isnan(errors), np.inf, errors)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -58,10 +58,16 @@ def _bends(features: Features) -> bool:
 
 
 class Balance:
-    """Equations of a driven model; unknowns are the states' coefficients float[size, n_states] in a row, then the drive's."""
+    """Equations of a driven model; unknowns are the states' coefficients float[size, n_states] in a row, then the drive's.
 
-    def __init__(self, model: PnlssModel, drive: Drive, basis: Basis) -> None:
+    ``held`` (float[n_inputs]) are constants that inputs have beside what drives, whatever its level.
+    """
+
+    def __init__(self, model: PnlssModel, drive: Drive, basis: Basis, held: Float | None = None) -> None:
         self.model, self.drive, self.basis = model, drive, basis
+        self._held = np.zeros((basis.size, len(model.inputs)))
+        if held is not None:
+            self._held[0] = held
         self._matrices = model.matrices
         self._tables = (model.state_features.table, model.output_features.table)
         self._given, self._by_own = drive.inputs(basis.size)
@@ -89,7 +95,7 @@ class Balance:
     def period(self, z: Float, level: float = 1.0) -> Period:
         """The model along the period that the unknowns describe."""
         size = self.basis.size
-        inputs = level * self._given + self._by_own @ self.own(z)
+        inputs = self._held + level * self._given + self._by_own @ self.own(z)
         v = self.basis.to_time @ np.concatenate([self.states(z), inputs], axis=1)
         x, y, x_slope, y_slope = self._samples
         along_period(self._matrices, *self._tables, v, *self._room, x, y, x_slope, y_slope)
@@ -144,8 +150,8 @@ class Balance:
 
         return system
 
-    def linear(self, frequency_hz: float) -> Float:
-        """Unknowns at level 1 of the model without its features."""
+    def linear(self, frequency_hz: float, level: float = 1.0) -> Float:
+        """Unknowns at a level of the model without its features."""
         model, z = self.model, np.zeros(self.state_unknowns)
         point = np.array([np.exp(1j * self.angle(frequency_hz))])
         row = self._driven_row()
@@ -155,8 +161,10 @@ class Balance:
         amplitude = complex(inputs[1, row], -inputs[2, row])
         gain = np.linalg.solve(point[0] * np.eye(model.states) - model.a, model.b[:, row])
         states = z.reshape(self.basis.size, -1)
-        states[1], states[2] = (gain * amplitude).real, -(gain * amplitude).imag
-        return np.concatenate([z, own])
+        states[1], states[2] = level * (gain * amplitude).real, -level * (gain * amplitude).imag
+        if np.any(self._held):
+            states[0] = np.linalg.lstsq(np.eye(model.states) - model.a, model.b @ self._held[0])[0]
+        return np.concatenate([z, level * own])
 
     def _driven_row(self) -> int:
         used = np.any(self._given != 0.0, axis=0) | np.any(self._by_own != 0.0, axis=(0, 2))

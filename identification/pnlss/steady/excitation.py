@@ -1,8 +1,10 @@
 """Which drive a model and what is asked for amount to, and where its resonance is."""
 
+from collections.abc import Mapping
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
@@ -13,7 +15,7 @@ from identification.pnlss.steady.states import motion_rows
 from identification.prediction.exciter import Exciter
 from identification.validation import positive
 
-__all__ = ["Held", "drive_of", "linear_resonance_hz"]
+__all__ = ["Held", "drive_of", "held_values", "linear_resonance_hz"]
 
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 
@@ -21,45 +23,76 @@ _LIGHT = 0.3
 """Damping ratio up to which a pole makes a resonance."""
 
 
-def drive_of(model: PnlssModel, level: float, held: Held, exciter: Exciter | None, coefficients: int) -> Drive:
-    """The drive; raises `IdentificationError` where model, exciter and what is to be held do not go together."""
+def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> tuple[int, NDArray[np.float64]]:
+    """The row of the input that is driven, and float[n_inputs], the constants that all others have.
+
+    Driven is the one force, or the one input that is not held. Raises `IdentificationError` where there is none such, or an
+    input beside it has no value.
+    """
+    given = dict(held_inputs or {})
+    names = [channel.name for channel in model.inputs]
+    for name, value in given.items():
+        if name not in names:
+            raise IdentificationError(
+                f"held_inputs: the model has no input '{name}', its inputs are {', '.join(names)}"
+            )
+        if model.inputs[names.index(name)].role == "force":
+            raise IdentificationError(f"held_inputs: '{name}' is the force, which drives; hold the other inputs")
+        if not np.isfinite(value):
+            raise IdentificationError(f"held_inputs: '{name}' is {value:g}, needs a finite value")
+    forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"]
+    free = [row for row, name in enumerate(names) if name not in given]
+    if len(forces) > 1 or (not forces and len(free) != 1):
+        raise IdentificationError(
+            f"model: has {len(names)} inputs, {len(forces)} of them forces and {len(given)} held constant; needs one force, or "
+            "a voltage alone (held_inputs holds others)"
+        )
+    row = forces[0] if forces else free[0]
+    missing = [names[other] for other in free if other != row]
+    if missing:
+        raise IdentificationError(
+            f"held_inputs: has no value for {', '.join(missing)}, which the model has beside {names[row]}; give each its "
+            "constant value"
+        )
+    return row, np.array([float(given.get(name, 0.0)) for name in names])
+
+
+def drive_of(
+    model: PnlssModel, level: float, held: Held, exciter: Exciter | None, coefficients: int, row: int
+) -> Drive:
+    """The drive at input ``row``; raises `IdentificationError` where model, exciter and what is held do not go together."""
     if held not in get_args(Held):
         raise IdentificationError(f"force: is '{held}', allowed are {', '.join(get_args(Held))}")
     amplitude = positive("force_n", level, "V" if held == "voltage" else "N")
     m = len(model.inputs)
-    forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"]
-    if len(forces) > 1 or (not forces and m != 1):
-        raise IdentificationError(
-            f"model: has {m} inputs, {len(forces)} of them forces; needs one force, or a voltage alone"
-        )
-    if not forces:
-        return _voltage_driven(model, amplitude, held, exciter)
+    if model.inputs[row].role != "force":
+        return _voltage_driven(model, amplitude, held, exciter, row)
     if exciter is None:
         if held != "pure-sine":
             raise IdentificationError(
                 f"force: '{held}' of a model driven by a force needs an exciter, which makes the force's harmonics; "
                 "without one 'pure-sine' is predicted"
             )
-        return Sine(amplitude, forces[0], m)
+        return Sine(amplitude, row, m)
     if held == "pure-sine":
         raise IdentificationError("exciter: makes harmonics of the force; leave it out for 'pure-sine'")
     drive = find_role(model.outputs, "drive")
     order = MOTION_ORDER[model.outputs[drive].motion]
-    return Coupled(exciter, amplitude, held, drive, order, forces[0], m, coefficients)
+    return Coupled(exciter, amplitude, held, drive, order, row, m, coefficients)
 
 
-def _voltage_driven(model: PnlssModel, amplitude: float, held: Held, exciter: Exciter | None) -> Drive:
+def _voltage_driven(model: PnlssModel, amplitude: float, held: Held, exciter: Exciter | None, row: int) -> Drive:
     if exciter is not None:
         raise IdentificationError("exciter: is inside a model that is driven by a voltage; leave it out")
     force = find_role(model.outputs, "force")
     if held == "voltage":
-        return Sine(amplitude, 0, 1, is_voltage=True)
+        return Sine(amplitude, row, len(model.inputs), is_voltage=True)
     if held == "pure-sine":
         raise IdentificationError(
             "force: 'pure-sine' is not what a sine of voltage makes; a model driven by a voltage answers 'fundamental', "
             "'rms' or 'voltage'"
         )
-    return HeldOutput(amplitude, held, force, 0, 1)
+    return HeldOutput(amplitude, held, force, row, len(model.inputs))
 
 
 def linear_resonance_hz(model: PnlssModel) -> float:
@@ -80,6 +113,7 @@ def linear_resonance_hz(model: PnlssModel) -> float:
     s = s[inside] if inside.any() else s
     output = motion_rows(model.outputs)[0]
     order = MOTION_ORDER[model.outputs[output].motion]
-    response = model.linear_part.response(np.exp(1j * s.imag / model.sample_rate_hz))[:, output, :]
+    forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"] or slice(None)
+    response = model.linear_part.response(np.exp(1j * s.imag / model.sample_rate_hz))[:, output, forces]
     size = np.linalg.norm(response, axis=1) / np.abs(s) ** order
     return float(np.abs(s[int(np.argmax(size))]) / (2.0 * np.pi))

@@ -1,5 +1,7 @@
 """What a user should know about a predicted response, one line each."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from identification.channels import MOTION_ORDER
@@ -10,14 +12,21 @@ from identification.prediction.exciter import Exciter
 __all__ = ["notes_of"]
 
 
-def notes_of(model: PnlssModel, points: SteadyStates, force: str, exciter: Exciter | None) -> tuple[str, ...]:
+def notes_of(
+    model: PnlssModel,
+    points: SteadyStates,
+    force: str,
+    exciter: Exciter | None,
+    held_inputs: Mapping[str, float] | None = None,
+) -> tuple[str, ...]:
     """What was held, harmonics at the peak, use of the trained range, losses of stability other than folds."""
-    return (*_held(model, force, exciter), *_harmonics(points), *_range(points), *_losses(points))
+    constant = [f"input '{name}' is held at {value:g}" for name, value in (held_inputs or {}).items()]
+    return (*_held(model, force, exciter), *constant, *_harmonics(points), *_range(points), *_losses(points))
 
 
 def _held(model: PnlssModel, force: str, exciter: Exciter | None) -> list[str]:
     where = f" of the exciter{f' ({exciter.source})' if exciter.source else ''}" if exciter else " at the model's input"
-    voltage_driven = exciter is None and model.inputs[0].role != "force"
+    voltage_driven = exciter is None and not any(channel.role == "force" for channel in model.inputs)
     maker = "the exciter inside the model" if voltage_driven else "the exciter"
     return {
         "pure-sine": ["held: a force without harmonics"],

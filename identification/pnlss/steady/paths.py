@@ -9,6 +9,7 @@ from identification.continuation.follow import continued
 from identification.continuation.newton import solved
 from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
+from identification.pnlss.simulation import use_of
 from identification.pnlss.steady.balance import Balance
 
 __all__ = ["Followed", "followed", "from_rest", "polished", "sizes", "statically_stable"]
@@ -43,11 +44,11 @@ def sizes(balance: Balance, frequency_hz: float) -> Float:
 
 def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf) -> Float | None:
     """Unknowns of the vibration that is reached from rest as the level rises; None where the path does not get there."""
-    linear, scale = balance.linear(frequency_hz), sizes(balance, frequency_hz)
+    linear, scale = balance.linear(frequency_hz, _FIRST_LEVEL), sizes(balance, frequency_hz)
     try:
         path = continued(
             balance.over_level(frequency_hz),
-            _FIRST_LEVEL * linear,
+            linear,
             _FIRST_LEVEL,
             scale=scale,
             parameter_scale=0.5,
@@ -64,7 +65,7 @@ def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf
 
 def statically_stable(balance: Balance, z: Float, frequency_hz: float) -> bool:
     """Whether a slow change can hold a solution: the determinant of its Jacobian has the sign that it has at rest."""
-    rest = _FIRST_LEVEL**2 * balance.linear(frequency_hz)
+    rest = balance.linear(frequency_hz, _FIRST_LEVEL**2)
     signs = [
         np.linalg.slogdet(balance.evaluated(at, frequency_hz, level)[1])[0]
         for at, level in ((z, 1.0), (rest, _FIRST_LEVEL**2))
@@ -103,8 +104,7 @@ def polished(balance: Balance, z: Float, frequency_hz: float) -> Float | None:
 
 def _beyond(balance: Balance, z: Float, largest_use: float) -> str:
     """What to say of states that are far outside of the training data; empty where they are not."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        use = np.max(np.abs(balance.basis.to_time @ balance.states(z)), axis=0) / balance.model.state_range
+    use = use_of(np.max(np.abs(balance.basis.to_time @ balance.states(z)), axis=0), balance.model.state_range)
     if not np.any(use > largest_use):
         return ""
     return f"the states are beyond {largest_use:g} times those of the training data"

@@ -1,5 +1,7 @@
 """Frequency responses and single periodic vibrations of nonlinear state-space models at constant force."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +31,7 @@ def pnlss_frequency_response(
     *,
     force: Held = "fundamental",
     exciter: Exciter | None = None,
+    held_inputs: Mapping[str, float] | None = None,
     lowest_hz: float | None = None,
     highest_hz: float | None = None,
     harmonics: int = 7,
@@ -42,6 +45,7 @@ def pnlss_frequency_response(
         force_n,
         force=force,
         exciter=exciter,
+        held_inputs=held_inputs,
         lowest_hz=lowest_hz,
         highest_hz=highest_hz,
         harmonics=harmonics,
@@ -57,6 +61,7 @@ def pnlss_response(
     *,
     force: Held = "fundamental",
     exciter: Exciter | None = None,
+    held_inputs: Mapping[str, float] | None = None,
     lowest_hz: float | None = None,
     highest_hz: float | None = None,
     harmonics: int = 7,
@@ -79,6 +84,9 @@ def pnlss_response(
         one. ``voltage``: a sine of constant voltage at the exciter.
     exciter
         For models driven by a force: the exciter that makes it, and is moved by the model's drive point.
+    held_inputs
+        Constant value of every input beside the driven one, by name: ``{"constant": 1.0}`` after
+        `Experiment.with_constant_input`.
     lowest_hz, highest_hz
         Band; by default 15 % about the resonance of the model's linear part that moves the drive point most.
     harmonics, samples
@@ -97,7 +105,7 @@ def pnlss_response(
     """
     low, high = band_of(model, lowest_hz, highest_hz)
     held, more = harmonics_that_fit(model, harmonics, high)
-    balance = balance_of(model, force_n, force, exciter, held, samples)
+    balance = balance_of(model, force_n, force, exciter, held_inputs, held, samples)
     allowed = positive("largest_range_use", largest_range_use)
     if points < 2:
         raise IdentificationError(f"points: is {points}, needs at least 2")
@@ -125,7 +133,7 @@ def pnlss_response(
         points=every,
         folds=folds[0] if len(folds) == 1 else folds[0].joined(folds[1]),
         branch=np.repeat(np.arange(len(states)), [each.count for each in states]),
-        notes=(*notes_of(model, every, force, exciter), *_at_the_edge(every, low, high), *more),
+        notes=(*notes_of(model, every, force, exciter, held_inputs), *_at_the_edge(every, low, high), *more),
         complete=not any(each.note for each in found),
     )
 
@@ -137,6 +145,7 @@ def pnlss_steady_state(
     *,
     force: Held = "fundamental",
     exciter: Exciter | None = None,
+    held_inputs: Mapping[str, float] | None = None,
     harmonics: int = 7,
     samples: int | None = None,
     near: SteadyStates | None = None,
@@ -149,7 +158,7 @@ def pnlss_steady_state(
     """
     at_hz = positive("frequency_hz", frequency_hz, "Hz")
     held, _ = harmonics_that_fit(model, harmonics, at_hz)
-    balance = balance_of(model, force_n, force, exciter, held, samples)
+    balance = balance_of(model, force_n, force, exciter, held_inputs, held, samples)
     if near is None:
         z = from_rest(balance, at_hz, largest_range_use)
     else:

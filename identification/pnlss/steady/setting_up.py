@@ -1,5 +1,7 @@
 """From what is asked of a model to the equations of its harmonic balance."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,7 +9,7 @@ from identification.errors import IdentificationError
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.steady.balance import Balance, samples_for
 from identification.pnlss.steady.basis import Basis, real_coefficients
-from identification.pnlss.steady.excitation import Held, drive_of, linear_resonance_hz
+from identification.pnlss.steady.excitation import Held, drive_of, held_values, linear_resonance_hz
 from identification.pnlss.steady.states import SteadyStates
 from identification.prediction.exciter import Exciter
 
@@ -19,15 +21,22 @@ _BAND = (0.85, 1.15)
 
 
 def balance_of(
-    model: PnlssModel, level: float, force: Held, exciter: Exciter | None, harmonics: int, samples: int | None
+    model: PnlssModel,
+    level: float,
+    force: Held,
+    exciter: Exciter | None,
+    held_inputs: Mapping[str, float] | None,
+    harmonics: int,
+    samples: int | None,
 ) -> Balance:
-    """The equations; raises `IdentificationError` on too few samples and what `drive_of` refuses."""
+    """The equations; raises `IdentificationError` on too few samples and what `held_values` and `drive_of` refuse."""
     least = 2 * harmonics + 1
     count = samples_for(model, harmonics) if samples is None else samples
     if count < least:
         raise IdentificationError(f"samples: is {count}, needs at least {least} for {harmonics} harmonics")
     basis = Basis(harmonics, count)
-    return Balance(model, drive_of(model, level, force, exciter, basis.size), basis)
+    row, values = held_values(model, held_inputs)
+    return Balance(model, drive_of(model, level, force, exciter, basis.size, row), basis, values)
 
 
 def band_of(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None) -> tuple[float, float]:

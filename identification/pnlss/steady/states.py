@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, Channel
 from identification.errors import IdentificationError
+from identification.pnlss.simulation import use_of
 from identification.pnlss.steady.balance import Balance
 from identification.pnlss.steady.basis import harmonics_of
 from identification.pnlss.steady.stability import Loss, loss_of_stability, multipliers
@@ -151,7 +152,7 @@ def steady_states(
         for name, part in parts.items():
             series[name][k] = harmonics_of(part)
         for name, limit in ranges.items():
-            use[name].append(np.max(np.abs(fine @ parts[name]), axis=0) / limit)
+            use[name].append(use_of(np.max(np.abs(fine @ parts[name]), axis=0), limit))
         found[k] = multipliers(period.states_by[..., : model.states], basis.turned(angle)[0], basis, angle)
         if not balance.drive.size:
             loss = loss_of_stability(found[k], angle)

@@ -1,6 +1,7 @@
 """The table of errors against errors worked out by hand, and against a system that blows up for a known reason."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -90,6 +91,36 @@ def test_cells_read_like_the_papers():
     ]
     assert str(ErrorCell.of(rows)) == "5.00 % (1.41 %)"
     assert str(ErrorCell.of([])) == "-"
+
+
+def test_cells_of_runs_beyond_the_trained_range_are_marked(study):
+    levels, jobs = study
+    table = ErrorTable.of({job.name: system() for job in jobs}, jobs, levels)  # trained up to 1 N
+    assert str(table.cell("low", "high")).endswith(" *")
+    assert "* beyond the range of the training data: extrapolated" in table.text().splitlines()
+    inside = ErrorTable.of(
+        {job.name: replace(system(), state_range=np.array([1e3]), input_range=np.array([1e3])) for job in jobs},
+        jobs,
+        levels,
+    )
+    assert "*" not in inside.text()
+
+
+def test_rows_have_no_number_where_there_is_none():
+    one = {"model": "a", "training_set": "low", "test": "high"}
+    uses = (float("nan"), 0.7, float("nan"))
+    rows = [ModelTest(**one, experiment=str(k), error=0.1, range_use=use) for k, use in enumerate(uses)]
+    assert ErrorCell.of(rows).range_use == 0.7
+    row = ErrorCell.of([ModelTest(**one, experiment="1", error=float("inf"), range_use=float("inf"))]).row()
+    assert (row["mean"], row["standard_deviation"], row["largest"], row["range_use"]) == (None,) * 4
+    assert (row["runs"], row["unbounded_runs"]) == (1, 1)
+
+
+def test_data_read_twice_is_still_no_test_of_a_model_that_was_trained_on_it():
+    once, again = ({"low": realisations(0.2, 3), "high": realisations(12.0, 3)} for _ in range(2))
+    jobs = realisation_combinations(once, models=1)
+    tables = [ErrorTable.of({job.name: system() for job in jobs}, jobs, levels) for levels in (once, again)]
+    assert [table.cell("mixed", "high").runs for table in tables] == [1, 1]
 
 
 def test_an_output_that_is_not_there_is_named(study):

@@ -59,6 +59,22 @@ def test_a_state_that_no_output_tells_of_stays_small() -> None:
     assert np.max(np.abs(estimated_initial_state(system, one))) < 10.0
 
 
+def test_an_estimated_initial_state_does_not_depend_on_the_units_of_the_states_nor_on_their_range() -> None:
+    system = nonlinear_system(4, 1, 2, saturating=2)
+    begin = np.array([1.0, -2.0, 0.5, 1.5])
+    # so few and late samples that they tell little of some states, and what is held back shows
+    one = replace(experiment(system, 400, begin=begin, noise=0.05), counted_from=250)
+    found = estimated_initial_state(system, one, samples=60)
+    units = np.array([1e6, 1e-5, 1.0, 1e-3])
+    other = system.scaled(states=units, inputs=np.ones(1), outputs=np.array([1.0, 1e4]))
+    in_units = replace(one, outputs=one.outputs * [[1.0], [1e-4]])
+    np.testing.assert_allclose(
+        estimated_initial_state(other, in_units, samples=60) * units, found, rtol=1e-4, atol=1e-4
+    )
+    ranged = replace(system, state_range=np.array([10.0, 0.1, 5.0, 1.0]))
+    np.testing.assert_array_equal(estimated_initial_state(ranged, one, samples=60), found)
+
+
 def test_what_cannot_be_compared_is_named() -> None:
     system = nonlinear_system(2, 1, 1)
     one = experiment(system, 100)

@@ -45,7 +45,43 @@ def test_a_known_nonlinear_system_is_found_down_to_the_noise_in_one_call() -> No
     # 84 parameters of 4096 values: what noise leaves is a seventh of it.
     assert nonlinear < 0.5 * noise
     assert 0.7 * noise < found.training_error < 1.3 * noise
-    assert any("linear model: error" in note for note in found.model.notes)
+    scores = {note.split(":")[0]: note for note in found.model.notes if "training error" in note}
+    assert list(scores) == ["linear model", "nonlinear model"]
+    pooled = [measured(exact, multisine(seed), noise=noise, seed=seed) for seed in range(2)]
+    runs = [found.linear.simulate(e.inputs).outputs[:, e.counted_from :] for e in pooled]
+    misfit = np.hstack([run - e.counted_outputs for run, e in zip(runs, pooled, strict=True)])
+    size = np.hstack([e.counted_outputs for e in pooled])
+    error = np.sqrt(np.mean(np.sum(misfit**2, axis=1) / np.sum(size**2, axis=1)))
+    assert f"training error {100 * error:.2g} %" in scores["linear model"]
+    assert not any("unstable" in note for note in found.model.notes)
+
+
+def test_a_fit_is_not_lost_to_the_notes_on_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = hardening(outputs=2)
+    one, other = (measured(exact, multisine(seed)) for seed in range(2))
+    without = replace(other, outputs=other.outputs * [[1.0], [0.0]])
+    found = identify_pnlss([one, without], states=2, settings=FitSettings(iterations=1))
+    assert any("linear model: training error" in note for note in found.model.notes)
+    real = identify.fit_pnlss
+
+    def refusing(start: PnlssModel, *args: object, **kwargs: object) -> object:
+        if not start.state_features.count:
+            raise IdentificationError("no")
+        return real(start, *args, **kwargs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(identify, "fit_pnlss", refusing)
+    found = identify_pnlss([one], states=2, settings=FitSettings(iterations=1))
+    assert "linear model: no training error (no)" in found.model.notes
+    assert found.history.iterations == 1
+
+
+def test_an_unstable_linear_part_is_noted_with_its_frequency_and_growth() -> None:
+    stable = linear_model(oscillator(frequency_hz=60.0))
+    assert identify._unstable(stable) == []
+    growing = replace(stable, a=stable.a * 1.01 / spectral_radius(stable.a))
+    (note,) = identify._unstable(growing)
+    assert "unstable: at 59.97 Hz" in note  # 60 Hz with 3 % damping
+    assert "rate of 7.96 1/s" in note  # 800 Hz times log 1.01
 
 
 def test_saturating_features_find_a_saturating_system() -> None:
@@ -200,6 +236,8 @@ def test_features_are_those_that_were_asked_for() -> None:
     assert features(saturating=(4, 1), degrees=(2,), output_degrees=()) == (6, 0, 4, 1)
     own = Features.monomials(2, 1, (5,), of=(1,))
     assert features(state_features=own, output_features=Features.none(2, 1)) == (1, 0, 0, 0)
+    both = replace(own, weights=np.ones((2, 4)))
+    assert features(state_features=both, output_degrees=(), saturating=(0, 1)) == (1, 0, 2, 1)
 
 
 def test_outputs_that_forces_do_not_act_on_at_once_have_no_saturating_features() -> None:

@@ -1,14 +1,23 @@
 """Errors of simulated experiments against what can be worked out without a simulation."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import dlsim, dlti
 
-from identification import Channel, Experiment, Features, IdentificationError, PnlssModel, error_spectra, simulated_run
+from identification import (
+    Channel,
+    Experiment,
+    Features,
+    IdentificationError,
+    PnlssModel,
+    error_spectra,
+    estimated_initial_state,
+    simulated_run,
+)
 from identification.linear.subspace import StateSpace
-from identification.prediction.simulated_runs import estimated_initial_state
 
 A = np.array([[0.95, 0.25], [-0.25, 0.95]]) * 0.99
 LINEAR = StateSpace(A, np.array([[0.0], [1.0]]), np.array([[1.0, 0.3], [0.2, 2.0]]), np.array([[0.1], [0.0]]))
@@ -56,14 +65,27 @@ def test_a_run_that_leaves_all_bounds_has_no_error_but_an_instant():
     assert 0.0 <= run.unbounded_at_s < 1.0
     assert np.isinf(run.error).all()
     assert np.isinf(run.range_use)
+    row = json.loads(json.dumps(run.row(), allow_nan=False))
+    assert (row["errors"]["tip"], row["range_use"], row["level"]) == (None, None, None)
+    late = simulated_run(replace(cubic, e=np.full(cubic.e.shape, 5.0)), experiment(counted_from=300))
+    assert late.unbounded_at_s == run.unbounded_at_s  # since the record began, be it before what counts
 
 
 def test_an_initial_state_is_estimated_where_the_experiment_asks_for_it():
     x0 = np.array([1.5, -3.0])
     asked = experiment(x0=x0, initial_state="estimated")
     np.testing.assert_allclose(estimated_initial_state(model(), asked), x0, rtol=1e-6)
+    unknown = replace(model(), state_range=np.full(2, np.nan), input_range=np.full(1, np.nan))
+    np.testing.assert_allclose(estimated_initial_state(unknown, asked), x0, rtol=1e-6)
     assert simulated_run(model(), asked).error.max() < 1e-6
     assert simulated_run(model(), experiment(x0=x0)).error.max() > 0.1
+
+
+def test_an_output_that_is_zero_has_no_relative_error():
+    dead = experiment()
+    dead = replace(dead, name="dead", outputs=dead.outputs * [[1.0], [0.0]])
+    with pytest.raises(IdentificationError, match="experiment 'dead': output 'tip' is zero where it counts"):
+        simulated_run(model(), dead)
 
 
 def test_spectra_of_a_sine_are_its_amplitude_and_that_of_the_error():

@@ -95,6 +95,7 @@ def test_a_toolbox_model_comes_in_by_a_mapping_in_si(states, tmp_path):
         ({"E": np.zeros((2, 5))}, "E: shape"),
         ({"xpowers": np.full((1, 3), 1.5)}, "xpowers: are no whole numbers"),
         ({"xpowers": np.zeros((2, 5))}, "xpowers: shape"),
+        ({"xpowers": np.ones((3, 4)), "E": np.ones((2, 4))}, r"xpowers: shape \(3, 4\), needs 3 columns"),
         ({"A": "text"}, "model.A: holds no real numbers"),
         ({"C": np.full((2, 2), np.nan)}, "c: "),
     ],

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification import Experiment, FitSettings, IdentificationError, PnlssModel, fit_pnlss
+from identification import Experiment, FitHistory, FitSettings, IdentificationError, PnlssModel, fit_pnlss
 from tests.identification.pnlss.systems import disturbed, experiment, nonlinear_system, periodic_experiment
 
 SYSTEM = nonlinear_system(2, 1, 1)
@@ -40,6 +40,20 @@ def driven_alike() -> Experiment:
         (START, [experiment(SYSTEM, 40)], [], {}, "40 values of outputs count, fewer than the 57 parameters"),
         (START, [replace(ONE, inputs=0.0 * ONE.inputs)], [], {}, "input 'u1': is zero throughout"),
         (START, [replace(ONE, outputs=0.0 * ONE.outputs)], [], {}, "output 'y1': is zero throughout"),
+        (
+            START,
+            [ONE],
+            [replace(ONE, outputs=0.0 * ONE.outputs)],
+            {},
+            "output 'y1': is zero throughout the validation data",
+        ),
+        (
+            START,
+            [experiment(SYSTEM, 300, seed=2), ONE],
+            [replace(ONE, inputs=np.array(ONE.inputs), name="again")],
+            {},
+            r"validation\[0\] \(again\): has the samples of experiments\[1\]",
+        ),
         (disturbed(DOUBLE), [driven_alike()], [], {}, "one is a combination of the others"),
         (replace(START, a=1.5 * START.a), [ONE], [], {}, "start: .*needs a model that is stable"),
         (replace(START, c=1e9 * START.c), [ONE], [], {}, "start: its outputs reach .* times those of"),
@@ -94,3 +108,19 @@ def test_a_fit_is_resumed_with_its_own_start_and_experiments_alone() -> None:
         fit_pnlss(disturbed(nonlinear_system(2, 1, 1, degrees=(3,))), [ONE], resume=fit)
     with pytest.raises(IdentificationError, match="resume: has 0 estimated initial states, the experiments 1"):
         fit_pnlss(START, [replace(ONE, initial_state="estimated")], resume=fit)
+    other = [experiment(SYSTEM, 300, seed=2)]
+    with pytest.raises(
+        IdentificationError, match="resume: was fitted with no validation data, now there is validation data"
+    ):
+        fit_pnlss(START, [ONE], validation=other, resume=fit)
+    chosen = fit_pnlss(START, [ONE], validation=other, settings=FitSettings(iterations=1))
+    with pytest.raises(
+        IdentificationError, match="resume: was fitted with validation data, now there is no validation data"
+    ):
+        fit_pnlss(START, [ONE], resume=chosen)
+
+
+def test_the_best_iterate_is_one_that_has_an_error() -> None:
+    one = np.ones(3)
+    history = FitHistory(training_error=one, validation_error=[np.nan, 0.2, 0.1], damping=one, seconds=one)
+    assert history.best == 2
