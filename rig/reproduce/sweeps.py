@@ -49,7 +49,7 @@ class SweepResult:
     range_use: float
     """Largest state or input over the largest in the training data."""
     unbounded_at_s: float | None
-    """When the simulation left all bounds; None if it did not."""
+    """When the simulation left all bounds, 0 if before the sweep began; None if it did not."""
 
     def row(self) -> dict[str, Any]:
         """Numbers for tables and JSON."""
@@ -106,7 +106,11 @@ def _simulated(
         run = pnlss_coupled_run(model, exciter, experiment.inputs[0], lowest_hz=lowest_hz)
     there = experiment.counted_outputs[find_role(experiment.output_channels, "drive")]
     here = run.outputs[find_role(model.outputs, "drive"), experiment.counted_from :]
-    at = None if run.unbounded_at is None else (run.unbounded_at - experiment.counted_from) / experiment.sample_rate_hz
+    at = (
+        None
+        if run.unbounded_at is None
+        else max(run.unbounded_at - experiment.counted_from, 0) / experiment.sample_rate_hz
+    )
     least = int(
         np.ceil(experiment.sample_rate_hz / min(plan.start_hz, plan.stop_hz))
     )  # a period, or an envelope is none
