@@ -53,13 +53,13 @@ if TYPE_CHECKING:
     from identification.pnlss.fitting.settings import FitProgress, FitSettings
     from identification.pnlss.identify import identify_pnlss
     from identification.pnlss.linear_model import linear_pnlss
+    from identification.pnlss.many import IdentifiedModel, identify_many
     from identification.pnlss.model import PnlssModel
     from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
     from identification.pnlss.steady.response import pnlss_frequency_response, pnlss_response, pnlss_steady_state
     from identification.pnlss.steady.result import PnlssResponse
     from identification.pnlss.steady.states import SteadyStates
-    from identification.pnlss.study import IdentifiedModel, identify_many
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
@@ -228,7 +228,7 @@ _MODULE_OF = {
     "FrequencyResponseMatrix": "linear.response_matrix",
     "HalfPeriods": "signals.half_periods",
     "IdentificationError": "errors",
-    "IdentifiedModel": "pnlss.study",
+    "IdentifiedModel": "pnlss.many",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
     "ModalAnalysis": "linear.analysis",
@@ -284,7 +284,7 @@ _MODULE_OF = {
     "force_surface": "response_control.force_surface",
     "frequency_response": "prediction.frequency_response",
     "identify_exciter": "prediction.exciter_fit",
-    "identify_many": "pnlss.study",
+    "identify_many": "pnlss.many",
     "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
     "linear_pnlss": "pnlss.linear_model",

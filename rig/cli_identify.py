@@ -40,7 +40,12 @@ def identify(
         int | None, typer.Option("--states", help="Of a PNLSS model: two per mode of vibration.", show_default="2")
     ] = None,
     degrees: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Degrees of a PNLSS model's monomials.", show_default="2,3")
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help='Degrees of a PNLSS model\'s monomials; "" for none.',
+            show_default="2,3; none beside --saturating",
+        ),
     ] = None,
     rate: Annotated[
         float | None,
@@ -57,9 +62,15 @@ def identify(
         typer.Option("--no-output-polynomials", help="A PNLSS model whose outputs are linear in states and input."),
     ] = False,
     saturating: Annotated[
-        int | None, typer.Option(metavar="K", help="Saturating features (tanh) of a PNLSS model.")
+        int | None,
+        typer.Option(
+            metavar="K",
+            help="Saturating features (tanh) of a PNLSS model, in place of the monomials; with --degrees, beside them.",
+        ),
     ] = None,
-    iterations: Annotated[int | None, typer.Option(help="Most iterations of a PNLSS model's fit.")] = None,
+    iterations: Annotated[
+        int | None, typer.Option(help="Most iterations of a PNLSS model's fit.", show_default="100")
+    ] = None,
     validation: Annotated[
         list[Path] | None,
         typer.Option(help="Recording by which a PNLSS model's iterate is chosen; may be repeated."),
@@ -68,7 +79,8 @@ def identify(
         int | None,
         typer.Option(
             "--hold-out",
-            help="Realisations of each level that do this instead, beside every fourth settled point.",
+            help="Realisations of each level, the last ones, that choose a PNLSS model's iterate in place of --validation; of "
+            "five settled points and more every fourth does too. 0: none.",
             show_default="1",
         ),
     ] = None,
@@ -164,8 +176,9 @@ def predict(
     exciter: Annotated[
         Path | None,
         typer.Option(
-            help="Exciter model: sweeps are predicted from the voltage, not from the force, planned ones too; "
-            "a PNLSS model's frequency responses with the harmonics of its force."
+            help="Exciter model: sweeps are predicted from the voltage, recorded ones and planned ones. With a PNLSS model "
+            "driven by a force also responses and references at constant fundamental, RMS or voltage, with the harmonics that "
+            "the exciter makes; one driven by the voltage has its own."
         ),
     ] = None,
     zero_crossings: Annotated[

@@ -114,14 +114,18 @@ class FitLines:
     def __init__(self) -> None:
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._best = (float("inf"), 0)
+        self._stage = ""
         self._said_s = 0.0
 
     def __call__(self, at: "FitProgress") -> None:
         """Say where the fit is, and which iteration is the best so far."""
         judged = at.training_error if at.validation_error != at.validation_error else at.validation_error
+        if at.stage != self._stage:
+            self._stage, self._best = at.stage, (float("inf"), 0)
         self._best = min(self._best, (judged, at.iteration))
+        stage = f"{at.stage}: " if at.stage else ""
         line = (
-            f"iteration {at.iteration:>3}/{at.iterations}  training {_percent(at.training_error)}  "
+            f"{stage}iteration {at.iteration:>3}/{at.iterations}  training {_percent(at.training_error)}  "
             f"validation {_percent(at.validation_error)}  best at {self._best[1]}  {at.seconds:.1f} s"
         )
         with contextlib.suppress(OSError):

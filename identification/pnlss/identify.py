@@ -57,7 +57,8 @@ def identify_pnlss(
         Number of states: two per mode of vibration, and more for what remembers (friction, hysteresis).
     degrees, output_degrees
         Degrees of the monomials in the state and the output equation. None: 2 and 3, but none beside saturating features,
-        with which alone a model stays bounded; in the outputs as in the states. ``()`` for none.
+        which take their place; in the outputs as in the states. ``()`` for none. Saturating features alone bound what is
+        added to the linear part: the model stays bounded as long as that is stable.
     variables
         What the monomials are made of: ``all`` states and inputs that vary, ``states`` alone, or the numbers of some (states
         first).

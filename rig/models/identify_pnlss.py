@@ -2,7 +2,10 @@
 
 import time
 from collections.abc import Callable, Sequence
+from itertools import compress
 from pathlib import Path
+
+import numpy as np
 
 from identification import (
     FitProgress,
@@ -14,6 +17,7 @@ from identification import (
     simulated_run,
 )
 from rig.errors import ConfigurationError, RecordingError
+from rig.models.data_fingerprints import uses_of
 from rig.models.files import load_as
 from rig.models.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.pnlss_data import PnlssData, pnlss_data
@@ -52,7 +56,7 @@ def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Pro
             states=2 if options.states is None else options.states,
             degrees=options.chosen_degrees,
             output_degrees=() if options.output_polynomials is False else None,
-            saturating=options.saturating or 0,
+            saturating=options.saturating_features,
             validation=data.validation,
             settings=settings,
             progress=progress,
@@ -86,9 +90,16 @@ def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssD
 
 def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPnlss:
     """The fit, its errors on all data, and spectra of the last periodic experiment, of validation where there is one."""
-    both = [(one, "training") for one in data.training] + [(one, "validation") for one in data.validation]
+    every = [(one, "training") for one in data.training] + [(one, "validation") for one in data.validation]
     begins = iter(fit.initial_states)
-    known = [next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in both]
+    states = [next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every]
+    moved = [bool(np.all(np.any(one.counted_outputs != 0.0, axis=1))) for one, _ in every]
+    both, known = list(compress(every, moved)), list(compress(states, moved))
+    still = [
+        f"{one.name}: an output is zero throughout, so that it has no errors"
+        for (one, _), is_moved in zip(every, moved, strict=True)
+        if not is_moved
+    ]
     runs = tuple(
         simulated_run(fit.model, one, initial_state=begin, use=use)
         for (one, use), begin in zip(both, known, strict=True)
@@ -105,6 +116,7 @@ def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPn
         linear_runs=linear_runs,
         spectra=spectra,
         seconds=seconds,
-        notes=data.notes,
+        notes=(*data.notes, *still),
         data=data.fingerprint,
+        uses=uses_of(data.training, data.validation),
     )

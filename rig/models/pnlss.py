@@ -1,7 +1,8 @@
 """Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one of them."""
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,8 @@ class IdentifiedPnlss:
         What a user should know about the data, one line each.
     data
         Fingerprint of the data of the fit, by which it is known again; empty if unknown.
+    uses
+        ``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown.
     """
 
     model: PnlssModel
@@ -45,6 +48,7 @@ class IdentifiedPnlss:
     seconds: float = float("nan")
     notes: tuple[str, ...] = ()
     data: str = ""
+    uses: Mapping[str, str] = field(default_factory=dict)
 
 
 def _pack(found: IdentifiedPnlss) -> tuple[Arrays, Attributes]:
@@ -52,7 +56,13 @@ def _pack(found: IdentifiedPnlss) -> tuple[Arrays, Attributes]:
     arrays, attributes = kept.to_arrays()
     head = "model" if found.fit is None else "fit"
     arrays = {f"{head}/{name}": array for name, array in arrays.items()}
-    out: dict[str, Any] = {head: attributes, "seconds": found.seconds, "notes": list(found.notes), "data": found.data}
+    out: dict[str, Any] = {
+        head: attributes,
+        "seconds": found.seconds,
+        "notes": list(found.notes),
+        "data": found.data,
+        "uses": dict(found.uses),
+    }
     spectra = () if found.spectra is None else (found.spectra,)
     for name, things in (("runs", found.runs), ("linear_runs", found.linear_runs), ("spectra", spectra)):
         inside, of_things = pack_all(name, things)
@@ -77,6 +87,7 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
         seconds=float(attributes["seconds"]),
         notes=tuple(attributes["notes"]),
         data=str(attributes.get("data", "")),
+        uses={str(name): str(use) for name, use in attributes.get("uses", {}).items()},
     )
 
 

@@ -14,6 +14,7 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.experiments import default_rate_hz, experiments
 from rig.experiments.build import KINDS
 from rig.measurements import bench_of_recording
+from rig.models.data_fingerprints import features_of
 from rig.models.pnlss import IdentifiedPnlss
 from rig.models.pnlss_request import PnlssOptions
 from rig.models.points_left_out import points_left_out
@@ -41,14 +42,11 @@ class PnlssData:
 
     @property
     def fingerprint(self) -> str:
-        """A text that is the same for the same data in the same use alone: six digits of what makes an experiment."""
+        """A text that is the same for the same data in the same use, weighted alike, alone."""
         digest = hashlib.sha256()
         for use, several in (("training", self.training), ("validation", self.validation)):
             for one in several:
-                signals = np.vstack([one.inputs, one.outputs])
-                sizes = [np.sqrt(np.mean(values**2)) for rows in (signals, np.diff(signals)) for values in rows]
-                shape = f"{use} {signals.shape} {one.counted_from} {one.period_samples} {one.initial_state}"
-                digest.update(f"{shape} {[f'{size:.5e}' for size in (one.weight, *sizes)]}".encode())
+                digest.update(f"{use} {one.weight:.5e} {features_of(one)}".encode())
         return digest.hexdigest()
 
 
@@ -149,7 +147,9 @@ def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment]
     One realisation stays. Without settled points an iterate would be taken that is good at the multisine's levels alone.
     """
     out = [one for same in _alike(found) for one in same[max(1, len(same) - count) :] if count]
-    settled = [one for one in found if not one.period_samples]
+    settled = [
+        one for one in found if not one.period_samples and one.initial_state == "estimated"
+    ]  # no sweep from rest
     if count and len(settled) >= _FEWEST_POINTS:
         out += settled[_EVERY // 2 : -1 : _EVERY]
     chosen = {id(one) for one in out}

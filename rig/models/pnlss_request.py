@@ -22,7 +22,7 @@ class PnlssOptions:
     states: int | None = None
     """Number of states, two per mode of vibration; 2 if None."""
     degrees: str | None = None
-    """Degrees of the monomials, with commas; ``2,3`` if None."""
+    """Degrees of the monomials, with commas, none if empty; if None ``2,3``, and none beside saturating features."""
     rate_hz: float | None = None
     """Sample rate of the model."""
     input: str | None = None
@@ -32,14 +32,14 @@ class PnlssOptions:
     output_polynomials: bool | None = None
     """Whether monomials act on the outputs too; yes if None."""
     saturating: int | None = None
-    """Number of saturating features of the states; none if None."""
+    """Number of saturating features, in the place of the monomials unless degrees are given; none if None."""
     iterations: int | None = None
-    """Most iterations of the fit."""
+    """Most iterations of the fit; 100 if None."""
     validation: tuple[Path, ...] = ()
     """Recordings on which the iterate is chosen."""
     hold_out: int | None = None
-    """Realisations of each level, the last ones, on which it is chosen instead, beside every fourth settled point; 1 if
-    None, nothing with 0."""
+    """Realisations of each level, the last ones, on which it is chosen instead, and from five settled points of a recording
+    on every fourth of these; 1 if None, nothing with 0."""
     relative: bool | None = None
     """Whether errors of all experiments count relative to their own outputs; else as they are, which large levels rule."""
     resume: Path | None = None
@@ -71,7 +71,7 @@ class PnlssOptions:
 
     @property
     def chosen_degrees(self) -> tuple[int, ...]:
-        """The degrees as numbers; none for an empty text."""
+        """The degrees as numbers; none for an empty text, or where saturating features take their place."""
         try:
             found = tuple(sorted({int(part) for part in (self.degrees or "").split(",") if part.strip()}))
         except ValueError:
@@ -79,9 +79,16 @@ class PnlssOptions:
         if any(not 2 <= degree <= 12 for degree in found):
             raise ConfigurationError(
                 f"--degrees = {self.degrees!r}: allowed are whole numbers from 2 to 12 with commas, such as 2,3; 1 is the "
-                "linear part"
+                'linear part, "" is none'
             )
-        return (2, 3) if self.degrees is None else found
+        if self.degrees is None:
+            return () if self.saturating else (2, 3)
+        return found
+
+    @property
+    def saturating_features(self) -> int | tuple[int, int]:
+        """Their number as `identification.identify_pnlss` takes it: linear outputs have none of these either."""
+        return (self.saturating or 0, 0) if self.output_polynomials is False else self.saturating or 0
 
     @property
     def channels(self) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """Predictions of nonlinear state-space models: steady vibrations, recorded sweeps, recorded multisines."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -19,6 +18,7 @@ from identification import (
 from rig.errors import ConfigurationError, RecordingError
 from rig.experiments import experiments
 from rig.measurements import bench_of_recording
+from rig.models.data_fingerprints import fingerprint
 from rig.models.exciter import EXCITER
 from rig.models.files import load_as
 from rig.models.pnlss import PNLSS, IdentifiedPnlss
@@ -125,7 +125,7 @@ def _default(request: "PredictionRequest", held: Held) -> tuple[str, ...]:
 
 
 def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedRun], tuple[str, ...]]:
-    """Every realisation of a recording, simulated, what it was to the model as far as its name says, and notes."""
+    """Every realisation of a recording, simulated, what it was to the model, and notes."""
     model = identified.model
     with Recording(path) as recording:
         if recording.kind != "multisine":
@@ -140,8 +140,12 @@ def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedR
             *strangers(bench_of_recording(recording), model.specimen, None, str(path)),
             *points_left_out(recording),
         )
-    uses = {run.name: run.use for run in identified.runs}
-    return [replace(simulated_run(model, one), use=uses.get(one.name, "test")) for one in found], notes
+    uses = identified.uses
+    other = "test" if uses else "unknown"
+    runs = [simulated_run(model, one, use=uses.get(fingerprint(one), other)) for one in found]
+    if not uses:
+        notes = (*notes, "the model does not say what it was identified with: these may be its training data")
+    return runs, notes
 
 
 def _strangers(model: PnlssModel, references: Sequence[FrequencyResponse]) -> list[str]:

@@ -24,6 +24,10 @@ __all__ = ["Held", "Reference", "compared", "default_held"]
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 _MARGIN = 0.02
 """How far beyond a reference's frequencies a response is followed."""
+_STEPS = 5
+"""From one point of a reference to the next."""
+_ALIKE = 0.01
+"""Relative difference of amplitudes below which two vibrations are one."""
 _HARMONIC = 0.01
 """Second harmonic of a reference's force, over its fundamental, from which a force without any is said to be another."""
 
@@ -85,28 +89,40 @@ def _point_by_point(
 ) -> SteadyPrediction:
     """The vibration at each point's own force; where several are found, the one whose amplitude is nearest to the measured.
 
-    Tried are the one that rest leads to, and the one next to that of the point before. Points without any are left out.
+    Tried are the one that rest leads to, and the ones next to that of the point before, at once and in steps, without which a
+    steep branch is lost. Points without any are left out.
     """
     states: list[SteadyStates] = []
+    several = 0
     near: SteadyStates | None = None
+    at = (0.0, 0.0)
     for frequency, force, amplitude in zip(
         measured.frequency_hz.tolist(), np.abs(measured.force).tolist(), measured.amplitude_m.tolist(), strict=True
     ):
         tried: list[SteadyStates] = []
-        for start in (near, None) if near is not None else (None,):
+        ways: list[tuple[SteadyStates | None, list[tuple[float, float]]]] = [(None, [(frequency, force)])]
+        if near is not None:
+            ways.insert(0, (near, [(frequency, force)]))
+            ways.insert(0, (near, _between(at, (frequency, force))))
+        for start, way in ways:
             try:
-                tried.append(pnlss_steady_state(model, force, frequency, force=held, exciter=exciter, near=start))
+                for frequency_hz, force_n in way:
+                    start = pnlss_steady_state(model, force_n, frequency_hz, force=held, exciter=exciter, near=start)
             except IdentificationError:
                 continue
+            tried += [] if start is None else [start]
         if tried:
-            near = min(tried, key=lambda one: abs(abs(complex(one.displacement_m[0, 1, 0])) - amplitude))
+            at = (frequency, force)
+            found = [abs(complex(one.displacement_m[0, 1, 0])) for one in tried]
+            several += max(found) > (1.0 + _ALIKE) * min(found)
+            near = tried[int(np.argmin(np.abs(np.array(found) - amplitude)))]
             states.append(near)
     if not states:
         raise IdentificationError(
             f"reference '{measured.label}': the model has no periodic vibration at any of its points"
         )
-    missing = measured.frequency_hz.size - len(states)
-    notes = (f"at {missing} of {measured.frequency_hz.size} points no vibration was found",) if missing else ()
+    stable = np.concatenate([one.stable for one in states])
+    range_use = np.concatenate([np.asarray(one.range_use) for one in states])
     none = np.zeros(0)
     return SteadyPrediction(
         force_n=float(np.median(np.abs(measured.force))),
@@ -116,11 +132,35 @@ def _point_by_point(
         modal_amplitude=np.full(len(states), np.nan),
         fundamental_n=np.concatenate([np.abs(one.force_n[:, 1]) for one in states]),
         displacement_m=np.concatenate([one.displacement_m[:, 1] for one in states]),
-        stable=np.concatenate([one.stable for one in states]),
+        stable=stable,
         branch=np.zeros(len(states), dtype=np.int64),
-        range_use=np.concatenate([np.asarray(one.range_use) for one in states]),
+        range_use=range_use,
         fold_frequency_hz=none,
         fold_amplitude_m=none,
         fold_modal_amplitude=none,
-        notes=notes,
+        notes=_said(measured.frequency_hz.size, several, stable, range_use),
     )
+
+
+def _between(begin: tuple[float, float], end: tuple[float, float]) -> list[tuple[float, float]]:
+    """Frequencies and forces on the way from one point to the next, without the first."""
+    return [
+        (begin[0] + share * (end[0] - begin[0]), begin[1] + share * (end[1] - begin[1]))
+        for share in (np.arange(1, _STEPS + 1) / _STEPS).tolist()
+    ]
+
+
+def _said(points: int, several: int, stable: np.ndarray, range_use: np.ndarray) -> tuple[str, ...]:
+    """What to know of vibrations that were taken point by point."""
+    missing, unstable = points - stable.size, int(np.count_nonzero(~stable))
+    notes = [f"at {missing} of {points} points no vibration was found"] if missing else []
+    if several:
+        notes.append(
+            f"at {several} of {points} points several vibrations were found: the one nearest to the measured amplitude was "
+            "taken, which the model does not tell by itself"
+        )
+    if unstable:
+        notes.append(f"{unstable} of {stable.size} vibrations are unstable")
+    if np.nanmax(range_use, initial=0.0) > 1.0:
+        notes.append(f"states reach {np.nanmax(range_use):.2f} times the training data: extrapolated")
+    return tuple(notes)

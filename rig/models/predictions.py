@@ -9,27 +9,32 @@ from rig.console import number, print_table
 from rig.figures.predictions import draw_predictions
 from rig.models.kind import Kind
 
-__all__ = ["PREDICTIONS"]
+__all__ = ["CUT", "PREDICTIONS"]
+
+CUT = "the response from "
+"""So begins the note of a response that was cut off, that of the first path before that of the other."""
 
 
 def _steady(
     response: SteadyPrediction, band: ResponseBand | None, reference: FrequencyResponse | None
 ) -> dict[str, Any]:
-    peak = response.peak()
+    peak, reached = response.peak(), response.peak_reached()
     return {
         "name": (reference.label if reference else "") or response.name,
         "force_n": None if response.force == "voltage" else response.force_n,
         "voltage_v": response.force_n if response.force == "voltage" else None,
         "force": response.force,
-        "peak_m": peak.amplitude_m,
-        "peak_frequency_hz": peak.frequency_hz,
+        "complete": response.complete,
+        "largest_m": peak.amplitude_m,
+        "peak_m": peak.amplitude_m if reached else None,
+        "peak_frequency_hz": peak.frequency_hz if reached else None,
         "peak_std_m": None if band is None else band.peak_amplitude_std_m,
         "peak_frequency_std_hz": None if band is None else band.peak_frequency_std_hz,
-        "peak_phase_lag_deg": peak.phase_lag_deg,
+        "peak_phase_lag_deg": peak.phase_lag_deg if reached else None,
         "folds_hz": response.fold_frequency_hz.tolist(),
-        "detached_branches": int(response.branch.max()),
+        "detached_branches": int(response.branch.max()) if response.complete else 0,
         "range_use": float(response.range_use[response.branch == 0].max()),
-        "notes": list(response.notes),
+        "notes": sorted(response.notes, key=lambda note: not note.startswith(CUT)),
     }
 
 
@@ -71,7 +76,7 @@ def _say(summary: dict[str, Any]) -> None:
                 (
                     r["name"],
                     number(r["force_n"], ".4g"),
-                    number(r["peak_m"], ".5f", 1e3),
+                    number(r["peak_m"], ".5f", 1e3) if r["peak_m"] else f">= {1e3 * r['largest_m']:.5f}",
                     number(r["peak_std_m"], ".2g", 1.96e3),
                     number(r["peak_frequency_hz"], ".4f"),
                     number(r["peak_frequency_std_hz"], ".2g", 1.96),

@@ -10,6 +10,7 @@ from rig.errors import RecordingError
 from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, title
 from rig.reproduce.steady import Steady
 from rig.reproduce.study import Study
+from rig.reproduce.sweeps import COUPLED
 from rig.reproduce.truths import Truth
 
 if TYPE_CHECKING:
@@ -120,14 +121,16 @@ def _sweeps(page: "Figure", study: Study) -> None:
         top = float(shown[0].measured.max())
         axis.plot(shown[0].frequency_hz, shown[0].measured, color=REJECTED, lw=2.4, label="recorded")
         for one in shown:
-            unbounded = "" if np.isnan(one.unbounded_s) else ", unbounded"
-            label = f"{one.training_set}{unbounded}"
-            axis.plot(one.frequency_hz, one.simulated, color=colours[one.training_set], lw=1.0, label=label)
-        highest = max((float(np.max(one.simulated)) for one in shown if np.isnan(one.unbounded_s)), default=0.0)
-        beyond = any(not np.isnan(one.unbounded_s) for one in shown) or highest > 2.4 * top
+            coupled = one.given == COUPLED
+            unbounded = "" if one.unbounded_at_s is None else ", unbounded"
+            label = f"{one.training_set}{', from the voltage' if coupled else ''}{unbounded}"
+            line = ":" if coupled else "-"
+            axis.plot(one.frequency_hz, one.simulated, line, color=colours[one.training_set], lw=1.0, label=label)
+        highest = max((float(np.max(one.simulated)) for one in shown if one.unbounded_at_s is None), default=0.0)
+        beyond = any(one.unbounded_at_s is not None for one in shown) or highest > 2.4 * top
         axis.set_ylim(0.0, 2.5 * top if beyond else 1.35 * max(top, highest))
         axis.set(ylabel="acceleration, m/s²", title=name)
-        axis.legend(fontsize=7, ncols=5, loc="upper right")
+        axis.legend(fontsize=6, ncols=3, loc="upper right")
     axes[-1].set_xlabel("frequency of the plan, Hz")
     title(page, f"{study.options.specimen.name}: sweeps simulated from the measured {study.options.input}")
 

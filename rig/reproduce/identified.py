@@ -17,6 +17,7 @@ from identification import (
     realisation_combinations,
 )
 from rig.errors import RecordingError
+from rig.models.data_fingerprints import uses_of
 from rig.models.files import load_as, save
 from rig.models.pnlss import PNLSS, IdentifiedPnlss
 from rig.reproduce.options import Options
@@ -76,6 +77,7 @@ def identify_all(
         beside=[one for index, one in enumerate(beside) if index % _CHOOSES != 1],
         beside_validation=beside[1::_CHOOSES],
     )
+    by_name = {job.name: job for job in jobs}
     files = {job.name: _file(options, job.name) for job in jobs}
     fits: dict[str, PnlssFit] = {name: _kept(path) for name, path in files.items() if path.exists()}
     failures: dict[str, str] = {}
@@ -96,7 +98,9 @@ def identify_all(
             failures[found.name] = found.reason
         else:
             fits[found.name] = found.fit
-            save(IdentifiedPnlss(model=found.fit.model, fit=found.fit, seconds=found.seconds), files[found.name])
+            uses = uses_of(by_name[found.name].training, by_name[found.name].validation)
+            kept = IdentifiedPnlss(model=found.fit.model, fit=found.fit, seconds=found.seconds, uses=uses)
+            save(kept, files[found.name])
         count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
         say(f"{count}  {_outcome(found.fit, found.reason)}  {found.seconds:.1f} s")
     return Models(jobs, fits, failures)

@@ -99,11 +99,12 @@ def _closed(progress: "Progress | None") -> Iterator[None]:
             progress.close()
 
 
-def training_data(options: Options, path: Path) -> tuple[Experiment, ...]:
-    """Experiments of a recording, as the models of this study want them."""
-    outputs = (*(("force",) if options.input == "voltage" else ()), *options.specimen.outputs)
+def training_data(options: Options, path: Path, *, given: str | None = None) -> tuple[Experiment, ...]:
+    """Experiments of a recording, as the models of this study want them, or with another input ``given``."""
+    by = options.input if given is None else given
+    outputs = (*(("force",) if by == "voltage" else ()), *options.specimen.outputs)
     with Recording(path) as recording:
-        return experiments(recording, inputs=(options.input,), outputs=outputs, rate_hz=options.specimen.rate_hz)
+        return experiments(recording, inputs=(by,), outputs=outputs, rate_hz=options.specimen.rate_hz)
 
 
 def _multisine(options: Options, name: str) -> MultisinePlan:

@@ -8,6 +8,7 @@ from typing import Any
 from identification.pnlss.error_table import SAME_LEVEL
 from rig.console import number, print_table
 from rig.errors import RecordingError
+from rig.models.predictions import CUT
 from rig.reproduce.folder import write_json
 from rig.reproduce.options import Options
 from rig.reproduce.study import VARIANTS, Study
@@ -100,13 +101,14 @@ def _say_steady(study: Study) -> None:
     incomplete: list[str] = []
     for one in study.steady:
         row = one.row()
+        whole = row["error"] is not None or row["peak_m"] is None
         rows.append(
             (
                 row["training_set"],
                 one.truth.text,
                 row["held"],
                 number(row["truth_m"], ".4f", 1e3),
-                number(row["peak_m"], ".4f", 1e3),
+                ("" if whole else ">= ") + number(row["peak_m"], ".4f", 1e3),
                 number(row["error"], "+.1f", 100.0),
                 number(row.get("frequency_error"), "+.3f", 100.0),
                 number(row["range_use"], ".2f"),
@@ -114,7 +116,7 @@ def _say_steady(study: Study) -> None:
             )
         )
         if not row["complete"]:
-            incomplete.append(row["notes"][-1])
+            incomplete.append(next((note for note in row["notes"] if note.startswith(CUT)), row["notes"][-1]))
     print_table(("trained at", "level", "held", "rig mm", "model mm", "error %", "frequency %", "range use", ""), rows)
     for index, note in enumerate(incomplete, 1):
         print(f"({index}) {note}")
@@ -129,14 +131,15 @@ def _say_sweeps(study: Study) -> None:
             (
                 row["sweep"],
                 row["training_set"],
+                row["from"],
                 number(row["peak_measured"], ".3f"),
                 number(row["peak_error"], "+.1f", 100.0),
                 number(row["rms_error"], ".1f", 100.0),
                 number(row["range_use"], ".2f"),
-                "" if row["bounded"] else f"unbounded from {row['unbounded_s']:.2f} s on",
+                f"unbounded from {row['unbounded_at_s']:.2f} s on" if row["unbounded"] else "",
             )
         )
-    print_table(("sweep", "trained at", "peak m/s^2", "peak error %", "RMS error %", "range use", ""), rows)
+    print_table(("sweep", "trained at", "from", "peak m/s^2", "peak error %", "RMS error %", "range use", ""), rows)
     print()
 
 

@@ -11,13 +11,10 @@ from identification import (
     IdentificationError,
     PnlssModel,
     SteadyPrediction,
-    identify_exciter,
     pnlss_frequency_response,
 )
-from rig.measurements import spectra
-from rig.recording.reader import Recording
+from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
-from rig.reproduce.recordings import recorded
 from rig.reproduce.truths import Truth, truths
 
 __all__ = ["Steady", "steady"]
@@ -88,7 +85,7 @@ def steady(
     it has among its outputs.
     """
     known = truths(options)
-    exciter = _exciter(options, say) if options.input == "force" else None
+    exciter = exciter_of(options, say) if options.input == "force" else None
     found = []
     for training_set, (name, model) in models.items():
         for truth in known:
@@ -113,11 +110,3 @@ def _predicted(
     except IdentificationError as error:
         return None, str(error)
     return found, ""
-
-
-def _exciter(options: Options, say: Callable[[str], None]) -> Exciter:
-    """The exciter, from its own multisine."""
-    with Recording(recorded(options, options.specimen.exciter, say)) as recording:
-        measured = next(iter(spectra(recording).values()))
-        rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])
-    return identify_exciter(measured, sample_rate_hz=rate_hz)

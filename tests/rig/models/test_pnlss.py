@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import rig
-from identification import Features
+from identification import Features, FitProgress
 from rig.campaigns.plans import plan_from
 from rig.console import FitLines
+from rig.figures.pnlss import draw_pnlss
 from rig.models.files import load, save
+from rig.models.pnlss_request import PnlssOptions
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
 
@@ -208,9 +211,71 @@ def test_with_an_exciter_a_force_driven_model_follows_the_voltage(there, force_m
     assert told["sweeps"][2]["peak_m"] == pytest.approx(told["sweeps"][0]["peak_m"], rel=2e-3)
 
 
-def test_a_figure_is_drawn_from_what_the_file_holds(there, force_model, recordings):
+def test_a_figure_shows_spectra_course_and_range_of_what_the_file_holds(there, force_model, recordings):
     assert there("plot F.h5 -o F.png").status == 0
-    assert (recordings / "F.png").stat().st_size > 10_000
+    found = load(force_model)
+    page = Figure(figsize=(12.0, 7.5), layout="constrained")
+    draw_pnlss(page, found)
+    spectra, history, runs = page.axes
+    measured, linear, model = spectra.get_lines()[:3]
+    np.testing.assert_allclose(measured.get_ydata(), found.spectra.measured[0])
+    assert model.get_ydata().max() < 0.8 * linear.get_ydata().max() < 0.2 * measured.get_ydata().max()
+    lengths = [len(line.get_xdata()) for line in history.get_lines()]
+    assert lengths.count(found.fit.history.iterations + 1) == 2  # training, validation
+    drawn = np.concatenate([line.get_xydata() for line in runs.get_lines() if len(line.get_xdata()) <= 3])
+    for run in found.runs:
+        assert np.any(np.isclose(drawn, run.range_use)), run.name
+
+
+def test_a_response_that_is_cut_off_has_no_peak(there, force_model):
+    told = json.loads(there("predict F.h5 --frequency-response 0.4 -o cut.h5 --overwrite --json").out)
+    (response,) = told["frequency_responses"]
+    assert (response["complete"], response["peak_m"], response["detached_branches"]) == (False, None, 0)
+    truth = constant_force_response(VirtualRig.shipped("magnet-beam"), 0.4)
+    assert 0.0 < response["largest_m"] < truth.amplitude_m.max()
+    assert " ends at " in response["notes"][0]
+    row = next(line for line in there("show cut.h5").out.splitlines() if line.startswith("0.4 N"))
+    assert f">= {1e3 * response['largest_m']:.5f}  -" in " ".join(row.split()).replace(" -", "  -", 1)
+
+
+def test_saturating_features_take_the_place_of_the_monomials_unless_degrees_are_given():
+    taken = {
+        (options.chosen_degrees, options.saturating_features)
+        for options in (
+            PnlssOptions(saturating=3),
+            PnlssOptions(saturating=3, degrees="3"),
+            PnlssOptions(saturating=3, output_polynomials=False),
+            PnlssOptions(degrees=""),
+            PnlssOptions(),
+        )
+    }
+    assert taken == {((), 3), ((3,), 3), ((), (3, 0)), ((), 0), ((2, 3), 0)}
+
+
+def test_a_model_from_elsewhere_does_not_call_its_training_data_a_test(there, force_model, recordings):
+    save(load(force_model).model, recordings / "elsewhere.h5")
+    told = json.loads(there("predict elsewhere.h5 --multisine lines.h5 -o E.h5 --overwrite --json").out)
+    assert {run["use"] for run in told["multisines"]} == {"unknown"}
+    assert any("does not say what it was identified with" in note for note in told["notes"])
+
+
+def test_progress_says_which_start_is_compared(capsys):
+    lines = FitLines()
+    at = FitProgress(
+        iteration=10,
+        iterations=10,
+        training_error=0.01,
+        validation_error=0.02,
+        damping=1.0,
+        seconds=1.0,
+        stage="start 3 of 8",
+    )
+    lines(at)
+    lines(replace(at, stage="", training_error=0.5, validation_error=0.6, iteration=20, iterations=40))
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith("start 3 of 8: iteration  10/10  ")
+    assert second.startswith("iteration  20/40  ")
+    assert "best at 20" in second  # not that of a start
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,18 @@
 
 import csv
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from rig.bench import load_bench
 from rig.models.files import load
 from rig.models.pnlss import IdentifiedPnlss
+from rig.reproduce.options import Options
+from rig.reproduce.specimens import specimen_of
+from rig.reproduce.steady import steady
+from rig.reproduce.sweeps import COUPLED, simulated_sweeps
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
 from tests.rig.reproduce.commands import typed
@@ -36,15 +43,75 @@ def test_a_model_of_the_lowest_level_is_near_its_noise_at_its_own_level(results)
     assert own["mean"] < linear["mean"]
 
 
-def test_steady_peaks_stand_beside_those_of_the_rig(results):
-    coupled = {row["force_n"]: row for row in results["steady"] if row["held"] == "fundamental"}
-    assert set(coupled) == {0.25, 0.55}
-    for force_n, row in coupled.items():
-        truth = constant_force_response(VirtualRig.shipped("magnet-beam"), force_n)
-        assert row["truth_m"] == pytest.approx(truth.amplitude_m.max(), rel=0.01)
-        assert row["range_use"] > 1.0  # what the lowest level trains is far below these forces
-    sine = {row["force_n"]: row["truth_m"] for row in results["steady"] if row["held"] == "pure-sine"}
-    assert 1.02 < sine[0.55] / coupled[0.55]["truth_m"] < 1.2  # the exciter's harmonics take from the peak
+def study_of(folder, **changes):
+    """Options of the study in the folder with other forces and sweeps, and its model."""
+    specimen = replace(specimen_of("magnet-beam"), **changes)
+    options = Options(specimen=specimen, bench=load_bench("magnet-beam"), folder=folder, levels=1)
+    (path,) = (folder / "force" / "models").glob("*01.h5")
+    return options, {"0.5 N": (path.stem, load(path).model)}
+
+
+def test_steady_peaks_within_the_range_are_those_of_the_rig(folder):
+    options, models = study_of(folder, forces_n=(0.05,))
+    truth = constant_force_response(VirtualRig.shipped("magnet-beam"), 0.05)
+    for row in (one.row() for one in steady(options, models, print)[0]):
+        assert row["complete"]
+        assert row["peak_m"] == pytest.approx(truth.amplitude_m.max(), rel=0.02)
+        assert row["peak_hz"] == pytest.approx(truth.frequency_hz[np.argmax(truth.amplitude_m)], rel=1e-3)
+
+
+def test_what_is_cut_off_far_beyond_the_range_is_no_peak(folder, results):
+    for row in results["steady"]:  # what the lowest level trains is far below these forces
+        assert (row["complete"], row["error"]) == (False, None)
+        assert row["peak_m"] < row["truth_m"]
+        assert any(note.startswith("the response from 22 Hz ends at") for note in row["notes"])
+    lines = [line for line in (folder / "printed.txt").read_text().splitlines() if "fundamental" in line]
+    assert len(lines) == 2
+    for line in lines:
+        assert line.split()[6] == ">="
+        assert line.split()[8:10] == ["-", "-"]
+
+
+def test_sweeps_of_force_models_are_simulated_from_the_voltage_too(folder):
+    options, models = study_of(folder, sweeps=("sweep-3",))
+    alone, coupled = simulated_sweeps(options, models, print)
+    assert (alone.given, coupled.given) == ("force", COUPLED)
+    assert np.array_equal(alone.measured, coupled.measured)
+    assert abs(coupled.row()["peak_error"]) < 0.05
+    assert coupled.rms_error < 0.5 * alone.rms_error
+
+
+def test_models_know_which_realisations_they_were_identified_with_whatever_the_file_is_called(folder, tmp_path):
+    (path,) = (folder / "force" / "models").glob("*01.h5")
+    other = tmp_path / "other-name.h5"
+    other.write_bytes((folder / "recordings" / "multisine-1.h5").read_bytes())
+    done = typed(f"predict {path} --multisine {other} -o {tmp_path / 'P.h5'} --json")
+    uses = [run["use"] for run in json.loads(done.out)["multisines"]]
+    assert uses == ["test", "validation", "training", "training", "training"]
+
+
+@pytest.mark.parametrize(
+    ("option", "kind"),
+    [("--input voltage", "voltage"), ("--with-backbone", "force-backbone"), ("--states 1", "force-n1")],
+)
+def test_other_kinds_of_models_have_a_folder_beside(folder, option, kind):
+    done = typed(f"{SMALL.replace('8', '6')} --without steady {option} -o {folder} --json")
+    assert done.status == 0, done.err
+    (path,) = (folder / kind / "models").glob("*.h5")
+    model = load(path).model
+    told = json.loads(done.out)
+    (own,) = [row for row in told["errors"]["chosen on validation data"] if row["model"] is None]
+    assert own["unbounded_runs"] == 0
+    if kind == "voltage":
+        assert [channel.name for channel in (*model.inputs, *model.outputs)][:2] == ["voltage", "force"]
+        assert len(model.output_features.exponents) == 0
+        assert own["mean"] < 0.03
+    elif kind == "force-backbone":
+        assert any("backbone" in name for name in model.training)
+        (lines,) = (folder / "force" / "models").glob("*01.h5")
+        assert model.state_range.max() > 3.0 * load(lines).model.state_range.max()
+    else:
+        assert model.states == 1
 
 
 def test_tables_models_and_figures_are_in_the_folder(folder, results):

@@ -1,0 +1,19 @@
+"""The exciter of a study, identified from its own multisine."""
+
+from collections.abc import Callable
+
+from identification import Exciter, identify_exciter
+from rig.measurements import spectra
+from rig.recording.reader import Recording
+from rig.reproduce.options import Options
+from rig.reproduce.recordings import recorded
+
+__all__ = ["exciter_of"]
+
+
+def exciter_of(options: Options, say: Callable[[str], None]) -> Exciter:
+    """What drives the specimen, to be coupled to models whose input is the force."""
+    with Recording(recorded(options, options.specimen.exciter, say)) as recording:
+        measured = next(iter(spectra(recording).values()))
+        rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])
+    return identify_exciter(measured, sample_rate_hz=rate_hz)
