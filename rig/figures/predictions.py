@@ -75,7 +75,9 @@ def _name(predictions: Predictions, index: int) -> str | None:
         return None
     measured, error = predictions.steady_references[index], predictions.steady_errors[index]
     name = (measured.label if measured else "") or predictions.steady[index].name
-    return name if error is None else f"{name}: peak {100 * error.peak_error:+.2f} %"
+    if error is None:
+        return name
+    return f"{name}: peak {100 * error.peak_error:+.2f} %" if np.isfinite(error.peak_error) else f"{name}: no peak"
 
 
 def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, colour: Any) -> None:

@@ -86,6 +86,7 @@ def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: Identified
     for path in options.validation:
         with Recording(path) as recording:
             validation += experiments(recording, rate_hz=rate_hz, **channels)
+    _check_alive([*training, *validation])
     if not validation:
         notes.append("no data to choose the iterate by: the last one is taken, however it does on other data")
     if "force" not in [channel.role for channel in (*training[0].input_channels, *training[0].output_channels)]:
@@ -95,6 +96,16 @@ def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: Identified
     if options.relative:
         training, validation = list(_relative(training)), list(_relative(validation) if validation else ())
     return PnlssData(tuple(training), tuple(validation), tuple(notes))
+
+
+def _check_alive(experiments: Sequence[Experiment]) -> None:
+    """Refuse an output that stands still in any experiment: no error can be relative to it."""
+    for one in experiments:
+        for channel, values in zip(one.output_channels, one.counted_outputs, strict=True):
+            if not np.any(values):
+                raise ConfigurationError(
+                    f"{one.name}: output {channel.name} is zero throughout (dead channel); leave it out with --outputs"
+                )
 
 
 def _check_files(paths: Sequence[Path], validation: Sequence[Path], *, needs_lines: bool) -> None:
