@@ -319,6 +319,10 @@ def test_progress_says_which_start_is_compared(capsys):
         ("predict F.h5 --frequency-response 0", "--frequency-response = 0: allowed is any number above 0, N"),
         ("predict F.h5 --sweep sweep.h5 --sweep sweep.h5", "--sweep = sweep.h5: is given twice"),
         ("predict F.h5 --voltage-response 0.1", "--voltage-response: gives a voltage, and F.h5 is driven by a force"),
+        (
+            f"predict F.h5 --planned-sweep {SWEEP_PLAN}",
+            "--planned-sweep: gives a voltage, and F.h5 is driven by a force; add --exciter",
+        ),
         ("predict F.h5 --multisine lines.h5 --exciter F.h5", "--exciter: means nothing to --multisine"),
         ("predict F.h5 --sweep lines.h5", "lines.h5: holds a multisine, wanted is a sweep recording"),
         ("predict F.h5 --multisine sweep.h5", "sweep.h5: holds a sweep, wanted is a multisine recording"),
