@@ -25,6 +25,7 @@ TRIES = 5
 ANSWER_S = 0.1
 DOUBLED_ANSWERS = 8  # a single one may be a frame that the wire has repeated
 WAITING_BLOCKS = 4096
+REMEMBERED_ANSWERS = 16  # a second device may be slower than the first by several requests
 
 
 class Dialogue:
@@ -42,8 +43,7 @@ class Dialogue:
         self.retries = 0
         self.stray_answers = 0
         self._doubled = 0
-        self._sent = 0
-        self._last: Answer | None = None
+        self._answered: deque[tuple[Answer, int]] = deque(maxlen=REMEMBERED_ANSWERS)  # and how often each was asked for
         self._number = time.monotonic_ns() // 1000 % 255  # another one than the last host's, most likely
 
     def ask(
@@ -57,11 +57,11 @@ class Dialogue:
     ) -> Answer:
         """The device's answer to a request, whatever its status; it is repeated after ``answer_s`` without one."""
         request = self.next_request(command, parameter, item, value)
-        for self._sent in range(1, tries + 1):
+        for sent in range(1, tries + 1):
             self.link.send(request)
             answer = self._answer_to(request, answer_s)
             if answer is not None:
-                self._last = answer
+                self._answered.append((answer, sent))
                 return answer
             self.retries += 1
         raise DaqTimeout(
@@ -115,10 +115,13 @@ class Dialogue:
     def note_stray(self, answer: Answer) -> None:
         """Count an answer that nobody waits for; `DaqProtocol` once it is plain that two devices answer."""
         self.stray_answers += 1
-        if self._last is None or answer.number != self._last.number or answer[2:4] != self._last[2:4]:
+        known = next(
+            (one for one in self._answered if (one[0].number, one[0][2:4]) == (answer.number, answer[2:4])), None
+        )
+        if known is None:
             return
-        if answer == self._last:
-            self._doubled += self._sent == 1
+        if answer == known[0]:
+            self._doubled += known[1] == 1
             if self._doubled < DOUBLED_ANSWERS:
                 return
         raise DaqProtocol(
