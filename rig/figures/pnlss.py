@@ -21,13 +21,19 @@ _FLOOR = 1e-6  # of the largest amplitude: what lies below is not shown
 
 
 def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
-    """Spectra on the left, one panel an output; on the right the fit's history, and the range that each run uses."""
-    left, right = cast(Any, page.subfigures(1, 2, width_ratios=(1.5, 1.0)))
-    _spectra(left, found.spectra, {channel.name: _unit(channel) for channel in found.model.outputs})
-    history, runs = right.subplots(2, 1)
-    _history(history, found.fit)
-    _runs(runs, found)
+    """Spectra on the left, one panel an output; on the right the fit's history, and the range that each run uses.
+
+    The history alone where a file holds nothing else, as those of a study.
+    """
     model = found.model
+    if found.spectra is None and not found.runs:
+        _history(page.subplots(), found.fit)
+    else:
+        left, right = cast(Any, page.subfigures(1, 2, width_ratios=(1.5, 1.0)))
+        _spectra(left, found.spectra, {channel.name: _unit(channel) for channel in model.outputs})
+        history, runs = right.subplots(2, 1)
+        _history(history, found.fit)
+        _runs(runs, found)
     inputs, outputs = (", ".join(channel.name for channel in side) for side in (model.inputs, model.outputs))
     title(
         page,

@@ -225,6 +225,9 @@ def test_a_figure_shows_spectra_course_and_range_of_what_the_file_holds(there, f
     drawn = np.concatenate([line.get_xydata() for line in runs.get_lines() if len(line.get_xdata()) <= 3])
     for run in found.runs:
         assert np.any(np.isclose(drawn, run.range_use)), run.name
+    page.clear()
+    draw_pnlss(page, replace(found, runs=(), linear_runs=(), spectra=None))
+    assert len(page.axes) == 1  # the course alone, no empty panels
 
 
 def test_a_response_that_is_cut_off_has_no_peak(there, force_model):
