@@ -1,7 +1,9 @@
 """Nonlinear features of states and inputs: monomials, and saturating functions of linear combinations.
 
-A model is linear in what its features give (`identification.pnlss.model`). Whatever is asked of features is asked here and
-in the kernels `feature_values` and `feature_derivatives`: a further kind of feature is a further loop in each of the two.
+A model is linear in what its features give (`identification.pnlss.model`). Simulation and harmonic balance ask the kernels
+`feature_values` and `feature_derivatives` for them; the fit, which needs derivatives at every sample, gathers those of
+monomials beforehand and has those of saturating features in `identification.pnlss.fitting.kernels`. A further kind of feature
+is a further loop in each of these.
 Monomials as in Paduart et al., Automatica 46, 2010; saturating features are the nonlinear feedback of an NL-LFR model
 (Schoukens and Toth, IFAC-PapersOnLine 53, 2020), with tanh.
 """
