@@ -12,6 +12,7 @@ import numpy as np
 
 from controller.law import Law
 from controller.layout import AmplitudeLaw
+from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.daq import DAQ, Capabilities
 from rig.drivers import make_daq
@@ -34,6 +35,7 @@ class TickSettings:
     settle: SettleRule
     segments: Sequence[Segment]
     waveforms: np.ndarray | None = None
+    exciter: PlantModel | None = None
     armed: bool = True
 
     def build(self, latency_samples: float) -> Tick:
@@ -46,6 +48,7 @@ class TickSettings:
             self.segments,
             self.bench.block + latency_samples,
             waveforms=self.waveforms,
+            exciter=self.exciter,
             armed=self.armed,
         )
 

@@ -26,8 +26,8 @@ from rig.tick.tick import Tick
 __all__ = ["Execution", "Progress", "Silent", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
-STARTS = {SegmentKind.START, SegmentKind.RAMP, SegmentKind.LEVEL_SWEEP}
-UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED}
+NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
+UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED, Outcome.NOT_SETTLED}
 OVER = {
     Outcome.DONE,
     Outcome.NOT_SETTLED,
@@ -230,12 +230,13 @@ class Execution:
 
     def _mark_unlocked(self) -> None:
         """Without a lock at the start voltage all that is left of the plan has failed, and for that reason."""
-        for segment, entry in zip(self.tick.arrays.segments, self.tick.outcomes, strict=True):
-            if int(segment["kind"]) in STARTS and int(entry["outcome"]) in UNLOCKED:
-                for target in self.targets:
-                    left = target.number not in self.measured_before
-                    if left and self.numbers[target.number] not in self.reported:
-                        self._report(failed_point(self.plan, target, entry, at_start=True))
+        if EndReason(int(self.tick.guard["reason"][0])) not in NO_LOCK:
+            return
+        entry = next(one for one in self.tick.outcomes[::-1] if int(one["outcome"]) in UNLOCKED)
+        for target in self.targets:
+            left = target.number not in self.measured_before
+            if left and self.numbers[target.number] not in self.reported:
+                self._report(failed_point(self.plan, target, entry, at_start=True))
 
     def _mark_interrupted(self) -> None:
         if self.in_one_go:

@@ -80,6 +80,11 @@ class KnownPlant(Levels):
     """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the bench's limits are
     refused."""
 
+    @property
+    def known_plant(self) -> PlantModel | None:
+        """Exciter and structure, where the plan knows them."""
+        return None if self.plant is None else self.plant.model
+
     def check_plant(self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float]) -> None:
         """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels out of its reach."""
         if self.plant is None:

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import AliasChoices, Field
 
 from controller import AmplitudeLaw, Law, OpenLoop
+from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.campaigns.levels import Levels
 from rig.configuration import Configured
@@ -91,6 +92,11 @@ class Plan(Configured):
     @abstractmethod
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """The segments that measure all points but those ``done`` already."""
+
+    @property
+    def known_plant(self) -> PlantModel | None:
+        """Exciter and structure, where the plan knows them."""
+        return None
 
     @property
     def evaluates_approach(self) -> bool:

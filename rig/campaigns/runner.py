@@ -190,5 +190,11 @@ def _remember_end(bench: Bench, loop: RunningLoop, output: Path) -> None:
 
 def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:
     return TickSettings(
-        bench, plan.law, plan.amplitude_law, plan.settle_rule, segments, plan.waveforms(bench.sample_rate_hz)
+        bench,
+        plan.law,
+        plan.amplitude_law,
+        plan.settle_rule,
+        segments,
+        plan.waveforms(bench.sample_rate_hz),
+        plan.known_plant,
     )

@@ -42,6 +42,8 @@ class EndReason(IntEnum):
     DRIVER_FAILED = 20
     SAMPLES_LOST = 21
     EMERGENCY_STOP = 22
+    LEVEL_NOT_FOLLOWED = 23
+    PLANT_CONTRADICTED = 24
 
     @property
     def is_trip(self) -> bool:
@@ -69,6 +71,8 @@ TEXT = {
     EndReason.DRIVER_FAILED: "the driver failed",
     EndReason.SAMPLES_LOST: "samples were lost for longer than is allowed",
     EndReason.EMERGENCY_STOP: "emergency stop",
+    EndReason.LEVEL_NOT_FOLLOWED: "the output rose and what it should hold did not follow",
+    EndReason.PLANT_CONTRADICTED: "force and motion are not those that the known plant gives for this output",
 }
 """One line for each reason."""
 

@@ -194,17 +194,22 @@ def give_up(
     segments: np.ndarray,
     outcomes: np.ndarray,
     settling: Record,
+    lock: Record,
     guard: Record,
     failure: int,
     cycle: float,
     sample: int,
 ) -> None:
-    """The present segment has failed: on to the next point, or end the run, as its plan wants it."""
+    """The present segment has failed: on to the next point, or end the run, as its plan wants it.
+
+    A loop that never had a lock and is as far off as one that feeds back the wrong way ends it, before the level rises.
+    """
     segment = segments[progress.segment]
     close_segment(progress, outcomes, settling, failure, cycle, sample)
-    if segment.kind == START or (is_ramp(segment.kind) and failure == OUTSIDE_WINDOW):
+    far_off = failure == OUTSIDE_WINDOW or lock.far_periods >= FAR_PERIODS
+    if segment.kind == START or (progress.unlocked == 1 and segment.drive == LOOP_DRIVE and far_off):
         progress.finished = 1
-        shut_down(guard, NO_LOCK if failure == NOT_LOCKED else NO_LOCK_IN_WINDOW, -1, 0.0, sample, False)
+        shut_down(guard, NO_LOCK_IN_WINDOW if failure == OUTSIDE_WINDOW else NO_LOCK, -1, 0.0, sample, False)
     elif (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
         progress.finished = 1
         shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
@@ -305,9 +310,9 @@ def advance(
         if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
         elif progress.unlocked == 1 and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE:
-            give_up(progress, segments, outcomes, settling, guard, OUTSIDE_WINDOW, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, OUTSIDE_WINDOW, cycle, sample)
         elif progress.frozen_cycles >= SATURATED_PERIODS:
-            give_up(progress, segments, outcomes, settling, guard, UNREACHABLE, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, UNREACHABLE, cycle, sample)
         return
     progress.level = segment.level
     if segment.kind == SWEEP:
@@ -323,15 +328,14 @@ def advance(
     if segment.kind == SETTLE or segment.kind == RECORD:
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
         if failure != RUNNING:
-            give_up(progress, segments, outcomes, settling, guard, failure, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, failure, cycle, sample)
             return
     if segment.kind == START and elapsed >= segment.periods:
         verdict = start_verdict(settling, lock, elapsed)
         if verdict == DONE:
-            progress.unlocked = 1
             close_segment(progress, outcomes, settling, DONE, cycle, sample)
         elif verdict != RUNNING:
-            give_up(progress, segments, outcomes, settling, guard, verdict, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, verdict, cycle, sample)
         return
     if segment.kind != SETTLE and elapsed >= segment.periods:
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end

@@ -149,4 +149,4 @@ PROGRESS = np.dtype(
     ]
 )
 """Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow,
-``unlocked``: no lock since the time at the start voltage."""
+``unlocked``: no lock was ever gained."""

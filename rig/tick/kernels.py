@@ -10,10 +10,12 @@ import numpy as np
 
 from controller.demodulation.kernels import adapt, demodulate, sign_product, turn_phasors
 from controller.kernels import TWO_PI, advance_phase, size, track, wrap
-from controller.layout import ADAPTIVE, SIGN
+from controller.layout import ADAPTIVE, SIGN, VOLTAGE
 from rig.daq import LOST
+from rig.safety.following.kernels import contradicts_exciter, permitted_level
 from rig.safety.kernels import (
     NON_FINITE_OUTPUT,
+    PLANT_CONTRADICTED,
     SENSOR_OVERLOAD,
     carry_motion,
     permitted_amplitude,
@@ -35,6 +37,7 @@ from vibrolock.compiled import Record, kernel
 
 STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
 HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
+SMALLEST_V = 1e-12  # no division by an output of nothing
 UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
 
 
@@ -151,6 +154,19 @@ def demodulate_inputs(t: TickArrays, cos_theta: float, sin_theta: float) -> None
 
 
 @kernel
+def judge_by_exciter(t: TickArrays, amplitude_v: float, turn: float, sample: int) -> None:
+    """Trip where the known exciter contradicts the output (V, rad) that force and drive show at this sample."""
+    law, loop, guard, following = t.law[0], t.loop[0], t.guard[0], t.following[0]
+    if guard.mode != ARMED or loop.drive == WAVEFORM:
+        return
+    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
+    sent = complex(amplitude_v * math.cos(turn), amplitude_v * math.sin(turn))
+    if contradicts_exciter(t.expected[0], following, sent, force, drive, law.demodulator_gain, law.dt_s):
+        ratio = size(following.needed) / max(size(following.late_sent), SMALLEST_V)
+        shut_down(guard, PLANT_CONTRADICTED, -1, ratio, sample, False)
+
+
+@kernel
 def oscillate(t: TickArrays, amplitude: float) -> float:
     """The output (V) of this sample, ``Re(U exp(i theta))``, and the oscillator one sample on.
 
@@ -208,6 +224,8 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         flags = take_in(t, volts, readings)
     if not lost or law.detector != ADAPTIVE:
         demodulate_inputs(t, cos_theta, sin_theta)
+        if t.expected[0].known == 1:
+            judge_by_exciter(t, seen.amplitude_v, seen.turn, now)
     thresholds = t.thresholds[0]
     present = loop.force_size >= thresholds.smallest_force_n and loop.response_size >= thresholds.smallest_response
     closed = present and loop.drive == LOOP_DRIVE
@@ -233,16 +251,17 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         loop.waveform = segment.waveform
     flags |= HELD if loop.held == 1 else 0
 
-    demanded = 0.0
+    demanded = allowed = 0.0
     if running:
         choose_frequency(t, present)
         flags |= FREQUENCY_CLAMPED if loop.clamped == 1 else 0
         if loop.drive != WAVEFORM:
             watch_frequency(guard, t.limits[0], loop.omega, now)
         demanded = demanded_amplitude(t, present)
+        allowed = demanded if loop.amplitude_law == VOLTAGE else permitted_level(t.following[0], demanded)
         flags |= SATURATED if loop.saturated == 1 else 0
     before, loop.turn_behind = guard.amplitude_v, 0
-    amplitude = permitted_amplitude(guard, t.limits[0], demanded, now)
+    amplitude = permitted_amplitude(guard, t.limits[0], allowed, now)
     if running and loop.demanded_turn != loop.turn:
         loop.turn = permitted_turn(t.limits[0], loop.turn, loop.demanded_turn, before, amplitude)
         if loop.turn != loop.demanded_turn:

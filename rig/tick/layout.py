@@ -133,7 +133,7 @@ def recorded_row(n_channels: int) -> np.dtype[Any]:
 
 
 class TickArrays(NamedTuple):
-    """Everything the tick reads and writes. The first seven are constants of the run, the rest is its state.
+    """Everything the tick reads and writes. The first eight are constants of the run, the rest is its state.
 
     ``waveforms`` [n, period]: periodic waveforms of unit peak that segments may play; [1, 1] without any. ``phasors``
     complex [H+1] and ``filters`` complex [2, H+1] belong to the adaptive filters of force and drive.
@@ -144,12 +144,14 @@ class TickArrays(NamedTuple):
     rule: np.ndarray
     limits: np.ndarray
     inputs: np.ndarray
+    expected: np.ndarray
     segments: np.ndarray
     waveforms: np.ndarray
     loop: np.ndarray
     lock: np.ndarray
     guard: np.ndarray
     watches: np.ndarray
+    following: np.ndarray
     settling: np.ndarray
     progress: np.ndarray
     outcomes: np.ndarray

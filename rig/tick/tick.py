@@ -7,8 +7,12 @@ import numpy as np
 
 from controller.law import Law
 from controller.layout import LOCK, AmplitudeLaw
+from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.errors import ConfigurationError
+from rig.safety.following.expected import expected_record
+from rig.safety.following.kernels import see_frequency
+from rig.safety.following.layout import FOLLOWING
 from rig.safety.kernels import is_over
 from rig.safety.limits import guard_record, input_records, limits_record, watch_records
 from rig.sequencer.layout import PROGRESS, SETTLING
@@ -24,8 +28,8 @@ class Tick:
     """The control state of a run.
 
     ``lead_samples`` is the way from an output computed by the tick to the input that shows it: the block plus the
-    device's latency, with its fraction. ``waveforms`` [n, period] are those of unit peak that segments play. ``armed`` false
-    keeps the output at 0 V.
+    device's latency, with its fraction. ``waveforms`` [n, period] are those of unit peak that segments play. Where a plant is
+    known its ``exciter`` is held against every fundamental. ``armed`` false keeps the output at 0 V.
 
     Raises `ConfigurationError` where the law does not fit the bench.
     """
@@ -40,6 +44,7 @@ class Tick:
         lead_samples: float,
         *,
         waveforms: np.ndarray | None = None,
+        exciter: PlantModel | None = None,
         armed: bool = True,
     ) -> None:
         try:
@@ -64,11 +69,15 @@ class Tick:
         loop["omega"] = law_record["centre_rad_s"] if first is None else 2.0 * math.pi * first.frequency_hz
         progress = np.zeros(1, PROGRESS)
         progress["omega"] = loop["omega"]
+        progress["unlocked"] = 1
         progress["lag"] = table["lag_rad"][:1] if len(segments) else lag_rad
         loop["drive"] = table["drive"][:1]
         loop["log_integral"] = math.log(float(law_record["smallest_v"][0]))
         harmonics = int(law_record["harmonics"][0])
         progress["segments"] = len(segments)
+        expected, following = expected_record(bench, smallest[force], smallest[drive], exciter), np.zeros(1, FOLLOWING)
+        following["reference_v"] = expected["floor_v"]
+        see_frequency(expected[0], following[0], float(loop["omega"][0]))
         self.bench = bench
         self.arrays = TickArrays(
             law=law_record,
@@ -76,12 +85,14 @@ class Tick:
             rule=settle.build(),
             limits=limits_record(bench),
             inputs=input_records(bench),
+            expected=expected,
             segments=table,
             waveforms=np.zeros((1, 1)) if waveforms is None else np.ascontiguousarray(waveforms, float),
             loop=loop,
             lock=np.zeros(1, LOCK),
             guard=guard_record(armed),
             watches=watch_records(len(bench.channels)),
+            following=following,
             settling=np.zeros(1, SETTLING),
             progress=progress,
             outcomes=outcomes,

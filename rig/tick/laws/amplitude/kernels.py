@@ -14,6 +14,7 @@ from controller.layout import (
     RESPONSE,
     VOLTAGE,
 )
+from rig.safety.following.kernels import begin_to_follow
 from rig.sequencer.layout import LOOP_DRIVE, TONE
 from rig.tick.layout import TickArrays
 from vibrolock.compiled import Record, kernel
@@ -51,6 +52,7 @@ def take_over(t: TickArrays, segment: Record) -> None:
     loop.demanded_turn = loop.turn
     loop.turn_behind = 0
     amplitude = t.guard[0].amplitude_v
+    begin_to_follow(t.expected[0], t.following[0], amplitude, 0.0, 0.0)
     progress.level = amplitude if loop.amplitude_law == VOLTAGE else controlled_size(t)
     loop.force_integral = amplitude
     loop.log_integral = complex(math.log(min(max(amplitude, law.smallest_v), law.largest_v)), loop.turn)

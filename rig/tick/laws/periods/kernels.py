@@ -8,6 +8,9 @@ from controller.layout import (
     VOLTAGE,
 )
 from controller.lock.kernels import next_lock_state
+from rig.safety.following.kernels import follow_level, see_frequency
+from rig.safety.kernels import LEVEL_NOT_FOLLOWED, shut_down
+from rig.safety.layout import ARMED
 from rig.sequencer.kernels import judge_period
 from rig.sequencer.layout import TONE, WAVEFORM
 from rig.tick.laws.amplitude.kernels import controlled_size
@@ -24,6 +27,19 @@ def add_to_period(t: TickArrays) -> None:
     loop.sum_force += loop.force_size
     loop.sum_controlled += controlled_size(t)
     loop.sum_samples += 1
+
+
+@kernel
+def judge_following(t: TickArrays, held: float, force: float, response: float) -> None:
+    """The means of a period: trip where a law that holds a level raises the output and what it holds stays away."""
+    loop, law, guard, following = t.loop[0], t.loop[0].amplitude_law, t.guard[0], t.following[0]
+    see_frequency(t.expected[0], following, loop.omega)
+    if law == VOLTAGE or guard.mode != ARMED:
+        return
+    wanted = t.progress[0].level
+    if follow_level(t.expected[0], following, guard.amplitude_v, wanted, held, force, response, law):
+        channel = loop.drive_channel if law == RESPONSE else loop.force_channel
+        shut_down(guard, LEVEL_NOT_FOLLOWED, channel, response if law == RESPONSE else held, loop.sample, False)
 
 
 @kernel
@@ -54,6 +70,7 @@ def close_period(t: TickArrays, present: bool) -> None:
             loop.clamped == 1,
             open_loop or loop.amplitude_law == RESPONSE,
         )
+        judge_following(t, loop.sum_controlled / n, loop.sum_force / n, loop.sum_response / n)
     loop.sum_error = 0.0
     loop.sum_response = 0.0
     loop.sum_force = 0.0

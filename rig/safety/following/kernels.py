@@ -1,0 +1,134 @@
+"""Compiled watch: do force and motion follow the output, as the plant, known or just measured, says?
+
+Two witnesses. A linear exciter obeys ``u = alpha(s) F + beta(s) A`` whatever the structure does; where alpha and beta are known,
+every fundamental is held against them (`contradicts_exciter`). Where they are not, the output that sufficed a moment ago is
+what was just measured: a law that holds a force or a response may not raise its output to more than `LARGEST_RISE` times that
+while what it holds does not follow (`follow_level`).
+"""
+
+import math
+
+import numpy as np
+
+from controller.kernels import TWO_PI, size
+from controller.layout import RESPONSE
+from vibrolock.compiled import Record, kernel
+
+LARGEST_RISE = 2.0  # of the output above what last sufficed, and so also within one period
+ASTRAY_RISE = 1.5  # from here on, or with less than half of what there was, a level that does not follow is astray
+ASTRAY_PART = 0.5
+ASTRAY_PERIODS = 10
+IN_ORDER = 0.75  # of its level: a held quantity that has so much follows
+GROWN = 1.1  # times what there was: it follows, although it is far from its level
+JUMPED = 1.3  # a force may fall where the vibration grows by so much more than the output: a jump past a turning point
+VANISHED = 0.15  # of its level: a force that low is not what such a jump leaves
+UNLIKE = 0.6  # of the largest of output sent and terms of the known exciter
+UNLIKE_PERIODS = 1.0  # of the mode under test, for which it must last
+
+
+@kernel
+def polynomial(coefficients: np.ndarray, z: complex) -> tuple[complex, complex]:
+    """``c_0 + c_1 z + c_2 z^2 + c_3 z^3`` and its derivative."""
+    c0, c1, c2, c3 = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    return complex(c0 + z * (c1 + z * (c2 + z * c3))), complex(c1 + z * (2.0 * c2 + z * 3.0 * c3))
+
+
+@kernel
+def see_frequency(expected: Record, following: Record, omega: float) -> None:
+    """Once a period: the known exciter at the frequency of the moment (rad/s), zero outside the band it was measured in.
+
+    ``alpha``, ``beta`` and their derivatives by s, from polynomials in ``z = s/centre``, beta's divided by z^2.
+    """
+    following.alpha = following.beta = following.alpha_rate = following.beta_rate = 0.0
+    if expected.known == 0 or not expected.lowest_rad_s <= omega <= expected.highest_rad_s:
+        return
+    z = complex(0.0, omega / expected.centre_rad_s)
+    force_turn, drive_turn = omega * expected.force_skew_s, omega * expected.drive_skew_s
+    of_force = complex(math.cos(force_turn), math.sin(force_turn))
+    of_drive = complex(math.cos(drive_turn), math.sin(drive_turn))
+    alpha, alpha_slope = polynomial(expected.force_v_n, z)
+    beta, beta_slope = polynomial(expected.acceleration_v_s2_m, z)
+    following.alpha = alpha * of_force
+    following.beta = beta / (z * z) * of_drive
+    following.alpha_rate = alpha_slope / expected.centre_rad_s * of_force
+    following.beta_rate = (beta_slope - 2.0 * beta / z) / (z * z) / expected.centre_rad_s * of_drive
+
+
+@kernel
+def contradicts_exciter(
+    expected: Record, following: Record, sent: complex, force: complex, drive: complex, gain: float, dt_s: float
+) -> bool:
+    """Once a sample: whether the known exciter has contradicted the output for the time of a period.
+
+    ``sent`` is the complex output (V) whose effect ``force`` (N) and ``drive`` (m/s^2) show. It passes the low-pass of their
+    detector, of step ``gain``; all three pass one more, for amplitudes that change: ``U = alpha F + alpha' dF/dt + beta A +
+    beta' dA/dt``. What is below the noise is not judged.
+    """
+    following.sent += gain * (sent - following.sent)
+    following.late_sent += gain * (following.sent - following.late_sent)
+    force_step, drive_step = gain * (force - following.late_force), gain * (drive - following.late_drive)
+    following.late_force += force_step
+    following.late_drive += drive_step
+    for_force, for_motion = following.alpha * following.late_force, following.beta * following.late_drive
+    for_change = (following.alpha_rate * force_step + following.beta_rate * drive_step) / dt_s
+    following.needed = for_force + for_motion + for_change
+    most = max(size(following.late_sent), size(for_force), size(for_motion), size(for_change))
+    noise = size(following.alpha) * expected.noise_n + size(following.beta) * expected.noise_m_s2
+    unlike = noise > 0.0 and most > noise and size(following.late_sent - following.needed) > UNLIKE * most
+    following.unlike_s = following.unlike_s + dt_s if unlike else 0.0
+    following.most_unlike_s = max(following.most_unlike_s, following.unlike_s)
+    return bool(following.unlike_s > UNLIKE_PERIODS * TWO_PI / expected.centre_rad_s)
+
+
+@kernel
+def begin_to_follow(expected: Record, following: Record, amplitude_v: float, level: float, other: float) -> None:
+    """A law begins to hold a level: what there is now is what the output (V) has sufficed for so far."""
+    following.reference_v = max(amplitude_v, expected.floor_v)
+    following.reference_level = level
+    following.reference_other = other
+    following.astray_periods = 0
+
+
+@kernel
+def follow_level(
+    expected: Record,
+    following: Record,
+    amplitude_v: float,
+    wanted: float,
+    held: float,
+    force: float,
+    response: float,
+    law: int,
+) -> bool:
+    """Once a period: take in what is held; returns whether it has gone astray for `ASTRAY_PERIODS`.
+
+    ``amplitude_v`` is the output, ``held`` what should be ``wanted`` (N or m), ``force`` (N) and ``response`` (m/s^2) the
+    fundamentals. It follows where it is near its level, or has grown. A force also does where the vibration has grown by more
+    than the output has risen: so a structure jumps past a turning point, at which its force drops. It has gone astray where
+    the output rises and it stays, or where it falls to a half although the output has not fallen.
+    """
+    visible = (
+        response >= expected.visible_m_s2 if law == RESPONSE else force >= min(expected.visible_n, IN_ORDER * wanted)
+    )
+    other = force if law == RESPONSE else response
+    rise = amplitude_v / following.reference_v
+    jumped = (
+        law != RESPONSE and held >= VANISHED * wanted and other > JUMPED * following.reference_other * max(rise, 1.0)
+    )
+    if visible and (held >= IN_ORDER * wanted or held >= GROWN * following.reference_level or jumped):
+        begin_to_follow(expected, following, amplitude_v, held, other)
+        return False
+    fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level and rise >= 1.0
+    if rise >= ASTRAY_RISE or fallen:
+        following.astray_periods += 1
+        following.largest_rise = max(following.largest_rise, rise)
+        following.most_periods = max(following.most_periods, following.astray_periods)
+    else:
+        following.astray_periods = max(following.astray_periods - 1, 0)
+    return bool(following.astray_periods >= ASTRAY_PERIODS)
+
+
+@kernel
+def permitted_level(following: Record, demanded_v: float) -> float:
+    """Output amplitude (V) that a law which holds a level may ask for."""
+    return min(demanded_v, LARGEST_RISE * following.reference_v)
