@@ -57,7 +57,10 @@ TEXT = {
     EndReason.STOP_REQUESTED: "stopped by request",
     EndReason.PLAN_STOPPED: "stopped by the plan's rule after a point failed",
     EndReason.NO_LOCK_IN_WINDOW: "no lock at the start voltage: the frequency stands at an end of its window",
-    EndReason.NO_LOCK: "no lock at the start voltage: the phase error stays large (start_periods may be too short)",
+    EndReason.NO_LOCK: (
+        "no lock at the start voltage: the phase error stays large, or force or drive is too small to be read "
+        "(start_periods may be too short)"
+    ),
     EndReason.FORCE_LIMIT: "force above its limit",
     EndReason.RESPONSE_LIMIT: "response above its limit",
     EndReason.DISPLACEMENT_LIMIT: "displacement above its limit",

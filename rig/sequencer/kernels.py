@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from controller.layout import LOCKED, LOST, VOLTAGE
+from controller.layout import LOCKED, LOST, SEARCHING, VOLTAGE
 from controller.lock.kernels import reacquire
 from rig.safety.kernels import shut_down
 from rig.safety.layout import ARMED, EndReason
@@ -142,11 +142,13 @@ def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed:
 def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
     """Whether the time at the start voltage, over by its length, ends: DONE, a failure's code, or RUNNING while in doubt.
 
-    No lock is needed, for one may swing in and out at plain voltage. Refused is a frequency that stands at an end of its
+    No lock is needed, for one may swing in and out at plain voltage. Refused is a force or motion too small to be read, a frequency that stands at an end of its
     window for 20 periods, or a phase error that was that of a lost lock in every period so far, for 100 at the least.
     """
     if lock.state == LOCKED:
         return DONE
+    if lock.state == SEARCHING:
+        return NOT_SETTLED
     if settling.clamped_in_row >= CLAMPED_PERIODS:
         return OUTSIDE_WINDOW
     always_far = lock.far_periods > 0 and lock.far_periods >= math.floor(elapsed) - 1

@@ -13,6 +13,7 @@ __all__ = ["expected_record"]
 VISIBLE = 8.0  # times the smallest amplitude of which a phase can be read: about three bits of the converter
 JUDGED = 16.0  # times that smallest amplitude, and
 NOISES = 8.0  # times the noise that the bench states for a channel (RMS), from which on the exciter is judged
+TOLD_APART = 3.0
 FLOOR_PART = 0.025  # of the largest voltage: where the output may always be
 
 
@@ -36,5 +37,23 @@ def expected_record(
         out["known"] = 1
         out["force_v_n"], out["acceleration_v_s2_m"] = exciter.force_v_n, exciter.acceleration_v_s2_m
         out["centre_rad_s"] = exciter.centre_rad_s
-        out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * end for end in exciter.band_hz)
+        out["lowest_rad_s"], out["highest_rad_s"] = known_band_rad_s(exciter)
     return out
+
+
+def known_band_rad_s(plant: PlantModel) -> tuple[float, float]:
+    """Lowest and highest frequency (rad/s) at which a linear test has told alpha from beta.
+
+    Of ``u = (alpha + beta Y) F`` it has seen the sum. Beta stands out where the structure resonates, and is extrapolated
+    elsewhere: on the magnet beam, 3 % above the resonance, it is off by a factor of three. So the band is that in which
+    ``|beta Y|`` is `TOLD_APART` times ``|alpha|``, and half a bandwidth on each side of the resonance at the least.
+    """
+    lock, half = plant.lock_frequency_rad_s(), plant.damping_ratio * plant.frequency_rad_s
+    omega = lock + half * np.linspace(-50.0, 50.0, 2001)
+    omega = omega[(omega > 2.0 * math.pi * plant.band_hz[0]) & (omega < 2.0 * math.pi * plant.band_hz[1])]
+    alpha, beta = plant.exciter(1j * omega)
+    told = np.abs(beta * plant.accelerance(1j * omega)) >= TOLD_APART * np.abs(alpha)
+    apart = omega[~told]
+    lowest = max(apart[apart < lock], default=omega[0])
+    highest = min(apart[apart > lock], default=omega[-1])
+    return float(min(lowest, lock - half)), float(max(highest, lock + half))

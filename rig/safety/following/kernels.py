@@ -1,9 +1,9 @@
-"""Compiled watch: do force and motion follow the output, as the plant, known or just measured, says?
+"""Compiled watch whether force and motion follow the output, as the plant, known or just measured, says.
 
-Two witnesses. A linear exciter obeys ``u = alpha(s) F + beta(s) A`` whatever the structure does; where alpha and beta are known,
-every fundamental is held against them (`contradicts_exciter`). Where they are not, the output that sufficed a moment ago is
-what was just measured: a law that holds a force or a response may not raise its output to more than `LARGEST_RISE` times that
-while what it holds does not follow (`follow_level`).
+There are two witnesses. A linear exciter obeys ``u = alpha(s) F + beta(s) A`` whatever the structure does. Where alpha and beta
+are known, every fundamental is held against them (`contradicts_exciter`). Where they are not, the output that sufficed a
+moment ago is what was just measured. A law that holds a force or a response may not raise its output beyond `LARGEST_RISE`
+times that while what it holds does not follow (`follow_level`).
 """
 
 import math
@@ -15,10 +15,12 @@ from controller.layout import RESPONSE
 from vibrolock.compiled import Record, kernel
 
 LARGEST_RISE = 2.0  # of the output above what last sufficed, and so also within one period
-ASTRAY_RISE = 1.5  # from here on, or with less than half of what there was, a level that does not follow is astray
+CREEP = 1.05  # a period: so fast may an output rise by which a held quantity stays at its level
+ASTRAY_RISE = 1.5  # from here on a level that does not follow is astray, or with less than half of what there was
 ASTRAY_PART = 0.5
 ASTRAY_PERIODS = 10
-IN_ORDER = 0.75  # of its level: a held quantity that has so much follows
+IN_ORDER = 0.9  # of its level: a held quantity that has so much follows
+TOO_MUCH = 1.5  # times its level: a law that raises its output then holds something else than it reads
 GROWN = 1.1  # times what there was: it follows, although it is far from its level
 JUMPED = 1.3  # a force may fall where the vibration grows by so much more than the output: a jump past a turning point
 VANISHED = 0.15  # of its level: a force that low is not what such a jump leaves
@@ -99,27 +101,35 @@ def follow_level(
     force: float,
     response: float,
     law: int,
+    slipping: bool,
+    may_jump: bool,
 ) -> bool:
-    """Once a period: take in what is held; returns whether it has gone astray for `ASTRAY_PERIODS`.
+    """Once a period: take in what is held; returns whether it has been astray for `ASTRAY_PERIODS`.
 
     ``amplitude_v`` is the output, ``held`` what should be ``wanted`` (N or m), ``force`` (N) and ``response`` (m/s^2) the
-    fundamentals. It follows where it is near its level, or has grown. A force also does where the vibration has grown by more
-    than the output has risen: so a structure jumps past a turning point, at which its force drops. It has gone astray where
-    the output rises and it stays, or where it falls to a half although the output has not fallen.
+    fundamentals; ``slipping``: a lock is about to be lost, so that nothing may be learned.
+
+    What is held follows where it has grown towards its level, or is near it while the output creeps. At a frequency that the
+    plan gives (``may_jump``) a force also does where the vibration has grown by more than the output has risen: so a structure
+    jumps past a turning point, at which its force drops. It is astray where the output rises and it stays, where it falls to a half although the output has not fallen, or where
+    there is too much of it and the output has not fallen.
     """
-    visible = (
-        response >= expected.visible_m_s2 if law == RESPONSE else force >= min(expected.visible_n, IN_ORDER * wanted)
-    )
+    smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
+    visible = (response if law == RESPONSE else force) >= smallest
     rise = amplitude_v / following.reference_v
-    jumped = (
-        law != RESPONSE and held >= VANISHED * wanted and other > JUMPED * following.reference_other * max(rise, 1.0)
-    )
-    if visible and (held >= IN_ORDER * wanted or held >= GROWN * following.reference_level or jumped):
-        begin_to_follow(expected, following, amplitude_v, held, other)
-        return False
-    fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level and rise >= 1.0
-    if rise >= ASTRAY_RISE or fallen:
+    too_much = held > TOO_MUCH * wanted
+    if visible and not too_much and not slipping:
+        jumped = may_jump and law != RESPONSE and held >= VANISHED * wanted
+        jumped = jumped and other > JUMPED * following.reference_other * max(rise, 1.0)
+        if jumped or GROWN * following.reference_level <= held <= GROWN * wanted:
+            begin_to_follow(expected, following, amplitude_v, held, other)
+            return False
+        if held >= IN_ORDER * wanted:
+            begin_to_follow(expected, following, min(amplitude_v, CREEP * following.reference_v), held, other)
+            return False
+    fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level
+    if rise >= ASTRAY_RISE or (rise >= 1.0 and (fallen or (visible and too_much))):
         following.astray_periods += 1
         following.largest_rise = max(following.largest_rise, rise)
         following.most_periods = max(following.most_periods, following.astray_periods)
@@ -131,4 +141,4 @@ def follow_level(
 @kernel
 def permitted_level(following: Record, demanded_v: float) -> float:
     """Output amplitude (V) that a law which holds a level may ask for."""
-    return min(demanded_v, LARGEST_RISE * following.reference_v)
+    return float(min(demanded_v, LARGEST_RISE * following.reference_v))

@@ -21,10 +21,10 @@ EXPECTED = np.dtype(
         ("drive_skew_s", "f8"),
     ]
 )
-"""What is known beforehand (one record). ``known``: whether there is an exciter ``u = alpha F + beta A``, with its coefficients as
-in `controller.tuning.PlantModel` and the band in which they hold. ``noise_``: amplitudes below which it is not judged by.
-``visible_``: amplitudes from which on a force or acceleration is told from noise. ``floor_v``: output that is never too much. ``_skew_s``: delays of
-the two channels."""
+"""What is known beforehand (one record). ``known``: whether there is an exciter ``u = alpha F + beta A``, with its
+coefficients as in `controller.tuning.PlantModel` and the band in which they hold. ``noise_``: amplitudes below which it is
+not judged by. ``visible_``: amplitudes from which on a force or acceleration is told from noise. ``floor_v``: output that is
+never too much. ``_skew_s``: delays of the two channels."""
 
 FOLLOWING = np.dtype(
     [

@@ -135,7 +135,7 @@ def test_an_amplifier_that_falls_out_trips_before_the_output_has_doubled(plan):
 
 @pytest.mark.parametrize("plan", ["magnet-beam/stepped-phase", "magnet-beam/stepped-phase-fast"])
 def test_with_a_load_cell_that_is_dead_from_the_start_the_output_stays_near_the_floor(plan):
-    daq, tick, bench = _run(plan, 0.0, readings=_noise_of(FORCE_CHANNEL))
+    daq, tick, _ = _run(plan, 0.0, readings=_noise_of(FORCE_CHANNEL))
     floor_v = float(tick.arrays.expected["floor_v"][0])
     assert EndReason(int(tick.guard["reason"][0])) is not EndReason.STOP_REQUESTED
     assert daq.peaks_v()[1] <= LARGEST_RISE * 1.02 * max(floor_v, load_plan(plan).start_v or 0.0)
@@ -217,23 +217,27 @@ def test_the_output_of_a_held_level_at_most_doubles_within_a_period(factor, peri
         allowed = permitted_level(following, factor * amplitude)
         assert allowed <= LARGEST_RISE * max(amplitude, float(expected["floor_v"]))
         amplitude = allowed
-        assert not follow_level(expected, following, amplitude, amplitude, amplitude, amplitude, 10.0, FORCE)
+        assert not follow_level(
+            expected, following, amplitude, amplitude, amplitude, amplitude, 10.0, FORCE, False, False
+        )
 
 
 @pytest.mark.parametrize("law", [FORCE, RESPONSE])
 def test_what_does_not_follow_goes_astray_after_the_stated_number_of_periods(law):
     expected, following = _fresh()
-    assert not follow_level(expected, following, 1.0, 1.0, 1.0, 1.0, 1.0, law)
-    found = [follow_level(expected, following, 1.6, 1.0, 0.6, 0.6, 0.6, law) for _ in range(ASTRAY_PERIODS)]
+    assert not follow_level(expected, following, 1.0, 1.0, 1.0, 1.0, 1.0, law, False, False)
+    found = [
+        follow_level(expected, following, 1.6, 1.0, 0.6, 0.6, 0.6, law, False, False) for _ in range(ASTRAY_PERIODS)
+    ]
     assert found == [False] * (ASTRAY_PERIODS - 1) + [True]
 
 
 def test_a_force_that_drops_while_the_vibration_jumps_follows():
     expected, following = _fresh()
-    assert not follow_level(expected, following, 1.0, 1.0, 1.0, 1.0, 1.0, FORCE)
+    assert not follow_level(expected, following, 1.0, 1.0, 1.0, 1.0, 1.0, FORCE, False, True)
     for step in range(3 * ASTRAY_PERIODS):
         response = 1.0 + 0.2 * step
-        assert not follow_level(expected, following, 1.0 + 0.02 * step, 1.0, 0.3, 0.3, response, FORCE)
+        assert not follow_level(expected, following, 1.0 + 0.02 * step, 1.0, 0.3, 0.3, response, FORCE, False, True)
 
 
 def test_frequencies_outside_the_band_of_the_known_plant_are_not_judged():

@@ -36,8 +36,9 @@ def judge_following(t: TickArrays, held: float, force: float, response: float) -
     see_frequency(t.expected[0], following, loop.omega)
     if law == VOLTAGE or guard.mode != ARMED:
         return
-    wanted = t.progress[0].level
-    if follow_level(t.expected[0], following, guard.amplitude_v, wanted, held, force, response, law):
+    wanted, volts = t.progress[0].level, guard.amplitude_v
+    slipping, tone = t.lock[0].state == LOCKED and t.lock[0].far_periods > 0, loop.drive == TONE
+    if follow_level(t.expected[0], following, volts, wanted, held, force, response, law, slipping, tone):
         channel = loop.drive_channel if law == RESPONSE else loop.force_channel
         shut_down(guard, LEVEL_NOT_FOLLOWED, channel, response if law == RESPONSE else held, loop.sample, False)
 
