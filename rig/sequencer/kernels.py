@@ -142,8 +142,9 @@ def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed:
 def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
     """Whether the time at the start voltage, over by its length, ends: DONE, a failure's code, or RUNNING while in doubt.
 
-    No lock is needed, for one may swing in and out at plain voltage. Refused is a force or motion too small to be read, a frequency that stands at an end of its
-    window for 20 periods, or a phase error that was that of a lost lock in every period so far, for 100 at the least.
+    No lock is needed, for one may swing in and out at plain voltage. Refused is a force or motion too small to be read, a
+    frequency that stands at an end of its window for 20 periods, or a phase error that was that of a lost lock in every
+    period so far, for 100 at the least.
     """
     if lock.state == LOCKED:
         return DONE

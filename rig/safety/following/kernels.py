@@ -109,10 +109,10 @@ def follow_level(
     ``amplitude_v`` is the output, ``held`` what should be ``wanted`` (N or m), ``force`` (N) and ``response`` (m/s^2) the
     fundamentals; ``slipping``: a lock is about to be lost, so that nothing may be learned.
 
-    What is held follows where it has grown towards its level, or is near it while the output creeps. At a frequency that the
-    plan gives (``may_jump``) a force also does where the vibration has grown by more than the output has risen: so a structure
-    jumps past a turning point, at which its force drops. It is astray where the output rises and it stays, where it falls to a half although the output has not fallen, or where
-    there is too much of it and the output has not fallen.
+    What is held follows where it has grown towards its level, or is near it while the output creeps. At a frequency that
+    the plan gives (``may_jump``) a force also does where the vibration has grown by more than the output has risen: so a
+    structure jumps past a turning point, at which its force drops. It is astray where the output rises and it stays, where it
+    falls to a half although the output has not fallen, or where there is too much of it and the output has not fallen.
     """
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
