@@ -54,6 +54,20 @@ def test_with_a_reversed_sensor_the_run_ends_near_the_start_voltage_and_asks_for
     assert end["skipped"].startswith(f"{len(points)} of {len(points)} points skipped: ")
 
 
+@pytest.mark.parametrize("role", ["force", "drive"])
+def test_a_reversed_sensor_in_voltage_control_is_noticed_at_the_lowest_level(role):
+    lowest_v = min(load_plan("magnet-beam/backbone").levels)
+    with rig.run("magnet-beam/backbone", bench=_reversed("magnet-beam", role)) as run:
+        part, points = run.recording.parts[0], run.recording.points
+        highest_v, highest_n = np.abs(part.rows("command_v")).max(), np.abs(part.rows("inputs")[:, 0]).max()
+    assert part.end["reason"] in ("no_lock", "no_lock_in_window")
+    assert highest_v < 1.001 * lowest_v
+    assert highest_n < 1.0
+    assert "polarity" in part.end["text"]
+    assert not any(point["accepted"] for point in points)
+    assert len(points) == 13
+
+
 def _verdict(state, clamped, far, elapsed):
     settling, lock = np.zeros(1, SETTLING), np.zeros(1, LOCK)
     settling["clamped_in_row"], lock["state"], lock["far_periods"] = clamped, state, far
@@ -71,7 +85,7 @@ def _verdict(state, clamped, far, elapsed):
         (LockState.ACQUIRING, 0, 40, 40.0, Outcome.RUNNING),
         (LockState.ACQUIRING, 0, 10, 10.0, Outcome.RUNNING),
         (LockState.ACQUIRING, 0, 30, 40.0, Outcome.DONE),  # it was close once: a lock that swings
-        (LockState.SEARCHING, 0, 0, 40.0, Outcome.DONE),
+        (LockState.SEARCHING, 0, 0, 40.0, Outcome.NOT_SETTLED),
     ],
 )
 def test_a_start_is_refused_only_where_there_was_no_sign_of_a_lock(state, clamped, far, elapsed, outcome):

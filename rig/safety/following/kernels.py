@@ -19,12 +19,14 @@ CREEP = 1.05  # a period: so fast may an output rise by which a held quantity st
 ASTRAY_RISE = 1.5  # from here on a level that does not follow is astray, or with less than half of what there was
 ASTRAY_PART = 0.5
 ASTRAY_PERIODS = 10
+RISEN = 1.2  # from here on an output has risen; a force that sags while a vibration builds up needs no more output
 IN_ORDER = 0.9  # of its level: a held quantity that has so much follows
 TOO_MUCH = 1.5  # times its level: a law that raises its output then holds something else than it reads
 GROWN = 1.1  # times what there was: it follows, although it is far from its level
 JUMPED = 1.3  # a force may fall where the vibration grows by so much more than the output: a jump past a turning point
 VANISHED = 0.15  # of its level: a force that low is not what such a jump leaves
 UNLIKE = 0.6  # of the largest of output sent and terms of the known exciter
+TOO_STRONG = 4.0  # times the output: what an amplifier of another gain makes of it, also while the vibration grows
 UNLIKE_PERIODS = 1.0  # of the mode under test, for which it must last
 
 
@@ -76,7 +78,9 @@ def contradicts_exciter(
     following.needed = for_force + for_motion + for_change
     most = max(size(following.late_sent), size(for_force), size(for_motion), size(for_change))
     noise = size(following.alpha) * expected.noise_n + size(following.beta) * expected.noise_m_s2
-    unlike = noise > 0.0 and most > noise and size(following.late_sent - following.needed) > UNLIKE * most
+    too_strong = size(following.needed) > max(TOO_STRONG * size(following.late_sent), noise)
+    unlike = most > noise and size(following.late_sent - following.needed) > UNLIKE * most
+    unlike = noise > 0.0 and (unlike or too_strong)
     following.unlike_s = following.unlike_s + dt_s if unlike else 0.0
     following.most_unlike_s = max(following.most_unlike_s, following.unlike_s)
     return bool(following.unlike_s > UNLIKE_PERIODS * TWO_PI / expected.centre_rad_s)
@@ -111,8 +115,8 @@ def follow_level(
 
     What is held follows where it has grown towards its level, or is near it while the output creeps. At a frequency that
     the plan gives (``may_jump``) a force also does where the vibration has grown by more than the output has risen: so a
-    structure jumps past a turning point, at which its force drops. It is astray where the output rises and it stays, where it
-    falls to a half although the output has not fallen, or where there is too much of it and the output has not fallen.
+    structure jumps past a turning point, at which its force drops. It is astray where the output has risen and it has stayed, has fallen
+    to a half, or is too much.
     """
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
@@ -129,7 +133,7 @@ def follow_level(
             begin_to_follow(expected, following, min(amplitude_v, CREEP * following.reference_v), held, other)
             return False
     fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level
-    if rise >= ASTRAY_RISE or (rise >= 1.0 and (fallen or (visible and too_much))):
+    if rise >= ASTRAY_RISE or (rise >= RISEN and (fallen or (visible and too_much))):
         following.astray_periods += 1
         following.largest_rise = max(following.largest_rise, rise)
         following.most_periods = max(following.most_periods, following.astray_periods)

@@ -16,6 +16,7 @@ from rig.loop import Loop
 from rig.safety.following.expected import expected_record
 from rig.safety.following.kernels import (
     ASTRAY_PERIODS,
+    CREEP,
     LARGEST_RISE,
     begin_to_follow,
     contradicts_exciter,
@@ -111,7 +112,7 @@ def test_a_load_cell_that_dies_under_force_control_trips_before_the_output_has_d
     daq, tick, bench = _run(plan, 20.0 if plan.startswith("magnet") else 4.0, readings=fault)
     before_v, peak_v = daq.peaks_v()
     assert EndReason(int(tick.guard["reason"][0])) is EndReason.LEVEL_NOT_FOLLOWED
-    assert peak_v <= LARGEST_RISE * 1.02 * before_v
+    assert peak_v <= LARGEST_RISE * CREEP**3 * before_v
     assert _periods_to_the_trip(daq, tick, bench) < 60.0
     assert "did not follow on channel force" in describe_end(tick.guard, bench)
 
@@ -121,7 +122,7 @@ def test_a_drive_sensor_that_dies_while_the_response_is_held_trips_before_the_ou
     daq, tick, bench = _run("magnet-beam/response-controlled", 20.0, readings=fault)
     before_v, peak_v = daq.peaks_v()
     assert EndReason(int(tick.guard["reason"][0])).is_trip
-    assert peak_v <= LARGEST_RISE * 1.02 * before_v
+    assert peak_v <= LARGEST_RISE * CREEP**3 * before_v
     assert _periods_to_the_trip(daq, tick, bench) < 60.0
 
 
@@ -130,7 +131,7 @@ def test_an_amplifier_that_falls_out_trips_before_the_output_has_doubled(plan):
     daq, tick, _ = _run(plan, 20.0, output=np.zeros_like)
     before_v, peak_v = daq.peaks_v()
     assert EndReason(int(tick.guard["reason"][0])).is_trip
-    assert peak_v <= LARGEST_RISE * 1.02 * before_v
+    assert peak_v <= LARGEST_RISE * CREEP**3 * before_v
 
 
 @pytest.mark.parametrize("plan", ["magnet-beam/stepped-phase", "magnet-beam/stepped-phase-fast"])
@@ -205,8 +206,17 @@ def test_the_exciter_is_held_against_amplitudes_that_grow_and_turn(rate, turn, r
         sent = growth * (alpha * force + beta * drive)
         contradicts_exciter(expected, following, sent, shown * force, shown * drive, gain, dt)
     terms = max(abs(alpha * force), abs(beta * drive)) * abs(growth)
-    second_order = abs((s - 1j * omega) / omega) ** 2
-    assert abs(complex(following["needed"]) - complex(following["late_sent"])) < (10.0 * second_order + 1e-6) * terms
+    missed = complex(following["needed"]) - complex(following["late_sent"])
+    behind = complex(following["late_force"])  # of a force of 1 N: both filters, and the growth
+    remainder = sum(_of_second_order(part, omega, s) * size for part, size in ((0, force), (1, drive)))
+    assert abs(missed - remainder * behind) < 2e-3 * terms
+
+
+def _of_second_order(part, omega, s):
+    """What a straight line through the exciter's alpha (0) or beta (1) at ``i omega`` is above its value at s."""
+    at, step = 1j * omega, 1e-3
+    here, ahead, back, there = (complex(PLANT.exciter(z)[part]) for z in (at, at + step, at - step, s))
+    return here + (ahead - back) / (2.0 * step) * (s - at) - there
 
 
 @given(factor=st.floats(2.0, 50.0), periods=st.integers(1, 40))
