@@ -33,7 +33,19 @@ class Case(NamedTuple):
         return not (plain and (virtual or self.levels == "N logarithmic") and "friction" not in self.levels)
 
 
-FRICTION = ("stuck", "open", "x0.1", "x10", "reversed", "dead", "clipped", "softer", "softening", "raises", "loses-some")
+FRICTION = (
+    "stuck",
+    "open",
+    "x0.1",
+    "x10",
+    "reversed",
+    "dead",
+    "clipped",
+    "softer",
+    "softening",
+    "raises",
+    "loses-some",
+)
 
 
 def _levels(fault: Fault, device: str) -> tuple[str, ...]:

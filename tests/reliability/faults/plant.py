@@ -41,13 +41,17 @@ class BrokenRig:
     displacement (m) of the drive point, of no sensor.
     """
 
-    def __init__(self, rig: VirtualRig, bench: Bench, seed: int, fault: Fault | None, onset: int, needed_v: float) -> None:
+    def __init__(
+        self, rig: VirtualRig, bench: Bench, seed: int, fault: Fault | None, onset: int, needed_v: float
+    ) -> None:
         self.arrays, self.state = rig.build(seed)
         self._rig, self._bench, self._seed = rig, bench, seed
         self._fault, self._onset, self._needed_v = fault, NEVER if fault is None else onset, needed_v
         drive = rig.shape(rig.stinger.at)
         self._observe = pad(np.array([rig.plant.force_row(), rig.plant.displacement_row(drive)]).T)
-        self._index = next((i for i, c in enumerate(bench.channels) if fault is not None and c.role == fault.part), None)
+        self._index = next(
+            (i for i, c in enumerate(bench.channels) if fault is not None and c.role == fault.part), None
+        )
         self._last_v = self._last_out_v = 0.0
         self.first = 0
         self.sent: list[np.ndarray] = []

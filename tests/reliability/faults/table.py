@@ -74,7 +74,10 @@ DRIVER = {
 }
 
 FAULTS: tuple[Fault, ...] = (
-    *(Fault(role, kind, at, SENSORS[kind]) for role, kind, at in product(("force", "drive", "response"), SENSORS, BOTH)),
+    *(
+        Fault(role, kind, at, SENSORS[kind])
+        for role, kind, at in product(("force", "drive", "response"), SENSORS, BOTH)
+    ),
     *(
         Fault(role, kind, at, NOT_IN_COUNTS[kind], VIRTUAL)
         for role, kind, at in product(("force", "drive", "response"), NOT_IN_COUNTS, ("middle",))
