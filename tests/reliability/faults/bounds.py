@@ -100,7 +100,7 @@ def words_for(fault: Fault) -> tuple[str, ...]:
         "force": ("channel force", "load cell"),
         "drive": ("channel drive", "drive-point sensor"),
         "response": ("channel acc_",),
-        "amplifier": ("amplifier", "output", "does not follow"),
+        "amplifier": ("amplifier", "does not follow", "does not change while the rig is driven"),
         "structure": ("structure", "settle"),
     }
     driver = {
@@ -108,7 +108,7 @@ def words_for(fault: Fault) -> tuple[str, ...]:
         "raises": ("library of the device has failed",),
         "nan-block": ("not a number",),
         "loses-all": ("samples were lost",),
-        "drops-all": ("lost", "no samples"),
+        "drops-all": ("lost", "no samples", "watchdog"),
         "emergency-stop": ("emergency stop",),
         "unplugged": ("unplugged",),
         "reset": ("anew",),

@@ -109,6 +109,7 @@ class EmulatedRig(Watched, WireDAQ):
     def __init__(self, bench: Bench, seed: int, fault: Fault | None, onset: int, needed_v: float) -> None:
         super().__init__(bench, seed, WireOptions())
         self.fault, self.onset, self.handed = fault, onset, []
+        self._was_late = False
         self.wire = MemoryWire()
         self.clock = self.wire.clock
         plant = BrokenPlant(bench, seed, fault, onset, needed_v)
@@ -151,9 +152,9 @@ class EmulatedRig(Watched, WireDAQ):
         if self.due("drops-some") or self.due("drops-all"):
             every = LOST_OF_BLOCKS if self.due("drops-some") else 1
             sender._faults = Faults(drop_every=every, drop_burst=1)
-        elif self.due("late-block"):
-            first = self.broken.first - self.onset < self.block
-            sender._faults = Faults(late_every=1, late_s=LATE_S) if first else Faults()
+        elif self.due("late-block") and not self._was_late:
+            self._was_late = True
+            sender._faults = Faults(late_every=self.device._sampling.blocks + 1, late_s=LATE_S)
 
     def left_alone(self) -> None:
         """Time goes on without a host."""
