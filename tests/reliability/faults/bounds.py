@@ -114,6 +114,7 @@ def words_for(fault: Fault) -> tuple[str, ...]:
         "reset": ("anew",),
         "deaf": ("watchdog", "no answer"),
         "silent": ("silent", "no samples", "nothing"),
+        "repeats": ("on channel ",),
     }
     return (*own.get(fault.part, driver.get(fault.kind, ())), "phase lock lost", "no lock")
 

@@ -21,18 +21,17 @@ class Case(NamedTuple):
 
     @property
     def is_slow(self) -> bool:
-        """Whether it is left to the slow tests: what another case nearly shows."""
-        virtual, driver = self.device == "virtual", self.fault.part == "driver"
-        if self.levels == "V" and driver:
+        """Whether it is left to the slow tests: of the emulated device, what a case of the other one nearly shows."""
+        if self.device == "virtual":
             return False
-        if virtual and self.levels == "N logarithmic":
-            return self.fault.onset == "start" and self.fault.kind in ("spikes", "hum", "drift")
-        if virtual and self.levels == "V":
-            return self.fault.onset == "start" and self.fault.kind not in ("reversed", "x0.1", "x10", "dead", "open")
-        plain = self.fault.onset == "middle" and self.fault.kind in ("open", "x0.1", "reversed", "x10", "dead")
-        return not (plain and (virtual or self.levels == "N logarithmic") and "friction" not in self.levels)
+        return (
+            self.levels != "V"
+            if self.fault.part == "driver"
+            else self.levels != EMULATED or self.fault.onset == "start"
+        )
 
 
+EMULATED = "N logarithmic"
 FRICTION = (
     "stuck",
     "open",
