@@ -52,9 +52,9 @@ LEVELS: dict[str, dict[str, Any]] = {
     "V, friction": {"bench": "friction-beam", "levels_v": [0.3, 0.4], "controller": _quick(*FRICTION)},
     "N, friction": {
         "bench": "friction-beam",
-        "levels_n": [1.0, 1.2],
+        "levels_n": [1.0, 1.1],
         "start_v": 0.28,
-        "controller": _quick(*FRICTION, force_loop="logarithmic"),
+        "controller": _quick(*FRICTION, force_loop="logarithmic", force_integral_per_s=5.0),
     },
 }
 """By the unit of what is held, the loop that holds it, and the specimen where it is not the magnet beam."""
