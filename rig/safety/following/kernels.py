@@ -115,8 +115,8 @@ def follow_level(
 
     What is held follows where it has grown towards its level, or is near it while the output creeps. At a frequency that
     the plan gives (``may_jump``) a force also does where the vibration has grown by more than the output has risen: so a
-    structure jumps past a turning point, at which its force drops. It is astray where the output has risen and it has stayed, has fallen
-    to a half, or is too much.
+    structure jumps past a turning point, at which its force drops. It is astray where the output has risen and it has stayed,
+    has fallen to a half, or is too much.
     """
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response

@@ -1,0 +1,119 @@
+"""A virtual rig in whose wires somebody puts a hand: it breaks at a sample, and remembers what was true all the same."""
+
+from functools import cache
+
+import numpy as np
+
+from rig.bench import Bench
+from simulators.kernels import run_observed
+from simulators.layout import RigArrays
+from simulators.plant.discretise import aligned, pad
+from simulators.scatter import Deviation
+from simulators.virtual_rig import VirtualRig
+from tests.reliability.faults.spoiling import AMPLIFIER, SENSOR
+from tests.reliability.faults.table import Fault
+
+__all__ = ["BrokenRig"]
+
+SOFTER = 0.8  # of the stiffness
+SOFTENING_PERIODS, SOFTENING_STEPS = 50.0, 20
+CLIPPED = 0.25  # of the largest voltage of the run without a fault
+NEVER = 2**62
+
+
+@cache
+def softened(specimen: str, rate_hz: float, range_v: float, stiffness: float, seed: int) -> RigArrays:
+    """The compiled rig of a shipped specimen with all its modes less stiff."""
+    rig = VirtualRig.shipped(specimen, converter={"sample_rate_hz": rate_hz, "dac_range_v": range_v})
+    moved = (stiffness**0.5 - 1.0,) * rig.plant.n_mode
+    return VirtualRig.shipped(
+        specimen,
+        converter={"sample_rate_hz": rate_hz, "dac_range_v": range_v},
+        deviation=Deviation(frequency=moved).model_dump(),
+    ).build(seed)[0]
+
+
+class BrokenRig:
+    """Voltages in, readings out, sample by sample as `simulators.kernels.sample`; ``fault`` acts from sample ``onset`` on.
+
+    ``needed_v``: largest output of the run without a fault. ``sent``: voltages [n] as they came from the device, before the
+    amplifier; ``true``: readings [n, n_channels] (V) before the sensors' fault; ``motion`` [n, 2]: force (N) and
+    displacement (m) of the drive point, of no sensor.
+    """
+
+    def __init__(
+        self, rig: VirtualRig, bench: Bench, seed: int, fault: Fault | None, onset: int, needed_v: float
+    ) -> None:
+        self.arrays, self.state = rig.build(seed)
+        self._rig, self._bench, self._seed = rig, bench, seed
+        self._fault, self._onset, self._needed_v = fault, NEVER if fault is None else onset, needed_v
+        drive = rig.shape(rig.stinger.at)
+        self._observe = pad(np.array([rig.plant.force_row(), rig.plant.displacement_row(drive)]).T)
+        self._index = next(
+            (i for i, c in enumerate(bench.channels) if fault is not None and c.role == fault.part), None
+        )
+        self._last_v = self._last_out_v = 0.0
+        self.first = 0
+        self.sent: list[np.ndarray] = []
+        self.true: list[np.ndarray] = []
+        self.motion: list[np.ndarray] = []
+
+    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """One sample a voltage [n]; returns readings [n, n_channels] (V) and flags uint16[n]."""
+        n = voltages.size
+        readings = np.empty((n, len(self._bench.channels)))
+        truth, flags = aligned((n, self._observe.shape[1])), np.empty(n, np.int64)
+        self._weaken()
+        run_observed(self.arrays, self.state, self._observe, self._amplified(voltages), readings, truth, flags)
+        self.sent.append(voltages.copy())
+        self.true.append(readings.copy())
+        self.motion.append(truth[:, :2].copy())
+        self._spoil(readings)
+        self.first += n
+        return readings, flags.astype(np.uint16)
+
+    def _since(self, n: int) -> np.ndarray:
+        return np.arange(self.first, self.first + n) - self._onset
+
+    def _amplified(self, voltages: np.ndarray) -> np.ndarray:
+        out, at = voltages.copy(), self._since(voltages.size)
+        if self._fault is not None and self._fault.part == "amplifier" and at[-1] >= 0:
+            broken = at >= 0
+            before = voltages[~broken]
+            self._last_out_v = float(before[-1]) if before.size else self._last_out_v
+            if self._fault.kind == "clipped":
+                limit = CLIPPED * self._needed_v
+                out[broken] = np.clip(voltages[broken], -limit, limit)
+            else:
+                spoil = AMPLIFIER[self._fault.kind]
+                out[broken] = spoil(voltages[broken], at[broken], self._last_out_v, self._bench.sample_rate_hz)
+        else:
+            self._last_out_v = float(voltages[-1])
+        return out
+
+    def _spoil(self, readings: np.ndarray) -> None:
+        if self._index is None or self._fault is None:
+            return
+        at, volts = self._since(readings.shape[0]), readings[:, self._index]
+        broken = at >= 0
+        before = volts[~broken]
+        self._last_v = float(before[-1]) if before.size else self._last_v
+        if broken.any():
+            spoil = SENSOR[self._fault.kind]
+            readings[broken, self._index] = spoil(
+                volts[broken].copy(), at[broken], self._last_v, self._bench.sample_rate_hz
+            )
+
+    def _weaken(self) -> None:
+        """The arrays of a softer rig, the state as it is: its coordinates are those of the same modes."""
+        at = self.first - self._onset
+        if self._fault is None or self._fault.part != "structure" or at < 0:
+            return
+        share = 1.0
+        if self._fault.kind == "softening":
+            periods = at / self._bench.sample_rate_hz * self._bench.specimen.linear_frequency_hz
+            share = min(1.0, np.ceil(SOFTENING_STEPS * periods / SOFTENING_PERIODS) / SOFTENING_STEPS)
+        if share > 0.0:
+            rate_hz, range_v = self._bench.sample_rate_hz, self._bench.output_range_v
+            stiffness = 1.0 - share * (1.0 - SOFTER)
+            self.arrays = softened(str(self._rig.specimen), rate_hz, range_v, stiffness, self._seed)
