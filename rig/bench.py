@@ -6,6 +6,7 @@ from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from rig.bench_limits import refuse
 from rig.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
 from rig.daq import Channel
 from rig.errors import ConfigurationError
@@ -193,8 +194,15 @@ def load_bench(name_or_path: str | Path) -> Bench:
 
     ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file beside it; what else
     stands there changes it key by key. Another ``driver.name`` than the base's begins with no ``driver.options``.
+
+    Raises `ConfigurationError` for what is no bench, and for one that must not run as it is (`rig.bench_limits`).
     """
-    return validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
+    bench = validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
+    try:
+        refuse(bench)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{name_or_path}: {error}") from None
+    return bench
 
 
 def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, Any]:
