@@ -8,11 +8,10 @@ import numpy as np
 from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
-from rig.drivers import make_daq
 from rig.tuning.errors import TuningError
 from rig.tuning.spectra import FIT_BAND, near
 
-__all__ = ["ALLOWED_OFFSET", "compared_with_bench", "largest_outside", "lead_samples", "mass_ratios", "plant_of"]
+__all__ = ["ALLOWED_OFFSET", "compared_with_bench", "largest_outside", "mass_ratios", "plant_of"]
 
 ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
 WORTH_SAYING_HZ = 0.005
@@ -20,13 +19,11 @@ WORTH_SAYING_SHAPE = 0.05
 TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-error law
 
 
-def lead_samples(bench: Bench) -> float:
-    """Samples from an output to the input that shows it."""
-    return bench.block + make_daq(bench, 0).latency_samples
-
-
-def plant_of(bench: Bench, responses: FrequencyResponseMatrix) -> PlantModel:
+def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float) -> PlantModel:
     """The plant fitted to force and drive acceleration per volt around the bench's linear frequency.
+
+    ``lead_samples`` from an output to the input that shows it are those of the run that measured the responses: a device
+    knows its queue and its filters once it has started.
 
     Raises `TuningError` where they show no mode of the structure.
     """
@@ -39,7 +36,7 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix) -> PlantModel:
             responses.value[around, 0, 0],
             responses.value[around, 1, 0],
             sample_rate_hz=bench.sample_rate_hz,
-            latency_samples=lead_samples(bench),
+            latency_samples=lead_samples,
         )
         plant.lock_frequency_rad_s()
     except ValueError as error:

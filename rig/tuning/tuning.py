@@ -98,9 +98,9 @@ def tune(
         progress=progress,
         arm=arm,
         about=about,
-        damping_of=lambda responses: plant_of(bench, responses).damping_ratio,
+        damping_of=lambda responses, lead: plant_of(bench, responses, lead).damping_ratio,
     )
-    plant = plant_of(bench, test.responses)
+    plant = plant_of(bench, test.responses, test.lead_samples)
     notes = compared_with_bench(bench, plant)
     lowest_n = lowest_force_n(bench, plant, PART * reach_m(bench, plant)[0] if to_m is None else to_m)
     densities = (test.force_density, test.acceleration_density)
