@@ -179,6 +179,17 @@ class Bench(Configured):
         """Index of the first channel with a role."""
         return next(index for index, channel in enumerate(self.channels) if channel.role == role)
 
+    @property
+    def response_ratios(self) -> dict[str, float]:
+        """How far a channel moves for one metre at the drive point, in the mode under test, where its shapes are known.
+
+        By name; the drive channel itself has 1.
+        """
+        drive, own = self.specimen.drive_mode_shape, self.channels[self.index_of("drive")].name
+        shapes = {channel.name: channel.mode_shape for channel in self.channels if channel.mode_shape is not None}
+        ratios = {} if drive is None else {name: abs(shape / drive) for name, shape in shapes.items()}
+        return {own: 1.0, **ratios}
+
 
 def _folder() -> Path:
     return Path(str(resources.files("rig"))) / "benches"

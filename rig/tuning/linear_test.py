@@ -42,7 +42,7 @@ class LinearTest:
     level_rms_v: float
     """Level that sufficed, V RMS."""
     responses: FrequencyResponseMatrix
-    """Force and drive acceleration per volt, with covariance."""
+    """Force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
     lead_samples: float
     """Samples from an output to the input that shows it: block, queue and filters of the device that was started."""
     coherence: tuple[float, float]
