@@ -74,7 +74,7 @@ def test_the_closed_form_fails_on_the_friction_beam_and_the_papers_gains_do_not(
         ({"levels_m": [1e-4, 3.7e-3]}, None),
         ({"levels_n": [0.1, 3.0]}, r"levels_n\[1\] = 3 N: needs 19\.\d V .* allows 9\.5 V"),
         ({"levels_rms_n": [2.0]}, r"levels_rms_n\[0\] = 2 N RMS: needs 18\.\d V"),
-        ({"levels_v": [9.0]}, None),
+        ({"levels_v": [7.0]}, None),
     ],
 )
 def test_levels_beyond_the_voltage_limit_are_refused_with_the_voltage(levels, said):
@@ -191,7 +191,8 @@ def test_the_loops_inside_a_force_loop_by_the_force_at_rest_are_checked(name, ke
             "displacement_m",
             2e-4,
             {"levels_n": [0.1, 0.55]},
-            r"levels_n\[1\] = 0\.55 N: means 0\.0038\d m at channel 'acc_magnet' on .* still 0\.0004\d* m with 8 times the damping; .* = 0\.0002",
+            r"levels_n\[1\] = 0\.55 N: means 0\.0038\d m at channel 'acc_magnet' on .* "
+            r"still 0\.0004\d* m with 8 times the damping; .* = 0\.0002",
         ),
         ("displacement_m", 5e-4, {"levels_n": [0.1, 0.55]}, None),  # a joint of eight times the damping would do
         (
