@@ -6,6 +6,7 @@ from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from rig.bench_limits import refuse
 from rig.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
 from rig.daq import Channel
 from rig.errors import ConfigurationError
@@ -178,6 +179,17 @@ class Bench(Configured):
         """Index of the first channel with a role."""
         return next(index for index, channel in enumerate(self.channels) if channel.role == role)
 
+    @property
+    def response_ratios(self) -> dict[str, float]:
+        """How far a channel moves for one metre at the drive point, in the mode under test, where its shapes are known.
+
+        By name; the drive channel itself has 1.
+        """
+        drive, own = self.specimen.drive_mode_shape, self.channels[self.index_of("drive")].name
+        shapes = {channel.name: channel.mode_shape for channel in self.channels if channel.mode_shape is not None}
+        ratios = {} if drive is None else {name: abs(shape / drive) for name, shape in shapes.items()}
+        return {own: 1.0, **ratios}
+
 
 def _folder() -> Path:
     return Path(str(resources.files("rig"))) / "benches"
@@ -193,8 +205,15 @@ def load_bench(name_or_path: str | Path) -> Bench:
 
     ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file beside it; what else
     stands there changes it key by key. Another ``driver.name`` than the base's begins with no ``driver.options``.
+
+    Raises `ConfigurationError` for what is no bench, and for one that must not run as it is (`rig.bench_limits`).
     """
-    return validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
+    bench = validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
+    try:
+        refuse(bench)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{name_or_path}: {error}") from None
+    return bench
 
 
 def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from controller.law import Law
 from controller.layout import AmplitudeLaw
 from controller.tuning import PlantModel
 from rig.bench import Bench
+from rig.bench_limits import refuse
 from rig.daq import DAQ, Capabilities
 from rig.drivers import make_daq
 from rig.loop import Loop, RunningLoop
@@ -99,6 +100,7 @@ def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iter
     from rig.worker.session import WorkerSession
     from rig.worker.spawn import supported
 
+    refuse(bench)
     daq = make_daq(bench, seed)
     if supported() and (realtime or daq.wall_clock):
         del daq  # nothing is open yet; the other process makes its own

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from rig.bench import Bench
+from rig.bench_limits import cautions as cautions_of_limits
 from rig.campaigns.about import user_name
 from rig.campaigns.bench_memory import BenchMemory, fingerprint, memory_of, now, remember
 from rig.errors import NotArmed
@@ -97,13 +98,16 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
 
 
 def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str]) -> tuple[str, ...]:
-    """What speaks against arming for ``what``: no check, or one that does not count. A check itself needs none."""
-    out: list[str] = []
+    """What speaks against arming for ``what``: limits that do not fit the sensors, no check, or one that does not count.
+
+    A check itself needs neither: it moves the rig gently, and finds both.
+    """
     check = memory.check
     if what == CHECK:
         return ()
+    out = list(cautions_of_limits(bench))
     if check is None:
-        return (f"the bench was never checked: rig check --bench {bench.name}",)
+        return (f"the bench was never checked: rig check --bench {bench.name}", *out)
     if check.failed:
         out.append(f"the last check failed: {', '.join(check.failed)}")
     age_h = _age_h(check.at)

@@ -88,9 +88,10 @@ class ContinuousBackbonePlan(LockedPlan):
         """Refuse, before anything moves, what the bench or the known plant cannot do."""
         super().check(bench)
         self._check_slow_flow(bench)
-        highest, allowed = max(self.levels) * (1.0 + self.margin), bench.limits.displacement_m
+        highest = max(self.levels) * (1.0 + self.margin)
+        allowed = bench.limits.displacement_m / max(self.ratios_to_drive(bench).values())
         if self.amplitude_law is AmplitudeLaw.RESPONSE and highest > allowed:
             raise ConfigurationError(
                 f"margin = {self.margin:g}: beyond the highest level it leads to {highest:g} m; the bench {bench.name} "
-                f"allows up to {allowed:g} m"
+                f"allows up to {allowed:.3g} m, where a channel reaches its {bench.limits.displacement_m:g} m"
             )

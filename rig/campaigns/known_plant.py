@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
 from controller import AmplitudeLaw, PhaseLockedLoop
 from controller.tuning import (
@@ -24,12 +24,11 @@ from controller.tuning import (
 from controller.tuning.laws import AmplitudeLaw as AmplitudeGains
 from rig.bench import Bench
 from rig.campaigns.levels import Levels
+from rig.campaigns.levels_on_plant import MORE_DAMPING, check_motion, check_voltage, lags_text
 from rig.configuration import Configured
 from rig.errors import ConfigurationError
 
-__all__ = ["KnownPlant", "PlantFacts", "control_loop", "motion_for", "voltage_for"]
-
-MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known one: a joint's rises with the level
+__all__ = ["KnownPlant", "PlantFacts", "control_loop"]
 
 
 class PlantFacts(Configured):
@@ -60,6 +59,9 @@ class PlantFacts(Configured):
     """Sample rate of the loop, Hz."""
     latency_samples: float = Field(ge=0)
     """Samples from an output to the input that shows it."""
+    response_ratios: dict[str, PositiveFloat] = Field(default_factory=dict)
+    """How far each response channel moves for one metre at the drive point, at resonance, by its name. They take the place of
+    the bench's mode shapes where levels are checked."""
 
     @property
     def residual_m_n(self) -> float:
@@ -70,7 +72,7 @@ class PlantFacts(Configured):
     @property
     def model(self) -> PlantModel:
         """The plant."""
-        return PlantModel(**self.model_dump())
+        return PlantModel(**self.model_dump(exclude={"response_ratios"}))
 
 
 class KnownPlant(Levels):
@@ -85,6 +87,18 @@ class KnownPlant(Levels):
         """Exciter and structure, where the plan knows them."""
         return None if self.plant is None else self.plant.model
 
+    def ratios_to_drive(self, bench: Bench) -> dict[str, float]:
+        """How far each channel moves for one metre at the drive point: as measured, else by the bench's mode shapes."""
+        measured = {} if self.plant is None else self.plant.response_ratios
+        names = [channel.name for channel in bench.channels if channel.role == "response"]
+        for name in measured:
+            if name not in names:
+                raise ConfigurationError(
+                    f"plant.response_ratios.{name}: allowed is a response channel of the bench {bench.name}: "
+                    f"{', '.join(names) or 'it has none'}"
+                )
+        return bench.response_ratios | measured
+
     def check_plant(self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float]) -> None:
         """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels out of its reach."""
         if self.plant is None:
@@ -96,8 +110,8 @@ class KnownPlant(Levels):
                 loops = self._loops(plant, law, lags_deg, bench)
                 _check_quickness(loops)
                 _check_stability(loops)
-            self._check_voltage(plant, lags_deg, bench)
-            self._check_motion(plant, lags_deg, bench)
+            check_voltage(self, plant, lags_deg, bench)
+            check_motion(self, plant, lags_deg, bench, self.ratios_to_drive(bench))
         except ValueError as error:
             raise ConfigurationError(f"plant: {error}") from None
 
@@ -114,40 +128,6 @@ class KnownPlant(Levels):
             control_loop(plant, law.model_copy(update={"phase_lag_deg": lag}), amplitude_law, shape) for lag in lags_deg
         ]
 
-    def _check_voltage(self, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
-        limit = bench.limits.voltage_v
-        for index, level in enumerate(self.levels):
-            volts, lag = max((voltage_for(plant, level, self.level_unit, lag), lag) for lag in lags_deg)
-            if volts > limit:
-                raise ConfigurationError(
-                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: needs {volts:.3g} V{_where([lag])} on "
-                    f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping), "
-                    f"the bench {bench.name} allows {limit:g} V"
-                )
-
-    def _check_motion(self, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
-        """Refuse levels in N or m that are beyond the limits of force or motion whatever a joint may dissipate.
-
-        A joint that dissipates more needs more force for a displacement, and moves less under a force.
-        """
-        if self.level_unit == "V":
-            return
-        part = 1.0 if self.level_unit == "m" else MORE_DAMPING[-1]
-        damped = plant.at(damping_ratio=min(part * plant.damping_ratio, 0.99))
-        for index, level in enumerate(self.levels):
-            for name, unit in (("force_n", "N"), ("displacement_m", "m"), ("acceleration_m_s2", "m/s^2")):
-                least, lag = max((motion_for(damped, level, self.level_unit, lag)[name], lag) for lag in lags_deg)
-                limit = getattr(bench.limits, name)
-                if least <= limit:
-                    continue
-                known = motion_for(plant, level, self.level_unit, lag)[name]
-                more = f", and still {least:.3g} {unit} with {part:g} times the damping" if part > 1.0 else " or more"
-                raise ConfigurationError(
-                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: means {known:.3g} {unit}{_where([lag])} on "
-                    f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping){more}; "
-                    f"the bench {bench.name} allows limits.{name} = {limit:g}"
-                )
-
 
 def _check_quickness(loops: Sequence[ControlLoop]) -> None:
     """Refuse a loop that would have to act within a period or two, where no demodulator has anything to go by."""
@@ -156,7 +136,7 @@ def _check_quickness(loops: Sequence[ControlLoop]) -> None:
     if gain > LARGEST_AT_HALF:
         hertz = loop.omega_rad_s / 2.0 / math.pi
         raise ConfigurationError(
-            f"controller: the {name} is too quick on the known plant ([plant], {hertz:.2f} Hz){_where([loop.lag_deg])}: "
+            f"controller: the {name} is too quick on the known plant ([plant], {hertz:.2f} Hz){lags_text([loop.lag_deg])}: "
             f"its gain at {0.5 * hertz:.4g} Hz, half the locked frequency, is {gain:.3g}, allowed is {LARGEST_AT_HALF:g}: "
             f"demodulated signals cannot follow changes within two periods; its gains are about "
             f"{gain / LARGEST_AT_HALF:.2g} times too large"
@@ -174,20 +154,11 @@ def _check_stability(loops: Sequence[ControlLoop]) -> None:
     raise ConfigurationError(
         f"controller: these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
         f"{damping:.3g} % damping)"
-        + _where([loop.lag_deg for loop in unstable])
+        + lags_text([loop.lag_deg for loop in unstable])
         + (f", growing at {max(growth):.3g} 1/s" if max(growth) > 0.0 else "")
         + ("" if enough is None else f"; with {enough * damping:.3g} % they would be stable")
         + "; rig tune finds gains, without [plant] nothing is checked"
     )
-
-
-def _where(lags_deg: Sequence[float]) -> str:
-    """The lags that are meant; nothing where that is resonance alone."""
-    if list(lags_deg) == [-90.0]:
-        return ""
-    if len(lags_deg) > 3:
-        return f" at {len(lags_deg)} lags from {lags_deg[0]:g} to {lags_deg[-1]:g} deg"
-    return f" at a lag of {', '.join(f'{lag:g}' for lag in lags_deg)} deg"
 
 
 def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
@@ -197,25 +168,6 @@ def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
         return not any(map(unstable_poles, damped))
     except ValueError:
         return False
-
-
-def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> float:
-    """Voltage (V peak) that a level (V, N, N RMS, m) needs on a linear plant."""
-    if unit == "V":
-        return level
-    omega = plant.lock_frequency_rad_s(lag_deg)
-    if unit == "m":
-        return float(level * omega**2 / abs(complex(plant.acceleration_per_v(1j * omega))))
-    return float(level * (math.sqrt(2.0) if unit == "N RMS" else 1.0) * plant.volts_per_newton(lag_deg))
-
-
-def motion_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> dict[str, float]:
-    """Force, displacement and acceleration (peak, by their limits' names) of a level (N, N RMS, m) on a linear plant."""
-    omega = plant.lock_frequency_rad_s(lag_deg)
-    accelerance = abs(complex(plant.accelerance(1j * omega)))
-    force = level * omega**2 / accelerance if unit == "m" else level * (math.sqrt(2.0) if unit == "N RMS" else 1.0)
-    acceleration = force * accelerance
-    return {"force_n": force, "displacement_m": acceleration / omega**2, "acceleration_m_s2": acceleration}
 
 
 def control_loop(

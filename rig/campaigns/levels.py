@@ -1,5 +1,6 @@
 """Levels of a plan: volts, newtons or metres, and how a loop is brought in before it holds them."""
 
+import math
 from dataclasses import replace
 from typing import Self
 
@@ -92,8 +93,16 @@ class Levels(Configured):
         kind = SegmentKind.START if excitation is None else SegmentKind.HOLD
         return [ramp, replace(ramp, kind=kind, periods=self.start_periods)]
 
-    def check_levels(self, bench: Bench) -> None:
-        """Refuse a level beyond the bench's limit, and levels of a logarithmic loop without a voltage to begin with."""
+    def ratios_to_drive(self, bench: Bench) -> dict[str, float]:
+        """How far each channel moves for one metre at the drive point, as far as known: by the bench's mode shapes."""
+        return bench.response_ratios
+
+    def check_levels(self, bench: Bench, band_hz: tuple[float, float] | None = None) -> None:
+        """Refuse a level beyond the bench's limit, and levels of a logarithmic loop without a voltage to begin with.
+
+        A displacement is checked at every channel whose motion in the mode under test is known, where the band that is
+        passed through, if any is given, holds that mode.
+        """
         limits = bench.limits
         largest = {"V": limits.voltage_v, "N": limits.force_n, "N RMS": limits.force_n, "m": limits.displacement_m}
         for index, level in enumerate(self.levels):
@@ -102,6 +111,8 @@ class Levels(Configured):
                     f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: the bench {bench.name} allows up to "
                     f"{largest[self.level_unit]:g} {self.level_unit}"
                 )
+        if band_hz is None or band_hz[0] <= bench.specimen.linear_frequency_hz <= band_hz[1]:
+            self._check_channels(bench)
         if self.start_v is not None and self.start_v > limits.voltage_v:
             raise ConfigurationError(
                 f"start_v = {self.start_v:g} V: the bench {bench.name} allows up to {limits.voltage_v:g} V"
@@ -112,3 +123,20 @@ class Levels(Configured):
         )
         if self.start_v is None and not linear:
             raise ConfigurationError(f"start_v: levels by {self.levels_key} of this loop need a voltage to begin with")
+
+    def _check_channels(self, bench: Bench) -> None:
+        """Refuse levels in metres that take a channel beyond its limits when the linear mode is passed."""
+        if self.level_unit != "m":
+            return
+        omega = 2.0 * math.pi * bench.specimen.linear_frequency_hz
+        ratios = self.ratios_to_drive(bench)
+        name = max(ratios, key=lambda channel: ratios[channel])
+        for index, level in enumerate(self.levels):
+            moved = level * ratios[name]
+            for key, unit, value in (("displacement_m", "m", moved), ("acceleration_m_s2", "m/s^2", moved * omega**2)):
+                if value > getattr(bench.limits, key):
+                    raise ConfigurationError(
+                        f"{self.levels_key}[{index}] = {level:g} m: means {value:.3g} {unit} at channel {name!r}, which moves "
+                        f"{ratios[name]:.3g} times as far as the drive point; "
+                        f"the bench {bench.name} allows limits.{key} = {getattr(bench.limits, key):g}"
+                    )

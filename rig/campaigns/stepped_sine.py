@@ -127,8 +127,8 @@ class SteppedSinePlan(TonePlan):
 
     def check(self, bench: Bench) -> None:
         """Refuse levels and frequencies beyond the bench's limits."""
-        self.check_levels(bench)
         frequencies = self.frequencies_at_each_level
+        self.check_levels(bench, (min(frequencies), max(frequencies)))
         self.check_frequencies(bench, **{"lowest frequency": min(frequencies), "highest frequency": max(frequencies)})
         highest = int(bench.sample_rate_hz / max(frequencies) / 2.0) - 1
         if self.harmonics > highest:

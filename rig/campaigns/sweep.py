@@ -114,5 +114,5 @@ class SweepPlan(TonePlan):
 
     def check(self, bench: Bench) -> None:
         """Refuse levels and frequencies beyond the bench's limits."""
-        self.check_levels(bench)
+        self.check_levels(bench, (min(self.start_hz, self.stop_hz), max(self.start_hz, self.stop_hz)))
         self.check_frequencies(bench, start_hz=self.start_hz, stop_hz=self.stop_hz)

@@ -8,6 +8,7 @@ import numpy as np
 
 from identification import IdentificationError
 from rig.bench import Bench
+from rig.bench_limits import objections
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.multisine_points import spectra_of
 from rig.campaigns.plans import plan_from
@@ -68,7 +69,11 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
     """Findings of a recorded check; `RecordingError` where one of the two is none."""
     bench = bench_of_recording(recording)
     plan = _plan(recording)
-    findings = [*_how_it_ended(recording, bench), *silent_findings(bench, _silence(recording, bench, plan))]
+    findings = [
+        *_how_it_ended(recording, bench),
+        *_limits(bench),
+        *silent_findings(bench, _silence(recording, bench, plan)),
+    ]
     found = responses_in(recording)
     old = None if reference is None else responses_in(reference)
     mode = None
@@ -86,6 +91,11 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
     level = plan.levels_rms_v[-1] if found is not None else None
     findings += _clipping(recording, bench, level)
     return Assessment(bench, recording.path, level, tuple(findings), found, mode, old)
+
+
+def _limits(bench: Bench) -> list[Finding]:
+    """What of the bench's numbers does not fit; a bench that was refused has no recording to be read here."""
+    return [Finding("limits", "", "warn", one.value, one.unit, one.allowed, one.line) for one in objections(bench)]
 
 
 def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> list[Finding]:

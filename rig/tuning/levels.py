@@ -1,13 +1,14 @@
 """Levels of the backbone that a tuning proposes: from what can be told from noise to a part of the bench's limits."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from controller.tuning import PlantModel
 from rig.bench import Bench
-from rig.campaigns.known_plant import voltage_for
+from rig.campaigns.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
 
 __all__ = ["LevelChoice", "choose_levels", "lowest_force_n", "needed_v", "reach_m"]
@@ -42,17 +43,22 @@ def needed_n(plant: PlantModel, level_m: float) -> float:
     return float(level_m * omega**2 / abs(complex(plant.accelerance(1j * omega))))
 
 
-def reach_m(bench: Bench, plant: PlantModel) -> tuple[float, str]:
-    """Largest displacement (m peak) that the linear plant reaches within the bench's limits, and the limit that ends it."""
+def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tuple[float, str]:
+    """Largest displacement of the drive point (m peak) that keeps the linear plant within the bench's limits, and what ends it.
+
+    ``ratios`` are how far channels move for one metre at the drive point, by name.
+    """
     limits, omega = bench.limits, plant.lock_frequency_rad_s()
+    name, ratio = max(ratios.items(), key=lambda entry: entry[1], default=("", 1.0))
+    ratio, where = (ratio, f" at channel {name!r}") if ratio > 1.0 else (1.0, "")
     ends = {
-        "displacement_m": limits.displacement_m,
-        "acceleration_m_s2": limits.acceleration_m_s2 / omega**2,
-        "voltage_v": limits.voltage_v / needed_v(plant, 1.0),
-        "force_n": limits.force_n / needed_n(plant, 1.0),
+        f"limits.displacement_m = {limits.displacement_m:g}{where}": limits.displacement_m / ratio,
+        f"limits.acceleration_m_s2 = {limits.acceleration_m_s2:g}{where}": limits.acceleration_m_s2 / omega**2 / ratio,
+        f"limits.voltage_v = {limits.voltage_v:g}": limits.voltage_v / needed_v(plant, 1.0),
+        f"limits.force_n = {limits.force_n:g}": limits.force_n / needed_n(plant, 1.0),
     }
-    name = min(ends, key=lambda key: ends[key])
-    return ends[name], f"limits.{name} = {getattr(limits, name):g}"
+    end = min(ends, key=lambda key: ends[key])
+    return ends[end], end
 
 
 def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
@@ -65,6 +71,7 @@ def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
 def choose_levels(
     bench: Bench,
     plant: PlantModel,
+    ratios: Mapping[str, float],
     *,
     lowest_n: float,
     from_m: float | None = None,
@@ -73,9 +80,9 @@ def choose_levels(
 ) -> LevelChoice:
     """Levels in equal ratios between the lowest force that can be told and a third of what the limits allow.
 
-    Raises `ConfigurationError` for a level beyond what the bench reaches.
+    ``ratios`` as for `reach_m`. Raises `ConfigurationError` for a level beyond what the bench reaches.
     """
-    reach, limit = reach_m(bench, plant)
+    reach, limit = reach_m(bench, plant, ratios)
     highest = PART * reach if to_m is None else to_m
     lowest = lowest_n / needed_n(plant, 1.0) if from_m is None else from_m
     if highest > reach:

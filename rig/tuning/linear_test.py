@@ -42,7 +42,9 @@ class LinearTest:
     level_rms_v: float
     """Level that sufficed, V RMS."""
     responses: FrequencyResponseMatrix
-    """Force and drive acceleration per volt, with covariance."""
+    """Force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
+    lead_samples: float
+    """Samples from an output to the input that shows it: block, queue and filters of the device that was started."""
     coherence: tuple[float, float]
     """Median over the band around the mode, of force and drive with the voltage, one period each."""
     distortion: float
@@ -67,11 +69,12 @@ def measure(
     progress: Progress | None = None,
     arm: Arm = None,
     about: About | None = None,
-    damping_of: Callable[[FrequencyResponseMatrix], float],
+    damping_of: Callable[[FrequencyResponseMatrix, float], float],
 ) -> LinearTest:
     """Raise the level until the coherence suffices, then measure with lines as close as the damping asks for.
 
-    ``level_rms_v`` spares the search. ``damping_of`` tells the damping ratio from coarse responses.
+    ``level_rms_v`` spares the search. ``damping_of`` tells the damping ratio from coarse responses and
+    the samples from an output to the input that shows it.
 
     Raises `TuningError` where a run was stopped or no level within half of the bench's limits suffices,
     `ConfigurationError` for a level beyond the limits.
@@ -88,7 +91,7 @@ def measure(
         level = _raised(bench, level, seen, run.share_of_limits, len(tried))
     _audible(bench, level, seen)
     matrix = voltage_responses(bench, found)
-    resolution = 2.0 * damping_of(matrix) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
+    resolution = 2.0 * damping_of(matrix, run.lead_samples) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
     found = run.at(level, _on_samples(bench, min(resolution, _coarse(bench))), 3)
     matrix = voltage_responses(bench, found)
     around = near(bench, matrix.frequency_hz)
@@ -97,6 +100,7 @@ def measure(
     return LinearTest(
         level_rms_v=level,
         responses=matrix,
+        lead_samples=run.lead_samples,
         coherence=coherence_of(bench, found),
         distortion=float(np.median(np.sqrt(nonlinear) / np.abs(matrix.value[around, 0, 0]))),
         force_density=noise[0],
@@ -125,9 +129,10 @@ class _Runs:
         self.arm, self.about = arm, replace(about or About(), purpose="tuning")
         self.begun = False
         self.share_of_limits = 0.0
+        self.lead_samples = 0.0
 
     def at(self, level_rms_v: float, resolution_hz: float, realisations: int) -> PeriodicSpectra:
-        """Spectra at a level; notes how far its peaks went towards the limits."""
+        """Spectra at a level; notes how far its peaks went towards the limits, and the lead of the device."""
         lowest, highest = (part * self.bench.specimen.linear_frequency_hz for part in BAND)
         allowed = self.bench.limits.frequency_hz
         plan = MultisinePlan(
@@ -165,6 +170,7 @@ class _Runs:
             self.begun = True
         with done as recording:
             _ended_well(recording, level_rms_v)
+            self.lead_samples = float(recording.parts[-1].information["about"]["lead_samples"])
             measured = spectra(recording)[level_rms_v]
             self.share_of_limits = self._share(recording, measured)
         return measured

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -20,9 +21,15 @@ SHORTEST_TIME_OUT = 600
 
 
 def plan_text(
-    bench_name: str, bench: Bench, plant: PlantModel, chosen: Chosen, levels: LevelChoice, recording: Path
+    bench_name: str,
+    bench: Bench,
+    plant: PlantModel,
+    ratios: Mapping[str, float],
+    chosen: Chosen,
+    levels: LevelChoice,
+    recording: Path,
 ) -> str:
-    """A backbone plan for a bench, as TOML."""
+    """A backbone plan for a bench, as TOML; ``ratios`` are those of response channels to the drive point, as measured."""
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     volts = chosen.law == "phase"
     settling = chosen.design.settling.longest
@@ -71,6 +78,9 @@ def plan_text(
         f"# The plant as measured ({recording.name}): gains and levels are checked against it before anything moves.",
     ]
     facts += ["[plant]", *(_line(key, value) for key, value in plant.to_dict().items())]
+    if ratios:
+        listed = ", ".join(f"{name} = {significant(ratio)}" for name, ratio in ratios.items())
+        facts += ["# Motion of the response channels for that of the drive point.", f"response_ratios = {{ {listed} }}"]
     return (
         "\n".join([*_summary(plant, chosen), *head, *controller, *(settle if math.isfinite(settling) else []), *facts])
         + "\n"

@@ -8,25 +8,23 @@ import numpy as np
 from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
-from rig.drivers import make_daq
 from rig.tuning.errors import TuningError
 from rig.tuning.spectra import FIT_BAND, near
 
-__all__ = ["ALLOWED_OFFSET", "compared_with_bench", "largest_outside", "lead_samples", "mass_ratios", "plant_of"]
+__all__ = ["ALLOWED_OFFSET", "compared_with_bench", "largest_outside", "mass_ratios", "measured_ratios", "plant_of"]
 
 ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
 WORTH_SAYING_HZ = 0.005
 WORTH_SAYING_SHAPE = 0.05
+TOLD = 3.0  # standard errors from which on a channel's motion is told from noise
 TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-error law
 
 
-def lead_samples(bench: Bench) -> float:
-    """Samples from an output to the input that shows it."""
-    return bench.block + make_daq(bench, 0).latency_samples
-
-
-def plant_of(bench: Bench, responses: FrequencyResponseMatrix) -> PlantModel:
+def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float) -> PlantModel:
     """The plant fitted to force and drive acceleration per volt around the bench's linear frequency.
+
+    ``lead_samples`` from an output to the input that shows it are those of the run that measured the responses: a device
+    knows its queue and its filters once it has started.
 
     Raises `TuningError` where they show no mode of the structure.
     """
@@ -39,7 +37,7 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix) -> PlantModel:
             responses.value[around, 0, 0],
             responses.value[around, 1, 0],
             sample_rate_hz=bench.sample_rate_hz,
-            latency_samples=lead_samples(bench),
+            latency_samples=lead_samples,
         )
         plant.lock_frequency_rad_s()
     except ValueError as error:
@@ -48,6 +46,27 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix) -> PlantModel:
             f"{FIT_BAND[1] * linear:.4g} Hz: {error}"
         ) from None
     return plant
+
+
+def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
+    """How far each response channel moves for one metre at the drive point at resonance, by name.
+
+    Least squares of the channel's response to that of the drive point, over the lines within a bandwidth of the mode. A
+    channel that cannot be told from noise is left out.
+    """
+    hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
+    frequency = responses.frequency_hz
+    half = max(2.0 * plant.damping_ratio * hertz, float(np.diff(frequency).max()))
+    around = np.abs(frequency - hertz) <= half
+    drive = responses.value[around, 1, 0]
+    power = float(np.sum(np.abs(drive) ** 2))
+    out = {}
+    for row, channel in list(enumerate(responses.outputs))[2:]:
+        ratio = abs(complex(np.vdot(drive, responses.value[around, row, 0]))) / power
+        error = math.sqrt(float(np.sum(np.abs(drive) ** 2 * responses.total_std[around, row, 0] ** 2))) / power
+        if ratio > TOLD * error:
+            out[channel.name] = ratio
+    return out
 
 
 def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:

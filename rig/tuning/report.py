@@ -40,6 +40,7 @@ def summary(tuning: Tuning) -> dict[str, Any]:
             "mass_ratio": [low, high],
             "force_per_v_n": 1.0 / plant.volts_per_newton(),
             "fit_error": plant.fit_error,
+            "response_ratios": dict(tuning.response_ratios),
         },
         "law": chosen.law,
         "low_pass_rad_s": chosen.low_pass_rad_s,

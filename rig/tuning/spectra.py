@@ -27,8 +27,8 @@ def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]
 
 
 def voltage_responses(bench: Bench, measured: PeriodicSpectra) -> FrequencyResponseMatrix:
-    """Force and drive acceleration per volt, with covariance."""
-    names = [next(c.name for c in bench.channels if c.role == role) for role in ("force", "drive")]
+    """Force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
+    names = [c.name for role in ("force", "drive", "response") for c in bench.channels if c.role == role]
     return best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
 
 

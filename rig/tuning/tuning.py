@@ -17,7 +17,7 @@ from rig.tuning.levels import PART, LevelChoice, choose_levels, lowest_force_n, 
 from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.noise import low_pass
 from rig.tuning.plan import plan_text
-from rig.tuning.plant import compared_with_bench, plant_of
+from rig.tuning.plant import compared_with_bench, measured_ratios, plant_of
 
 __all__ = ["Tuning", "tune"]
 
@@ -37,6 +37,8 @@ class Tuning:
     """Its recording."""
     plant: PlantModel
     """The plant near the mode."""
+    response_ratios: dict[str, float]
+    """How far each response channel moves for one metre at the drive point at resonance, as measured, by name."""
     chosen: Chosen
     """The gains."""
     levels: LevelChoice
@@ -98,25 +100,28 @@ def tune(
         progress=progress,
         arm=arm,
         about=about,
-        damping_of=lambda responses: plant_of(bench, responses).damping_ratio,
+        damping_of=lambda responses, lead: plant_of(bench, responses, lead).damping_ratio,
     )
-    plant = plant_of(bench, test.responses)
+    plant = plant_of(bench, test.responses, test.lead_samples)
     notes = compared_with_bench(bench, plant)
-    lowest_n = lowest_force_n(bench, plant, PART * reach_m(bench, plant)[0] if to_m is None else to_m)
+    measured = measured_ratios(test.responses, plant)
+    ratios = bench.response_ratios | measured
+    lowest_n = lowest_force_n(bench, plant, PART * reach_m(bench, plant, ratios)[0] if to_m is None else to_m)
     densities = (test.force_density, test.acceleration_density)
     largest, lowest_n, noise = low_pass(plant, densities, lowest_n)
     chosen = choose(plant, test.responses, law, largest, noise)
-    levels = choose_levels(bench, plant, lowest_n=lowest_n, from_m=from_m, to_m=to_m, points=points)
+    levels = choose_levels(bench, plant, ratios, lowest_n=lowest_n, from_m=from_m, to_m=to_m, points=points)
     notes += _cautions(bench, test, levels)
     return Tuning(
         bench=bench,
         test=test,
         recording=Path(recording),
         plant=plant,
+        response_ratios=measured,
         chosen=chosen,
         levels=levels,
         notes=notes,
-        plan_toml=plan_text(named or name, bench, plant, chosen, levels, Path(recording)),
+        plan_toml=plan_text(named or name, bench, plant, measured, chosen, levels, Path(recording)),
     )
 
 
@@ -147,10 +152,13 @@ def _check_request(
         raise ConfigurationError(f"--level = {level_rms_v:g} V RMS: allowed is above 0")
     if points < 1:
         raise ConfigurationError(f"--points = {points}: allowed is 1 or more")
+    farthest = max(bench.response_ratios.values())
+    allowed_m = bench.limits.displacement_m / farthest
+    why = f": a channel's mode_shape moves {farthest:.3g} times as far" if farthest > 1.0 else ""
     for name, level in (("--from-m", from_m), ("--to-m", to_m)):
-        if level is not None and not 0.0 < level <= bench.limits.displacement_m:
+        if level is not None and not 0.0 < level <= allowed_m:
             raise ConfigurationError(
-                f"{name} = {level:g} m: the bench {bench.name} allows above 0 and up to {bench.limits.displacement_m:g} m"
+                f"{name} = {level:g} m: the bench {bench.name} allows above 0 and up to {allowed_m:.3g} m{why}"
             )
     if from_m is not None and to_m is not None and from_m >= to_m:
         raise ConfigurationError(f"--from-m = {from_m:g} m: allowed is below --to-m = {to_m:g} m")

@@ -86,7 +86,7 @@ def test_a_person_is_shown_bench_device_limits_and_check_and_types_the_name(monk
     with rig.run(PLAN, bench=bench(), arm=ask) as run:
         assert armed(run)["how"] == "person"
     shown = capsys.readouterr().err
-    for part in ("beam next door", "serial_number 7", "9.5 V, 40 N", "never", "CAUTION"):
+    for part in ("beam next door", "serial_number 7", "9.5 V, 34 N", "never", "CAUTION"):
         assert part in shown
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
     with pytest.raises(NotArmed, match="nothing has moved"):

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rig.bench import load_bench
-from rig.campaigns.known_plant import motion_for, voltage_for
+from rig.campaigns.levels_on_plant import motion_for, voltage_for
 from rig.campaigns.plans import load_plan, plan_from
 from rig.errors import ConfigurationError
 from tests.controller.tuning.rigs import plant_of
@@ -71,10 +71,10 @@ def test_the_closed_form_fails_on_the_friction_beam_and_the_papers_gains_do_not(
 @pytest.mark.parametrize(
     ("levels", "said"),
     [
-        ({"levels_m": [1e-4, 5.9e-3]}, None),
+        ({"levels_m": [1e-4, 3.7e-3]}, None),
         ({"levels_n": [0.1, 3.0]}, r"levels_n\[1\] = 3 N: needs 19\.\d V .* allows 9\.5 V"),
         ({"levels_rms_n": [2.0]}, r"levels_rms_n\[0\] = 2 N RMS: needs 18\.\d V"),
-        ({"levels_v": [9.0]}, None),
+        ({"levels_v": [7.0]}, None),
     ],
 )
 def test_levels_beyond_the_voltage_limit_are_refused_with_the_voltage(levels, said):
@@ -178,19 +178,37 @@ def test_the_loops_inside_a_force_loop_by_the_force_at_rest_are_checked(name, ke
         (
             "force_n",
             0.5,
-            {"levels_m": [1e-3, 4e-3]},
-            r"levels_m\[1\] = 0\.004 m: means 0\.9\d* N on .* or more; .* = 0\.5",
+            {"levels_m": [1e-3, 3.5e-3]},
+            r"levels_m\[1\] = 0\.0035 m: means 0\.[78]\d* N on .* or more; .* = 0\.5",
         ),
-        ("acceleration_m_s2", 50.0, {"levels_m": [1e-3, 4e-3]}, r"levels_m\[1\] = 0\.004 m: means 93\.\d m/s\^2 on"),
+        (
+            "acceleration_m_s2",
+            50.0,
+            {"levels_m": [1e-3, 3.5e-3]},
+            r"levels_m\[1\] = 0\.0035 m: means 130 m/s\^2 at channel 'acc_magnet'",
+        ),
         (
             "displacement_m",
             2e-4,
             {"levels_n": [0.1, 0.55]},
-            r"levels_n\[1\] = 0\.55 N: means 0\.00242 m on .* still 0\.0003\d* m with 8 times the damping; .* = 0\.0002",
+            r"levels_n\[1\] = 0\.55 N: means 0\.0038\d m at channel 'acc_magnet' on .* "
+            r"still 0\.0004\d* m with 8 times the damping; .* = 0\.0002",
         ),
-        ("displacement_m", 4e-4, {"levels_n": [0.1, 0.55]}, None),  # a joint of eight times the damping would do
-        ("acceleration_m_s2", 5.0, {"levels_rms_n": [0.39]}, r"0\.39 N RMS: means 56\.\d m/s\^2 on"),
-        ("displacement_m", 2e-4, {"levels_v": [0.5]}, None),
+        ("displacement_m", 5e-4, {"levels_n": [0.1, 0.55]}, None),  # a joint of eight times the damping would do
+        (
+            "acceleration_m_s2",
+            5.0,
+            {"levels_rms_n": [0.39]},
+            r"0\.39 N RMS: means 90\.\d m/s\^2 at channel 'acc_magnet' on",
+        ),
+        ("displacement_m", 5e-4, {"levels_v": [0.5]}, None),
+        (
+            "displacement_m",
+            4e-4,
+            {"levels_v": [0.5]},
+            r"levels_v\[0\] = 0\.5 V: means 0\.00053\d m at channel 'acc_magnet' on",
+        ),
+        ("force_n", 0.07, {"levels_v": [0.5]}, r"levels_v\[0\] = 0\.5 V: means 0\.076\d N on the known plant"),
     ],
 )
 def test_levels_beyond_the_limits_of_force_and_motion_are_refused_with_the_number(limit, value, levels, said):

@@ -103,7 +103,7 @@ def test_what_makes_no_sense_is_refused_in_one_line(changes, words):
 
 def test_levels_beyond_the_bench_are_refused():
     bench = load_bench("magnet-beam")
-    with pytest.raises(ConfigurationError, match=r"levels_n\[1\] = 41 N: the bench magnet-beam allows up to 40 N"):
+    with pytest.raises(ConfigurationError, match=r"levels_n\[1\] = 41 N: the bench magnet-beam allows up to 34 N"):
         plan(levels_n=[0.2, 41.0]).check(bench)
     window = TABLE["controller"] | {"frequency_window_hz": [20.0, 24.1]}
     with pytest.raises(ConfigurationError, match=r"specimen.linear_frequency_hz = 24.37"):

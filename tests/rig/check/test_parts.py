@@ -113,9 +113,9 @@ def recorded_with(bench, inputs):
 def test_lost_samples_do_not_hide_how_near_a_limit_the_others_were():
     bench = bench_with()
     inputs = np.zeros((100, len(bench.channels)))
-    inputs[::2, 0], inputs[1::2, 0] = 36.0, -36.0  # of 40 N
+    inputs[::2, 0], inputs[1::2, 0] = 30.6, -30.6  # of 34 N
     inputs[10:14] = np.nan
-    assert share_of_limits(bench, recorded_with(bench, inputs)) == pytest.approx(36.0 / bench.limits.force_n, rel=1e-6)
+    assert share_of_limits(bench, recorded_with(bench, inputs)) == pytest.approx(30.6 / bench.limits.force_n, rel=1e-6)
 
 
 def test_a_channel_of_which_nothing_was_seen_gives_no_higher_level(monkeypatch):

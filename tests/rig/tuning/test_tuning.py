@@ -122,7 +122,8 @@ def test_a_linear_frequency_that_is_30_percent_off_is_refused_with_the_measured_
         ({"level_rms_v": 5.0}, "allows above 0 and up to 9.5 V"),
         ({"level_rms_v": -1.0}, "--level = -1 V RMS: allowed is above 0"),
         ({"law": "pid"}, "allowed is frequency-error, phase"),
-        ({"to_m": 0.02}, "up to 0.006 m"),
+        ({"to_m": 0.02}, "up to 0.00377 m: a channel's mode_shape moves 1.59 times as far"),
+        ({"to_m": 0.005}, "--to-m = 0.005 m"),
         ({"from_m": 0.002, "to_m": 0.001}, "--from-m = 0.002 m: allowed is below"),
         ({"points": 0}, "--points = 0"),
     ],
@@ -170,8 +171,8 @@ def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_sai
 
 
 def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):
-    tuned = tune("magnet-beam", tmp_path / "test.h5", level_rms_v=0.05, to_m=0.005, points=3)
-    assert [note for note in tuned.notes if "out of reach where the damping rises beyond 1.3 times" in note]
+    tuned = tune("magnet-beam", tmp_path / "test.h5", level_rms_v=0.05, to_m=0.0037, points=3)
+    assert [note for note in tuned.notes if "out of reach where the damping rises beyond 1.7" in note]
     assert not magnet.notes
 
 
