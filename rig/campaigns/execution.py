@@ -12,6 +12,7 @@ from rig.campaigns.evaluate import failed_point
 from rig.campaigns.kept_rows import KeptRows
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
+from rig.campaigns.plausibility import with_plausibility
 from rig.campaigns.quality import what_was_skipped
 from rig.campaigns.rounds import round_at
 from rig.campaigns.stop_signals import stop_on_signals
@@ -77,6 +78,7 @@ class Execution:
         progress: Progress,
         done: frozenset[int] = frozenset(),
         numbers: Sequence[int] | None = None,
+        before: Sequence[Mapping[str, Any]] = (),
     ) -> None:
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
         self.journal, self.progress = journal, progress
@@ -85,6 +87,7 @@ class Execution:
         self.targets = plan.targets()
         self.measured_before = done
         self.numbers = range(len(self.targets)) if numbers is None else numbers
+        self.good = list(before)
         self.done = len(done)
         self.finished = self.done
         self.accepted = self.done
@@ -220,8 +223,11 @@ class Execution:
 
     def _report(self, point: dict[str, Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
+        point = with_plausibility(self.bench, self.plan, point, self.good)
         quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
         point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
+        if point["accepted"]:
+            self.good.append(point)
         self._write(self.journal.point, point)
         self.reported[point["number"]] = point
         self.finished += 1

@@ -1,0 +1,186 @@
+"""Whether the channels of a point fit each other: by the mode shapes of the bench, and by the points before.
+
+A sensor that fails in a plausible way trips nothing: one that reads noise only, one whose sensitivity has fallen to a tenth.
+At phase resonance of one mode the fundamental of response k over that of the drive is ``phi_k / phi_d``, a real number; higher
+harmonics and other modes change it by some per cent. What it differs by is a factor
+
+    (max(|q|, |phi|) + a) / (min(|q|, |phi|) + a),    q = Y_k / Y_d phi_d
+
+with an allowance ``a``, so that a channel near a node is not judged by the ratio of two small numbers. The allowance grows away
+from resonance, with the tangent of the phase or with the detuning, whichever says less.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.campaigns.evaluate import as_complex
+from rig.campaigns.locked import LockedPlan
+from rig.campaigns.misfits import Misfit, Seen, told
+from rig.campaigns.plan import Plan
+
+__all__ = ["REFUSED", "WARNED", "with_plausibility"]
+
+WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping by less than the level
+REFUSED = 4.0
+ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres off its place
+DETUNED = 20.0  # times ALLOWANCE for a square of the frequency that is off by all of itself
+SURE = 3.0  # standard errors
+NEAR = 0.1  # in frequency, relative: in open loop only points so near are compared
+FEW = 5  # of them
+
+Point = Mapping[str, Any]
+
+
+def with_plausibility(bench: Bench, plan: Plan, point: dict[str, Any], before: Sequence[Point]) -> dict[str, Any]:
+    """The point, warned of or refused where a channel fits neither the mode shapes nor the accepted points ``before``."""
+    misfits = misfits_of(bench, plan, point, before)
+    worst = max((misfit.factor for misfit in misfits), default=1.0)
+    if worst < WARNED:
+        return point
+    text = told(misfits, bench.channels[bench.index_of("drive")].name, WARNED, REFUSED)
+    if worst < REFUSED or not point["accepted"]:
+        return {**point, "warnings": [*(point.get("warnings") or ()), text]}
+    return {**point, "accepted": False, "quality": "implausible", "reason": text}
+
+
+def misfits_of(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) -> list[Misfit]:
+    """By how much each channel differs from what is expected of it; none where nothing is known to compare with."""
+    if "harmonics" in point:
+        return _of_a_tone(bench, plan, point, [one for one in before if "harmonics" in one])
+    if "channel_rms" in point:
+        return _of_a_band(bench, point, [one for one in before if "channel_rms" in one])
+    return []
+
+
+def _of_a_tone(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) -> list[Misfit]:
+    """Fundamentals of the responses over that of the drive and, under a lock, force over velocity."""
+    drive, locked = bench.index_of("drive"), isinstance(plan, LockedPlan)
+    ratios, spread = _ratios(point, drive), _spread(bench, point, drive)
+    softened = 1.0 if spread is None else _softened(bench, point, drive)
+    if not locked:
+        off = [abs(math.log(one["frequency_hz"] / point["frequency_hz"])) for one in before]
+        before = [before[i] for i in np.argsort(off, kind="stable")[:FEW] if off[i] < NEAR]
+    usual = np.median([_ratios(one, drive) for one in before], axis=0) if before else None
+    shapes = _shapes(bench) if locked or _near_the_mode(bench, point) else None
+    out = []
+    for index, channel in enumerate(bench.channels):
+        if channel.role != "response" or spread is None:
+            continue
+        for expected, by in ((shapes, Seen.SHAPES), (usual, Seen.BEFORE)):
+            if expected is not None and np.isfinite(expected[index]):
+                largest = float(np.nanmax(np.abs([expected[i] for i in _motions(bench)])))
+                allowed = ALLOWANCE * softened * largest + SURE * spread[index]
+                out.append(_misfit(channel.name, complex(ratios[index]), complex(expected[index]), allowed, by))
+    return [*out, *(_of_the_force(bench, point, before) if locked else [])]
+
+
+def _of_the_force(bench: Bench, point: Point, before: Sequence[Point]) -> list[Misfit]:
+    """In-phase force over velocity, against the nearest of the points before: a damping changes less than the level does."""
+    force = bench.channels[bench.index_of("force")].name
+    here = _resistance(bench, point)
+    known = [one for one in before if one["level_unit"] == point["level_unit"]]
+    if not known or not here > 0.0:
+        return []
+    nearest = min(known, key=lambda one: (_apart(point, one, "level"), _lags_apart(point, one)))
+    there = _resistance(bench, nearest)
+    if not there > 0.0:
+        return []
+    factor = max(here / there, there / here) / math.exp(_apart(point, nearest, "level"))
+    return [
+        Misfit(
+            force, here / there, 1.0, max(factor, 1.0), Seen.BEFORE, f"{nearest['level']:.4g} {nearest['level_unit']}"
+        )
+    ]
+
+
+def _of_a_band(bench: Bench, point: Point, before: Sequence[Point]) -> list[Misfit]:
+    """RMS of force and responses over that of the drive, against the points before at the same level."""
+    alike = [one for one in before if one["level"] == point["level"]]
+    drive = bench.index_of("drive")
+    here, usual = _levels(point, drive), np.median([_levels(one, drive) for one in alike], axis=0) if alike else None
+    if usual is None:
+        return []
+    return [
+        _misfit(channel.name, complex(here[index]), complex(usual[index]), 1e-12, Seen.BEFORE)
+        for index, channel in enumerate(bench.channels)
+        if channel.role in ("force", "response") and usual[index] > 0.0
+    ]
+
+
+def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: Seen) -> Misfit:
+    """How far a ratio is from the expected one; opposite signs of what stands out are as far apart as can be."""
+    size, wanted = abs(seen), abs(expected)
+    factor = (max(size, wanted) + allowed) / (min(size, wanted) + allowed)
+    turned = (seen * expected.conjugate()).real < 0.0
+    if turned and min(size, wanted) > 2.0 * allowed:
+        return Misfit(name, -size, wanted, max(factor, REFUSED), by)
+    return Misfit(name, size, wanted, factor, by)
+
+
+def _ratios(point: Point, drive: int) -> np.ndarray:
+    fundamentals = as_complex(point["harmonics"])[:, 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(fundamentals / fundamentals[drive])
+
+
+def _levels(point: Point, drive: int) -> np.ndarray:
+    sizes = np.asarray(point["channel_rms"], float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(sizes / sizes[drive])
+
+
+def _spread(bench: Bench, point: Point, drive: int) -> np.ndarray | None:
+    """Standard errors of the ratios from noise and the converter's steps; None where there is no drive to compare with."""
+    size = np.abs(as_complex(point["harmonics"])[:, 1])
+    known = point["harmonics_std"]
+    std = np.zeros(size.size) if known is None else np.asarray(known, float)[:, 1]
+    steps = np.array([channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels])
+    return None if not size[drive] > 0.0 else np.hypot(std, steps / math.sqrt(12.0)) / size[drive]
+
+
+def _shapes(bench: Bench) -> np.ndarray | None:
+    """Mode shapes over that of the drive point; NaN for channels that have none."""
+    at_drive = bench.specimen.drive_mode_shape
+    if at_drive is None:
+        return None
+    drive = bench.index_of("drive")
+    known = [at_drive if i == drive else channel.mode_shape for i, channel in enumerate(bench.channels)]
+    return np.array([math.nan if shape is None else shape for shape in known]) / at_drive
+
+
+def _motions(bench: Bench) -> list[int]:
+    return [index for index, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
+
+
+def _near_the_mode(bench: Bench, point: Point) -> bool:
+    return abs(math.log(point["frequency_hz"] / bench.specimen.linear_frequency_hz)) < NEAR
+
+
+def _softened(bench: Bench, point: Point, drive: int) -> float:
+    """How many times the allowance at resonance is allowed, 1 or more."""
+    fundamentals = as_complex(point["harmonics"])[:, 1]
+    force, velocity = fundamentals[bench.index_of("force")], -1j * fundamentals[drive]
+    active = abs((force * velocity.conjugate()).real)
+    by_phase = math.inf if active == 0.0 else abs(force) * abs(velocity) / active - 1.0
+    detuned = abs((float(point["frequency_hz"]) / bench.specimen.linear_frequency_hz) ** 2 - 1.0)
+    return 1.0 + min(by_phase, DETUNED * detuned)
+
+
+def _resistance(bench: Bench, point: Point) -> float:
+    """Part of the force in phase with the drive point's velocity, over that velocity, N s/m."""
+    fundamentals = as_complex(point["harmonics"])[:, 1]
+    velocity = fundamentals[bench.index_of("drive")] / (2j * math.pi * point["frequency_hz"])
+    force = fundamentals[bench.index_of("force")]
+    return float((force * velocity.conjugate()).real / abs(velocity) ** 2) if velocity else math.nan
+
+
+def _apart(one: Point, other: Point, key: str) -> float:
+    return abs(math.log(float(one[key]) / float(other[key])))
+
+
+def _lags_apart(one: Point, other: Point) -> float:
+    return abs(float(one.get("asked_phase_lag_deg", 0.0)) - float(other.get("asked_phase_lag_deg", 0.0)))
