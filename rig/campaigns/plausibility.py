@@ -24,11 +24,12 @@ from rig.campaigns.plan import Plan
 
 __all__ = ["REFUSED", "WARNED", "with_plausibility"]
 
-WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping by less than the level
+WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping with the root of the level
 REFUSED = 4.0
 ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres off its place
 DETUNED = 20.0  # times ALLOWANCE for a square of the frequency that is off by all of itself
 SURE = 3.0  # standard errors
+FASTEST = 2.0  # change of a damping that is put down to the level
 NEAR = 0.1  # in frequency, relative: in open loop only points so near are compared
 FEW = 5  # of them
 
@@ -36,9 +37,15 @@ Point = Mapping[str, Any]
 
 
 def with_plausibility(bench: Bench, plan: Plan, point: dict[str, Any], before: Sequence[Point]) -> dict[str, Any]:
-    """The point, warned of or refused where a channel fits neither the mode shapes nor the accepted points ``before``."""
-    misfits = misfits_of(bench, plan, point, before)
-    worst = max((misfit.factor for misfit in misfits), default=1.0)
+    """The point with its ``misfit``, the largest factor; warned of or refused where that is too large.
+
+    ``before``: the accepted points before. Those that were warned of are no measure of others: a fault would become the usual.
+    """
+    misfits = misfits_of(bench, plan, point, [one for one in before if one.get("misfit", 1.0) < WARNED])
+    if not misfits:
+        return point
+    worst = max(misfit.factor for misfit in misfits)
+    point = {**point, "misfit": worst}
     if worst < WARNED:
         return point
     text = told(misfits, bench.channels[bench.index_of("drive")].name, WARNED, REFUSED)
@@ -79,7 +86,7 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) 
 
 
 def _of_the_force(bench: Bench, point: Point, before: Sequence[Point]) -> list[Misfit]:
-    """In-phase force over velocity, against the nearest of the points before: a damping changes less than the level does."""
+    """In-phase force over velocity, against the nearest of the points before: a damping may change with the level's root."""
     force = bench.channels[bench.index_of("force")].name
     here = _resistance(bench, point)
     known = [one for one in before if one["level_unit"] == point["level_unit"]]
@@ -89,7 +96,8 @@ def _of_the_force(bench: Bench, point: Point, before: Sequence[Point]) -> list[M
     there = _resistance(bench, nearest)
     if not there > 0.0:
         return []
-    factor = max(here / there, there / here) / math.exp(_apart(point, nearest, "level"))
+    allowed = min(math.exp(0.5 * _apart(point, nearest, "level")), FASTEST)
+    factor = max(here / there, there / here) / allowed
     return [
         Misfit(
             force, here / there, 1.0, max(factor, 1.0), Seen.BEFORE, f"{nearest['level']:.4g} {nearest['level_unit']}"
@@ -117,8 +125,8 @@ def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: See
     factor = (max(size, wanted) + allowed) / (min(size, wanted) + allowed)
     turned = (seen * expected.conjugate()).real < 0.0
     if turned and min(size, wanted) > 2.0 * allowed:
-        return Misfit(name, -size, wanted, max(factor, REFUSED), by)
-    return Misfit(name, size, wanted, factor, by)
+        return Misfit(name, -size, wanted, float(max(factor, REFUSED)), by)
+    return Misfit(name, size, wanted, float(factor), by)
 
 
 def _ratios(point: Point, drive: int) -> np.ndarray:
