@@ -13,6 +13,7 @@ from rig.safety.layout import POLARITY_HINT, EndReason
 __all__ = ["Advice", "Before", "Trip", "advice_on"]
 
 CLEAR = 0.7  # of a limit: a level that is expected there, in proportion to one before, is too high
+ROOM = 0.9  # of a limit: where a level is proposed that in proportion should fit
 AT_AN_END = 0.01  # of a frequency window's width
 
 BESIDE_THE_LEVEL = {
@@ -95,7 +96,7 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
     reached = f"{100.0 * margin.share:.2g} % of {margin.key} on channel {name}"
     had = f"the point before, {margin.level:.4g} {unit}, had reached {reached}"
     if at is None or margin.share * max(at.level / margin.level, 1.0) >= CLEAR:
-        below = margin.level / margin.share
+        below = ROOM * margin.level / margin.share
         bound = f" below {below:.2g} {unit}" if at is None or below < at.level else ""
         return Advice(f"{had}: {what} is too high", f"lower {_key(plan, at)}{bound}, or {raised}")
     return Advice(

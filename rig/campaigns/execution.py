@@ -90,13 +90,13 @@ class Execution:
         self.targets = plan.targets()
         self.measured_before = done
         self.numbers = range(len(self.targets)) if numbers is None else numbers
-        self.good = list(before)
+        self.known = list(before)
         self.done = len(done)
         self.finished = self.done
         self.accepted = self.done
         self.reported: dict[int, dict[str, Any]] = {}
         self.next_segment = 0
-        self.locked = any("phase_error_deg" in point for point in before)
+        self.locked = any(point["accepted"] for point in before)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = KeptRows(loop.tick.row_dtype)
         self.write_error: RecordingError | None = None
@@ -228,11 +228,10 @@ class Execution:
 
     def _report(self, point: dict[str, Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
-        point = with_plausibility(self.bench, self.plan, point, self.good)
+        point = with_plausibility(self.bench, self.plan, point, self.known)
         quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
         point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
-        if point["accepted"]:
-            self.good.append(point)
+        self.known.append(point)
         self._write(self.journal.point, point)
         self.reported[point["number"]] = point
         self.finished += 1
@@ -279,8 +278,8 @@ class Execution:
         at = tripped_at(self.tick, self.plan, self.targets)
         frequency_hz = float(self.tick.arrays.loop["omega"][0]) / (2.0 * math.pi)
         trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
-        recorded = [p for p in self.reported.values() if not p["accepted"] and p["quality"] != "implausible"]
-        points = [point for point in (*self.good, *recorded) if "harmonics" in point or point["accepted"]]
+        recorded = [point for point in self.known if "harmonics" in point or point["accepted"]]
+        points = [point for point in recorded if point.get("quality") != "implausible"]
         first = not points and (self.in_one_go or len(self.reported) <= 1)
         advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
         return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}

@@ -14,6 +14,8 @@ class Seen(Enum):
 
     SHAPES = "by the mode shapes of the bench"
     BEFORE = "by the points before"
+    NOT_TRUSTED = "where it did not fit"
+    OTHER_WAY = "by the other way past the level"
 
 
 class Misfit(NamedTuple):
@@ -55,6 +57,8 @@ def told(misfits: Sequence[Misfit], drive: str, warned: float, refused: float) -
 
 
 def _one(misfit: Misfit) -> str:
+    if misfit.by is Seen.NOT_TRUSTED:
+        return f"channel {misfit.channel}: force over velocity at the drive point is like that at {misfit.at},"
     if misfit.at:
         return (
             f"channel {misfit.channel}: force over velocity at the drive point is {misfit.times:.3g} times that at "

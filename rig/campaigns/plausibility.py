@@ -18,11 +18,12 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.campaigns.evaluate import as_complex
+from rig.campaigns.gaps import rms_of
 from rig.campaigns.locked import LockedPlan
 from rig.campaigns.misfits import Misfit, Seen, told
 from rig.campaigns.plan import Plan
 
-__all__ = ["REFUSED", "WARNED", "with_plausibility"]
+__all__ = ["REFUSED", "WARNED", "with_plausibility", "with_plausible_ways"]
 
 WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping with the root of the level
 REFUSED = 4.0
@@ -32,6 +33,7 @@ SURE = 3.0  # standard errors
 FASTEST = 2.0  # change of a damping that is put down to the level
 NEAR = 0.1  # in frequency, relative: in open loop only points so near are compared
 FEW = 5  # of them
+MANY = 100  # under a lock: more would tell no more
 
 Point = Mapping[str, Any]
 
@@ -39,15 +41,35 @@ Point = Mapping[str, Any]
 def with_plausibility(bench: Bench, plan: Plan, point: dict[str, Any], before: Sequence[Point]) -> dict[str, Any]:
     """The point with its ``misfit``, the largest factor; warned of or refused where that is too large.
 
-    ``before``: the accepted points before. Those that were warned of are no measure of others: a fault would become the usual.
+    ``before``: the points before. Those that did not fit or were not accepted are no measure of others: a fault would become
+    the usual. With a point that did not fit, others that are like it do not fit either.
     """
-    misfits = misfits_of(bench, plan, point, [one for one in before if one.get("misfit", 1.0) < WARNED])
+    return _judged(bench, point, misfits_of(bench, plan, point, before))
+
+
+def with_plausible_ways(bench: Bench, point: dict[str, Any], pieces: Sequence[np.ndarray]) -> dict[str, Any]:
+    """The same by the rows of two ways past one level, of which a point holds the mean; nothing is said of a single way."""
+    if len(pieces) < 2:
+        return point
+    drive = bench.index_of("drive")
+    up, down = (_levels({"channel_rms": rms_of(rows)}, drive) for rows in pieces)
+    responses = [index for index, channel in enumerate(bench.channels) if channel.role == "response"]
+    allowed = ALLOWANCE * float(np.max(up[_motions(bench)]))
+    misfits = [
+        _misfit(bench.channels[index].name, complex(down[index]), complex(up[index]), allowed, Seen.OTHER_WAY)
+        for index in responses
+    ]
+    return _judged(bench, point, misfits)
+
+
+def _judged(bench: Bench, point: dict[str, Any], misfits: Sequence[Misfit]) -> dict[str, Any]:
     if not misfits:
         return point
     worst = max(misfit.factor for misfit in misfits)
-    point = {**point, "misfit": worst}
+    point = {**point, "misfit": max(worst, point.get("misfit", 1.0))}
     if worst < WARNED:
         return point
+    point["misfit_channels"] = sorted({misfit.channel for misfit in misfits if misfit.factor >= WARNED})
     text = told(misfits, bench.channels[bench.index_of("drive")].name, WARNED, REFUSED)
     if worst < REFUSED or not point["accepted"]:
         return {**point, "warnings": [*(point.get("warnings") or ()), text]}
@@ -56,22 +78,25 @@ def with_plausibility(bench: Bench, plan: Plan, point: dict[str, Any], before: S
 
 def misfits_of(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) -> list[Misfit]:
     """By how much each channel differs from what is expected of it; none where nothing is known to compare with."""
+    usual = [one for one in before if one["accepted"] and one.get("misfit", 1.0) < WARNED]
     if "harmonics" in point:
-        return _of_a_tone(bench, plan, point, [one for one in before if "harmonics" in one])
+        tones = [one for one in usual if "harmonics" in one]
+        force = _of_the_force(bench, point, tones, before) if isinstance(plan, LockedPlan) else []
+        return [*_of_a_tone(bench, plan, point, tones), *force]
     if "channel_rms" in point:
-        return _of_a_band(bench, point, [one for one in before if "channel_rms" in one])
+        return _of_a_band(bench, point, [one for one in usual if "channel_rms" in one])
     return []
 
 
 def _of_a_tone(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) -> list[Misfit]:
-    """Fundamentals of the responses over that of the drive and, under a lock, force over velocity."""
+    """Fundamentals of the responses over that of the drive."""
     drive, locked = bench.index_of("drive"), isinstance(plan, LockedPlan)
     ratios, spread = _ratios(point, drive), _spread(bench, point, drive)
     softened = 1.0 if spread is None else _softened(bench, point, drive)
     if not locked:
         off = [abs(math.log(one["frequency_hz"] / point["frequency_hz"])) for one in before]
         before = [before[i] for i in np.argsort(off, kind="stable")[:FEW] if off[i] < NEAR]
-    usual = np.median([_ratios(one, drive) for one in before], axis=0) if before else None
+    usual = np.median([_ratios(one, drive) for one in before[-MANY:]], axis=0) if before else None
     shapes = _shapes(bench) if locked or _near_the_mode(bench, point) else None
     out = []
     for index, channel in enumerate(bench.channels):
@@ -82,27 +107,46 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) 
                 largest = float(np.nanmax(np.abs([expected[i] for i in _motions(bench)])))
                 allowed = ALLOWANCE * softened * largest + SURE * spread[index]
                 out.append(_misfit(channel.name, complex(ratios[index]), complex(expected[index]), allowed, by))
-    return [*out, *(_of_the_force(bench, point, before) if locked else [])]
+    return out
 
 
-def _of_the_force(bench: Bench, point: Point, before: Sequence[Point]) -> list[Misfit]:
-    """In-phase force over velocity, against the nearest of the points before: a damping may change with the level's root."""
+def _of_the_force(bench: Bench, point: Point, usual: Sequence[Point], before: Sequence[Point]) -> list[Misfit]:
+    """In-phase force over velocity, against the nearest of the points before: a damping may change with the level's root.
+
+    Over some levels a damping may change so much that a fault is hidden. So a point that is like a nearer one of which the
+    force did not fit does not fit either.
+    """
     force = bench.channels[bench.index_of("force")].name
-    here = _resistance(bench, point)
-    known = [one for one in before if one["level_unit"] == point["level_unit"]]
-    if not known or not here > 0.0:
-        return []
-    nearest = min(known, key=lambda one: (_apart(point, one, "level"), _lags_apart(point, one)))
-    there = _resistance(bench, nearest)
-    if not there > 0.0:
-        return []
-    allowed = min(math.exp(0.5 * _apart(point, nearest, "level")), FASTEST)
-    factor = max(here / there, there / here) / allowed
-    return [
-        Misfit(
-            force, here / there, 1.0, max(factor, 1.0), Seen.BEFORE, f"{nearest['level']:.4g} {nearest['level_unit']}"
+    nearest, misfitting = (
+        min(
+            (one for one in some if one["level_unit"] == point["level_unit"]),
+            key=lambda one: (_apart(point, one, "level"), _lags_apart(point, one)),
+            default=None,
         )
-    ]
+        for some in (usual, [one for one in before if force in one.get("misfit_channels", ())])
+    )
+    if nearest is None:
+        return []
+    times, factor = _against(bench, point, nearest)
+    found = Misfit(force, times, 1.0, factor, Seen.BEFORE, _level_of(nearest))
+    if misfitting is not None and _apart(point, misfitting, "level") < _apart(point, nearest, "level"):
+        times, factor = _against(bench, point, misfitting)
+        if factor < WARNED <= misfitting["misfit"] and found.factor < misfitting["misfit"]:
+            return [Misfit(force, times, 1.0, misfitting["misfit"], Seen.NOT_TRUSTED, _level_of(misfitting))]
+    return [found]
+
+
+def _against(bench: Bench, point: Point, other: Point) -> tuple[float, float]:
+    """Force over velocity over that of another point, and by how much that is more than the levels tell of."""
+    here, there = _resistance(bench, point), _resistance(bench, other)
+    if not (here > 0.0 and there > 0.0):
+        return 1.0, 1.0
+    allowed = min(math.exp(0.5 * _apart(point, other, "level")), FASTEST)
+    return here / there, max(here / there / allowed, there / here / allowed, 1.0)
+
+
+def _level_of(point: Point) -> str:
+    return f"{point['level']:.4g} {point['level_unit']}"
 
 
 def _of_a_band(bench: Bench, point: Point, before: Sequence[Point]) -> list[Misfit]:

@@ -103,7 +103,7 @@ def take_up(
         drawn = (recording.seed or 0) + len(recording.parts) if seed is None else seed
         information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
         finished = recording.complete and not left.changed
-        before = [point for point in recording.points if point["accepted"]]
+        before = recording.points
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench

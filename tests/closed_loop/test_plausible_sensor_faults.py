@@ -60,6 +60,10 @@ def _dead(inputs, noise):
     inputs[:, TIP] = noise
 
 
+def _dead_beside(inputs, noise):
+    inputs[:, BESIDE] = noise
+
+
 def _tenth_of_the_drive(inputs, noise):
     inputs[:, DRIVE] *= 0.1
 
@@ -146,3 +150,28 @@ def test_a_response_that_dies_between_realisations_of_a_multisine_is_noticed(mon
         points = run.recording.points
         assert [point["accepted"] for point in points] == [True, False, False]
         assert points[1]["reason"].startswith("channel acc_magnet has")
+
+
+def test_a_response_that_dies_between_the_two_ways_of_a_continuous_backbone_is_noticed(monkeypatch):
+    friction = bench_with({"block": 10}, "friction-beam")
+    with rig.run("friction-beam/continuous-backbone", bench=friction, seed=1) as run:
+        points = run.recording.points
+        assert run.complete
+        assert max(point["misfit"] for point in points) < 1.5
+        half = (points[0]["first_sample"] + points[0]["end_sample"]) // 2
+    spoil(monkeypatch, half, _dead_beside)
+    with rig.run("friction-beam/continuous-backbone", bench=friction, seed=1) as run:
+        reasons = [point["reason"] for point in run.recording.points]
+    told = [r for r in reasons if r.startswith("channel acc_left") and "by the other way past the level" in r]
+    assert len(told) >= len(reasons) - 3
+
+
+def test_a_force_sensor_that_fails_is_not_taken_for_a_damping_that_rises_with_the_level(monkeypatch):
+    plan = "friction-beam/backbone"
+    friction = bench_with({"block": 10}, "friction-beam")
+    with rig.run(plan, bench=friction, seed=1) as run:
+        begins = run.recording.points[5]["first_sample"]
+    spoil(monkeypatch, begins - 600, _tenth_of_the_force)
+    with rig.run(plan, bench=friction, seed=1) as run:
+        accepted = [point["accepted"] for point in run.recording.points]
+    assert accepted == [True] * 5 + [False] * (len(accepted) - 5)
