@@ -7,7 +7,7 @@ harmonics and other modes change it by some per cent. What it differs by is a fa
     (max(|q|, |phi|) + a) / (min(|q|, |phi|) + a),    q = Y_k / Y_d phi_d
 
 with an allowance ``a``, so that a channel near a node is not judged by the ratio of two small numbers. The allowance grows away
-from resonance, with the tangent of the phase or with the detuning, whichever says less.
+from resonance, with 1 over the cosine of the phase or with the detuning, whichever grows less.
 """
 
 import math
@@ -17,7 +17,15 @@ from typing import Any
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.evaluate import as_complex
+from rig.campaigns.channel_ratios import (
+    motions_of,
+    ratios_of,
+    resistance_of,
+    rms_ratios_of,
+    shapes_of,
+    softened,
+    spread_of,
+)
 from rig.campaigns.gaps import rms_of
 from rig.campaigns.locked import LockedPlan
 from rig.campaigns.misfits import Misfit, Seen, told
@@ -28,7 +36,6 @@ __all__ = ["REFUSED", "WARNED", "with_plausibility", "with_plausible_ways"]
 WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping with the root of the level
 REFUSED = 4.0
 ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres off its place
-DETUNED = 20.0  # times ALLOWANCE for a square of the frequency that is off by all of itself
 SURE = 3.0  # standard errors
 FASTEST = 2.0  # change of a damping that is put down to the level
 NEAR = 0.1  # in frequency, relative: in open loop only points so near are compared
@@ -52,9 +59,9 @@ def with_plausible_ways(bench: Bench, point: dict[str, Any], pieces: Sequence[np
     if len(pieces) < 2:
         return point
     drive = bench.index_of("drive")
-    up, down = (_levels({"channel_rms": rms_of(rows)}, drive) for rows in pieces)
+    up, down = (rms_ratios_of({"channel_rms": rms_of(rows)}, drive) for rows in pieces)
     responses = [index for index, channel in enumerate(bench.channels) if channel.role == "response"]
-    allowed = ALLOWANCE * float(np.max(up[_motions(bench)]))
+    allowed = ALLOWANCE * float(np.max(up[motions_of(bench)]))
     misfits = [
         _misfit(bench.channels[index].name, complex(down[index]), complex(up[index]), allowed, Seen.OTHER_WAY)
         for index in responses
@@ -91,21 +98,21 @@ def misfits_of(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) 
 def _of_a_tone(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) -> list[Misfit]:
     """Fundamentals of the responses over that of the drive."""
     drive, locked = bench.index_of("drive"), isinstance(plan, LockedPlan)
-    ratios, spread = _ratios(point, drive), _spread(bench, point, drive)
-    softened = 1.0 if spread is None else _softened(bench, point, drive)
+    ratios, spread = ratios_of(point, drive), spread_of(bench, point, drive)
+    times = 1.0 if spread is None else softened(bench, point, drive)
     if not locked:
         off = [abs(math.log(one["frequency_hz"] / point["frequency_hz"])) for one in before]
         before = [before[i] for i in np.argsort(off, kind="stable")[:FEW] if off[i] < NEAR]
-    usual = np.median([_ratios(one, drive) for one in before[-MANY:]], axis=0) if before else None
-    shapes = _shapes(bench) if locked or _near_the_mode(bench, point) else None
+    usual = np.median([ratios_of(one, drive) for one in before[-MANY:]], axis=0) if before else None
+    shapes = shapes_of(bench) if locked or _near_the_mode(bench, point) else None
     out = []
     for index, channel in enumerate(bench.channels):
         if channel.role != "response" or spread is None:
             continue
         for expected, by in ((shapes, Seen.SHAPES), (usual, Seen.BEFORE)):
             if expected is not None and np.isfinite(expected[index]):
-                largest = float(np.nanmax(np.abs([expected[i] for i in _motions(bench)])))
-                allowed = ALLOWANCE * softened * largest + SURE * spread[index]
+                largest = float(np.nanmax(np.abs([expected[i] for i in motions_of(bench)])))
+                allowed = ALLOWANCE * times * largest + SURE * spread[index]
                 out.append(_misfit(channel.name, complex(ratios[index]), complex(expected[index]), allowed, by))
     return out
 
@@ -138,7 +145,7 @@ def _of_the_force(bench: Bench, point: Point, usual: Sequence[Point], before: Se
 
 def _against(bench: Bench, point: Point, other: Point) -> tuple[float, float]:
     """Force over velocity over that of another point, and by how much that is more than the levels tell of."""
-    here, there = _resistance(bench, point), _resistance(bench, other)
+    here, there = resistance_of(bench, point), resistance_of(bench, other)
     if not (here > 0.0 and there > 0.0):
         return 1.0, 1.0
     allowed = min(math.exp(0.5 * _apart(point, other, "level")), FASTEST)
@@ -153,7 +160,10 @@ def _of_a_band(bench: Bench, point: Point, before: Sequence[Point]) -> list[Misf
     """RMS of force and responses over that of the drive, against the points before at the same level."""
     alike = [one for one in before if one["level"] == point["level"]]
     drive = bench.index_of("drive")
-    here, usual = _levels(point, drive), np.median([_levels(one, drive) for one in alike], axis=0) if alike else None
+    here, usual = (
+        rms_ratios_of(point, drive),
+        np.median([rms_ratios_of(one, drive) for one in alike], axis=0) if alike else None,
+    )
     if usual is None:
         return []
     return [
@@ -173,61 +183,8 @@ def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: See
     return Misfit(name, size, wanted, float(factor), by)
 
 
-def _ratios(point: Point, drive: int) -> np.ndarray:
-    fundamentals = as_complex(point["harmonics"])[:, 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(fundamentals / fundamentals[drive])
-
-
-def _levels(point: Point, drive: int) -> np.ndarray:
-    sizes = np.asarray(point["channel_rms"], float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(sizes / sizes[drive])
-
-
-def _spread(bench: Bench, point: Point, drive: int) -> np.ndarray | None:
-    """Standard errors of the ratios from noise and the converter's steps; None where there is no drive to compare with."""
-    size = np.abs(as_complex(point["harmonics"])[:, 1])
-    known = point["harmonics_std"]
-    std = np.zeros(size.size) if known is None else np.asarray(known, float)[:, 1]
-    steps = np.array([channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels])
-    return None if not size[drive] > 0.0 else np.hypot(std, steps / math.sqrt(12.0)) / size[drive]
-
-
-def _shapes(bench: Bench) -> np.ndarray | None:
-    """Mode shapes over that of the drive point; NaN for channels that have none."""
-    at_drive = bench.specimen.drive_mode_shape
-    if at_drive is None:
-        return None
-    drive = bench.index_of("drive")
-    known = [at_drive if i == drive else channel.mode_shape for i, channel in enumerate(bench.channels)]
-    return np.array([math.nan if shape is None else shape for shape in known]) / at_drive
-
-
-def _motions(bench: Bench) -> list[int]:
-    return [index for index, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
-
-
 def _near_the_mode(bench: Bench, point: Point) -> bool:
     return abs(math.log(point["frequency_hz"] / bench.specimen.linear_frequency_hz)) < NEAR
-
-
-def _softened(bench: Bench, point: Point, drive: int) -> float:
-    """How many times the allowance at resonance is allowed, 1 or more."""
-    fundamentals = as_complex(point["harmonics"])[:, 1]
-    force, velocity = fundamentals[bench.index_of("force")], -1j * fundamentals[drive]
-    active = abs((force * velocity.conjugate()).real)
-    by_phase = math.inf if active == 0.0 else abs(force) * abs(velocity) / active - 1.0
-    detuned = abs((float(point["frequency_hz"]) / bench.specimen.linear_frequency_hz) ** 2 - 1.0)
-    return 1.0 + min(by_phase, DETUNED * detuned)
-
-
-def _resistance(bench: Bench, point: Point) -> float:
-    """Part of the force in phase with the drive point's velocity, over that velocity, N s/m."""
-    fundamentals = as_complex(point["harmonics"])[:, 1]
-    velocity = fundamentals[bench.index_of("drive")] / (2j * math.pi * point["frequency_hz"])
-    force = fundamentals[bench.index_of("force")]
-    return float((force * velocity.conjugate()).real / abs(velocity) ** 2) if velocity else math.nan
 
 
 def _apart(one: Point, other: Point, key: str) -> float:
