@@ -169,15 +169,17 @@ def resume(
     operator: str | None = None,
     specimen_serial: str = "",
     notes: Sequence[str] = (),
+    retry_tripped: bool = False,
 ) -> Run:
     """Go on with a recording: points that were accepted stay, the others are measured in a further part.
 
     A changed ``plan`` of the same kind and bench takes the place of the one in force. Points that it asks for and that were
     accepted by any plan before are not measured again; those that it does not ask for stay in the file and count no more.
-    ``seed`` draws the noise of the further part; without it, one that no part had. ``arm`` and all after it: as for `run`.
+    ``seed`` draws the noise of the further part; without it, one that no part had. ``arm`` to ``notes``: as for `run`.
+    A level that tripped, and any higher one, is not tried again unless ``retry_tripped``.
 
-    Raises `rig.errors.ConfigurationError` for a plan that cannot follow, `rig.errors.RecordingError` for a file that cannot
-    be read or written.
+    Raises `rig.errors.ConfigurationError` for a plan that cannot follow or asks for a level that tripped,
+    `rig.errors.RecordingError` for a file that cannot be read or written.
     """
     if seed is not None and not 0 <= seed < 2**63:
         raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
@@ -193,5 +195,6 @@ def resume(
             progress=progress,
             arm=arm,
             about=About(operator, specimen_serial, tuple(notes)),
+            retry_tripped=retry_tripped,
         )
     )

@@ -99,6 +99,9 @@ def resume(
     output: Annotated[Path, typer.Argument(help="Recording of the interrupted run.")],
     plan: Annotated[str | None, typer.Option(help="Changed plan to go on with: a name or TOML file.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)] = None,
+    retry_tripped: Annotated[
+        bool, typer.Option("--retry-tripped", help="Try a level at which the run tripped again.")
+    ] = False,
     realtime: Realtime = False,
     arm: ArmNow = False,
     operator: Operator = None,
@@ -125,6 +128,7 @@ def resume(
             operator=operator,
             specimen_serial=specimen_serial,
             notes=note or (),
+            retry_tripped=retry_tripped,
         ),
     )
 

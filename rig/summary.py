@@ -51,6 +51,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
             "rows": part.n_rows,
             "ended": None if part.end is None else part.end["text"],
             "tripped": part.end is not None and part.end["tripped"],
+            **{key: (part.end or {}).get(key) for key in ("tripped_at", "likely_cause", "what_to_do")},
             "changed": changed.get(number, []),
             "about": part.information.get("about"),
             "loop": None if part.end is None else part.end["loop"],

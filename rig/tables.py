@@ -1,6 +1,6 @@
 """Summaries as a person reads them: one line on how a run ended, tables of recordings, models and measurements."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,14 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
     if summary["skipped"]:
         print(summary["skipped"])
-    if not summary["complete"]:
+    last = summary["parts"][-1] if summary["parts"] else {"tripped": False}
+    _print_advice(last)
+    if last["tripped"] and not summary["complete"]:
+        print(
+            f"what was accepted is kept; then `rig resume {path} --plan PLAN.toml` goes on by a changed plan, "
+            f"`rig resume {path} --retry-tripped` by the same"
+        )
+    elif not summary["complete"]:
         print(
             f"what was accepted is kept; `rig resume {path}` measures the rest, with --plan PLAN.toml by a changed plan"
         )
@@ -61,8 +68,15 @@ def print_summary(summary: dict[str, Any]) -> None:
     for index, part in enumerate(summary["parts"]):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
         print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
+        _print_advice(part)
         _print_about(part["about"] or {})
         print_loop(part["loop"] or {}, part["counters"] or {})
+
+
+def _print_advice(part: Mapping[str, Any]) -> None:
+    """After a trip: what it most likely was, and what comes first."""
+    if part.get("likely_cause"):
+        print(f"  likely cause: {part['likely_cause']}\n  what to do: {part['what_to_do']}")
 
 
 def _print_drift(drift: dict[str, Any] | None) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench import Bench
-from rig.campaigns.plan import Plan
+from rig.campaigns.plan import Plan, Target
 from rig.campaigns.plans import bench_of, plan_from
 from rig.configuration import validated
 from rig.errors import ConfigurationError
@@ -51,6 +51,11 @@ class Continuation:
     """The targets, by their place in the plan, that were accepted already."""
     changed: bool
     """Whether the plan is another one than that in force."""
+
+    @property
+    def to_measure(self) -> tuple[Target, ...]:
+        """The targets that are not done."""
+        return tuple(target for place, target in enumerate(self.plan.targets()) if place not in self.done)
 
     def information(self) -> dict[str, Any]:
         """What a part says of a plan that comes into force with it; nothing where it is the one before."""

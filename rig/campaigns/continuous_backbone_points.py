@@ -21,6 +21,7 @@ from rig.campaigns.continuous_ways import WAYS, Way, both_ways, rows_near
 from rig.campaigns.evaluate import channels_from, head, not_evaluated, vibration_from
 from rig.campaigns.objections import alien_objection, first_of, std_objection
 from rig.campaigns.plan import Column, Target
+from rig.campaigns.plausibility import with_plausible_ways
 from rig.campaigns.quality import PURITY_COLUMNS, of_a_vibration
 from rig.campaigns.recorded_flow import recorded_flow
 from rig.campaigns.rounds import Passage
@@ -136,7 +137,7 @@ def _point(
     near = np.abs(np.log(flow.amplitude_m / target.level)) < plan.bandwidth
     # The lag itself swings while the level is ramped; this is the one that a settled vibration so far off would have.
     lags = np.degrees(np.arctan((flow.frequency_hz[near] / frequency - 1.0) / abs(damping)))
-    return {
+    point = {
         **head(plan, target),
         "direction": "both" if len(covered) == 2 else covered[0],
         "settled": None,
@@ -155,6 +156,7 @@ def _point(
         "periods_of_both_ways": found.periods,
         **of_a_vibration(bench, vibration, np.concatenate(pieces), held=False),
     }
+    return with_plausible_ways(bench, point, pieces)
 
 
 def _one_way(found: ContinuousBackbone, way: int, index: int) -> dict[str, float]:

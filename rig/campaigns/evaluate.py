@@ -73,8 +73,13 @@ def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -
     return {**head(plan, target), "settled": settled, "accepted": False, "reason": f"cannot be evaluated: {error}"}
 
 
-def failed_point(plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False) -> dict[str, Any]:
-    """The mark of a point that was not measured, with the reason; it holds no data. ``at_start``: for want of a lock there."""
+def failed_point(
+    plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False, locked: bool = False
+) -> dict[str, Any]:
+    """The mark of a point that was not measured, with the reason; it holds no data.
+
+    ``at_start``: for want of a lock there. ``locked``: a lock had been gained before, so no polarity is wrong.
+    """
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle_rule.longest_periods)
@@ -87,7 +92,7 @@ def failed_point(plan: Plan, target: Target, outcome: np.void, *, at_start: bool
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
         phase = "" if isinstance(plan, OpenLoopPlan) else f"averaged phase error {error:.2f} deg, "
         why += f" ({phase}amplitude drift {100.0 * drift:.2g} %)"
-    if code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG:
+    if not locked and (code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG):
         why += f"; {POLARITY_HINT}"
     return {
         **head(plan, target),

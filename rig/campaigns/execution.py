@@ -1,5 +1,6 @@
 """Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -7,14 +8,17 @@ import numpy as np
 
 from controller import LockState
 from rig.bench import Bench
+from rig.campaigns.advice import Before, Trip, advice_on
 from rig.campaigns.device_remarks import flag_names, with_device_remarks
 from rig.campaigns.evaluate import failed_point
 from rig.campaigns.kept_rows import KeptRows
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
+from rig.campaigns.plausibility import with_plausibility
 from rig.campaigns.quality import what_was_skipped
 from rig.campaigns.rounds import round_at
 from rig.campaigns.stop_signals import stop_on_signals
+from rig.campaigns.trips import tripped_at
 from rig.errors import RecordingError
 from rig.loop import LoopStatistics, RunningLoop
 from rig.recording.journal import JournalWriter
@@ -77,6 +81,7 @@ class Execution:
         progress: Progress,
         done: frozenset[int] = frozenset(),
         numbers: Sequence[int] | None = None,
+        before: Sequence[Mapping[str, Any]] = (),
     ) -> None:
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
         self.journal, self.progress = journal, progress
@@ -85,11 +90,13 @@ class Execution:
         self.targets = plan.targets()
         self.measured_before = done
         self.numbers = range(len(self.targets)) if numbers is None else numbers
+        self.known = list(before)
         self.done = len(done)
         self.finished = self.done
         self.accepted = self.done
         self.reported: dict[int, dict[str, Any]] = {}
         self.next_segment = 0
+        self.locked = any(point["accepted"] for point in before)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = KeptRows(loop.tick.row_dtype)
         self.write_error: RecordingError | None = None
@@ -147,6 +154,7 @@ class Execution:
             values = np.concatenate([[self.last[name]], rows[name]])
             for index in np.flatnonzero(np.diff(values.astype(int))):
                 state = kind(int(rows[name][index])).name.lower()
+                self.locked = self.locked or state == "locked"
                 events.append({"sample": first + int(index), "what": name, "state": state})
             self.last[name] = int(rows[name][-1])
         for event in sorted(events, key=lambda event: event["sample"]):
@@ -168,7 +176,7 @@ class Execution:
             number = int(segments[self.next_segment]["point"])
             if number >= 0 and code is not Outcome.SKIPPED:
                 if code is not Outcome.DONE:
-                    self._report(failed_point(self.plan, self.targets[number], entry))
+                    self._report(failed_point(self.plan, self.targets[number], entry, locked=self.locked))
                 elif kind in EVALUATED:
                     first, end = self._begin(self.next_segment), int(entry["end_sample"])
                     settling = outcomes[self.next_segment - 1]
@@ -220,8 +228,10 @@ class Execution:
 
     def _report(self, point: dict[str, Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
+        point = with_plausibility(self.bench, self.plan, point, self.known)
         quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
         point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
+        self.known.append(point)
         self._write(self.journal.point, point)
         self.reported[point["number"]] = point
         self.finished += 1
@@ -246,7 +256,8 @@ class Execution:
             return
         for segment, entry in zip(self.tick.arrays.segments, self.tick.outcomes, strict=True):
             if int(entry["outcome"]) == Outcome.INTERRUPTED and int(segment["point"]) >= 0:
-                self._report(failed_point(self.plan, self.targets[int(segment["point"])], entry))
+                number = int(segment["point"])
+                self._report(failed_point(self.plan, self.targets[number], entry, locked=self.locked))
 
     def _end(self) -> dict[str, Any]:
         reason = EndReason(int(self.tick.guard["reason"][0]))
@@ -257,10 +268,22 @@ class Execution:
             "reason": reason.name.lower(),
             "text": self._why(),
             "tripped": reason.is_trip,
+            **(self._trip(reason) if reason.is_trip else {}),
             "skipped": what_was_skipped(self.reported.values(), len(self.targets) - self.done),
             "loop": self.loop.report,
             "counters": self.loop.counters,
         }
+
+    def _trip(self, reason: EndReason) -> dict[str, Any]:
+        """Where in the plan it tripped, what the cause most likely was, and what to do."""
+        at = tripped_at(self.tick, self.plan, self.targets)
+        frequency_hz = float(self.tick.arrays.loop["omega"][0]) / (2.0 * math.pi)
+        trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
+        recorded = [point for point in self.known if "harmonics" in point or point["accepted"]]
+        points = [point for point in recorded if point.get("quality") != "implausible"]
+        first = not points and (self.in_one_go or len(self.reported) <= 1)
+        advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
+        return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}
 
     def _why(self) -> str:
         """Why the output was brought down, in one sentence."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from rig.tick.layout import SAMPLE_LOST
 
-__all__ = ["bridged", "lost_rows", "lost_warnings"]
+__all__ = ["bridged", "lost_rows", "lost_warnings", "rms_of"]
 
 
 def lost_rows(rows: np.ndarray) -> np.ndarray:
@@ -18,6 +18,12 @@ def lost_warnings(rows: np.ndarray) -> list[str]:
     """One line on how many samples are missing; none where all are there."""
     lost = int(np.count_nonzero(lost_rows(rows)))
     return [f"{lost} of {rows.size} samples were lost on their way"] if lost else []
+
+
+def rms_of(rows: np.ndarray) -> list[float]:
+    """RMS of every channel without its mean, in its unit; lost samples take no part."""
+    inputs = rows["inputs"][~lost_rows(rows)].astype(float)
+    return [float(value) for value in inputs.std(axis=0)] if inputs.size else [math.nan] * rows["inputs"].shape[1]
 
 
 def bridged(rows: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from identification import IdentificationError, PeriodicSpectra, periodic_spectra
 from rig.bench import Bench
 from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
-from rig.campaigns.gaps import lost_rows
+from rig.campaigns.gaps import lost_rows, rms_of
 from rig.campaigns.multisine import MultisinePlan
 from rig.campaigns.plan import Column, Target
 from rig.daq import Channel
@@ -55,6 +55,7 @@ def measure_multisine_point(
         "reason": reason,
         "force_rms_n": spectra.rms(roles["force"]),
         "drive_rms_m_s2": spectra.rms(roles["drive"]),
+        "channel_rms": rms_of(rows),
         "voltage_rms_v": spectra.rms(VOLTAGE.name),
         "voltage_peak_v": float(np.abs(rows["output_v"]).max()),
         "change": None if math.isnan(change) else change,

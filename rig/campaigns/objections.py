@@ -19,6 +19,9 @@ __all__ = [
     "std_objection",
 ]
 
+MOTIONS = ("drive", "response")
+FAILING = 0.25  # of the largest motion: noise of a sensor is far below, and one that dies within a record above
+
 
 def first_of(objections: Iterable[str]) -> str:
     """The first that is not empty."""
@@ -71,12 +74,21 @@ def hunting_objection(scatter: float, accepted: float) -> str:
 
 
 def drift_objection(bench: Bench, vibration: PeriodicVibration, accepted: float) -> str:
-    """That force or drive changes over the record."""
-    for channel, drift in zip(bench.channels, () if vibration.drift is None else np.abs(vibration.drift), strict=False):
+    """That force or drive changes over the record, or a response by a good part of the largest motion: its sensor fails."""
+    if vibration.drift is None:
+        return ""
+    drifts, sizes = np.abs(vibration.drift), np.abs(vibration.harmonics[:, 1])
+    motion = max(size for channel, size in zip(bench.channels, sizes, strict=True) if channel.role in MOTIONS)
+    for channel, drift, size in zip(bench.channels, drifts, sizes, strict=True):
         if channel.role in ("force", "drive") and drift > accepted:
             return (
                 f"channel {channel.name} changed by {100.0 * drift:.1f} % over the record, "
                 f"accepted up to {100.0 * accepted:g} %"
+            )
+        if channel.role == "response" and drift * size > max(accepted, FAILING) * motion:
+            return (
+                f"channel {channel.name} changed by {100.0 * drift:.1f} % over the record, which the drive channel did not: "
+                "look at its sensor and cable"
             )
     return ""
 

@@ -15,6 +15,7 @@ from rig.campaigns.continuation import what_is_left
 from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
 from rig.campaigns.output import make_way, set_aside
 from rig.campaigns.plan import Plan
+from rig.campaigns.trips import refuse_tripped
 from rig.errors import RigError
 from rig.loop import RunningLoop
 from rig.recording.header import Column, Header
@@ -85,6 +86,7 @@ def take_up(
     progress: Progress | None = None,
     arm: Arm = None,
     about: About | None = None,
+    retry_tripped: bool = False,
 ) -> Recording:
     """Finish a run that was interrupted: finished points stay, the others are measured in a further part of the file.
 
@@ -92,7 +94,8 @@ def take_up(
     force with that part: what it asks for and was accepted before is not measured again. ``seed`` draws the noise of the
     part. A recording that is complete and asked for nothing new is returned as it is.
 
-    Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before.
+    Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before, or that asks for a level
+    that tripped or a higher one, unless ``retry_tripped``.
     """
     with Recording(output) as recording:
         left = what_is_left(recording, change, source)
@@ -100,6 +103,9 @@ def take_up(
         drawn = (recording.seed or 0) + len(recording.parts) if seed is None else seed
         information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
         finished = recording.complete and not left.changed
+        before = recording.points
+        if not retry_tripped:
+            refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench
     segments = plan.segments(bench.sample_rate_hz, left.done)
     if segments:
@@ -111,7 +117,7 @@ def take_up(
                 _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
                 _started(session, _settings(plan, bench, segments), output) as loop,
             ):
-                execution = Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers)
+                execution = Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers, before)
                 execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
     elif not finished:
         with continue_recording(output) as journal:

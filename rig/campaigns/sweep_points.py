@@ -9,7 +9,7 @@ from controller import AmplitudeLaw
 from identification import IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
 from rig.campaigns.evaluate import VOLTAGE, channels_of, head, skew_turn
-from rig.campaigns.gaps import bridged, lost_rows
+from rig.campaigns.gaps import bridged, lost_rows, rms_of
 from rig.campaigns.plan import Column, Target
 from rig.campaigns.sweep import SweepPlan
 from rig.tick.layout import SATURATED
@@ -50,6 +50,7 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
         **asdict(drop_out),
         "minimum_ratio": drop_out.minimum_ratio,
         "overshoot_ratio": drop_out.overshoot_ratio,
+        "channel_rms": rms_of(rows),
         "duration_s": rows.size / bench.sample_rate_hz,
         **held,
     }

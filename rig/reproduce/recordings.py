@@ -80,7 +80,7 @@ def _make(plan: Plan, bench: Bench, path: Path, seed: int, *, quiet: bool = Fals
     progress: Any = None if quiet else RunProgress(KINDS[plan.kind].columns)
     with _closed(progress):
         if path.exists() or journal_path(path).exists():
-            run = rig.resume(path, progress=progress)
+            run = rig.resume(path, progress=progress, retry_tripped=True)  # these rigs are virtual
         else:
             run = rig.run(plan, bench=bench, output=path, seed=seed, progress=progress)
     with run:

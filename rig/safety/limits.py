@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from controller.layout import LockState
 from rig.bench import Bench
 from rig.errors import DaqEmergencyStop, DaqError
 from rig.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_HINT, TEXT, EndReason, GuardMode
@@ -80,7 +79,11 @@ def end_reason_of(error: DaqError) -> EndReason:
 
 
 def describe_end(guard: np.ndarray, bench: Bench) -> str:
-    """One sentence on why the output was brought down: reason, channel, value, sample; what to look for without a lock."""
+    """One sentence on why the output was brought down: reason, channel, value, sample.
+
+    What to look for is said only where no lock was gained at the start; the likely cause of a trip needs what was measured
+    before it (`rig.campaigns.advice`).
+    """
     reason = EndReason(int(guard["reason"][0]))
     text = TEXT[reason]
     if not reason.is_trip:
@@ -96,6 +99,4 @@ def describe_end(guard: np.ndarray, bench: Bench) -> str:
         where = f" ({float(guard['value'][0]):.4g} Hz)"
     elif reason is EndReason.SAMPLES_LOST:
         where = f" ({float(guard['value'][0]):.4g} s, limits.lost_s = {bench.limits.lost_s:g})"
-    acquiring = int(guard["lock"][0]) == LockState.ACQUIRING and reason <= EndReason.FREQUENCY_LIMIT
-    hint = f"; the loop was not locked: {POLARITY_HINT}" if acquiring else ""
-    return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s){hint}"
+    return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s)"
