@@ -100,8 +100,8 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
         bound = f" below {below:.2g} {unit}" if at is None or below < at.level else ""
         return Advice(f"{had}: {what} is too high", f"lower {_key(plan, at)}{bound}, or {raised}")
     return Advice(
-        f"{had}: {what} alone does not explain it. A jump to another response, a knock, or a sensor that reads too much",
-        f"look at the sensor of channel {name} and for what else moved the rig; then go there in smaller steps of the level",
+        f"{had}: {what} alone does not explain it. A jump to another response, a knock, or a sensor that reads wrong",
+        f"look at the sensors of force, drive and channel {name}, and at what else moved the rig; then go there in smaller steps",
     )
 
 
