@@ -84,10 +84,8 @@ def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before
 def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before: Before) -> Advice:
     """By the share of the limit that the points before had reached, in proportion to their level."""
     name, unit = _name(bench, trip), plan.level_unit if at is None else at.level_unit
-    margin, raised = (
-        margin_before(bench, trip.reason, trip.channel, unit, before.points),
-        _what_may_be_raised(trip, bench),
-    )
+    margin = margin_before(bench, trip.reason, trip.channel, unit, before.points)
+    raised = _what_may_be_raised(trip, bench)
     what = "the level" if at is None else f"the level {at.text}"
     if margin is None:
         polarity = ", or polarity or sensitivity of a sensor is wrong" if before.first else ""
@@ -100,20 +98,22 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
         bound = f" below {below:.2g} {unit}" if at is None or below < at.level else ""
         return Advice(f"{had}: {what} is too high", f"lower {_key(plan, at)}{bound}, or {raised}")
     return Advice(
-        f"{had}: {what} alone does not explain it. A jump to another response, a knock, or a sensor that reads too much",
-        f"look at the sensor of channel {name} and for what else moved the rig; then go there in smaller steps of the level",
+        f"{had}: {what} alone does not explain it. A jump to another response, a knock, or a sensor that reads wrong",
+        f"look at the sensors of force, drive and channel {name}, and at what else moved it; then take smaller steps",
     )
 
 
 def _on_a_lock(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None) -> Advice:
     """A lock that was gained and then lost: at an end of the window, or within it."""
-    low, high = getattr(plan.law, "frequency_window_hz", bench.limits.frequency_hz)
+    window = getattr(plan.law, "frequency_window_hz", None)
+    low, high = bench.limits.frequency_hz if window is None else window
+    key = "limits.frequency_hz of the bench" if window is None else "controller.frequency_window_hz"
     from_end = min(abs(trip.frequency_hz - low), abs(trip.frequency_hz - high))
     where = "" if at is None else f" at {at.text}"
     if from_end <= AT_AN_END * (high - low):
         return Advice(
-            f"the resonance{where} lies beyond controller.frequency_window_hz = [{low:g}, {high:g}]",
-            "widen the window within limits.frequency_hz, or lower the levels",
+            f"the resonance{where} lies beyond {key} = [{low:g}, {high:g}]",
+            "widen it if rig and specimen bear it, or lower the levels",
         )
     return Advice(
         f"a lock that had been gained broke{where} at {trip.frequency_hz:.4g} Hz, within its window: a knock, a step of the "
