@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.layout import FORCE, RESPONSE
-from controller.tuning import PlantModel
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop import Loop
@@ -32,7 +31,7 @@ from tests.rig.rigs import bench_with
 
 FORCE_CHANNEL, DRIVE_CHANNEL = 0, 1
 BLOCK = 10
-PLANT = PlantModel(**load_plan("magnet-beam/continuous-backbone").plant.model_dump())
+PLANT = load_plan("magnet-beam/continuous-backbone").known_plant
 
 
 class Spoilt(VirtualDAQ):
