@@ -27,6 +27,7 @@ JUMPED = 1.3  # a force may fall where the vibration grows by so much more than 
 VANISHED = 0.15  # of its level: a force that low is not what such a jump leaves
 UNLIKE = 0.6  # of the largest of output sent and terms of the known exciter
 TOO_STRONG = 4.0  # times the output: what an amplifier of another gain makes of it, also while the vibration grows
+WIDE = 3.0  # times its band, in which the known exciter tells an amplifier of another gain
 UNLIKE_PERIODS = 1.0  # of the mode under test, for which it must last
 
 
@@ -39,12 +40,19 @@ def polynomial(coefficients: np.ndarray, z: complex) -> tuple[complex, complex]:
 
 @kernel
 def see_frequency(expected: Record, following: Record, omega: float) -> None:
-    """Once a period: the known exciter at the frequency of the moment (rad/s), zero outside the band it was measured in.
+    """Once a period: the known exciter at the frequency of the moment (rad/s), zero where it says nothing.
+
+    It is told within its band, and tells an amplifier of another gain `WIDE` times as far around it.
 
     ``alpha``, ``beta`` and their derivatives by s, from polynomials in ``z = s/centre``, beta's divided by z^2.
     """
     following.alpha = following.beta = following.alpha_rate = following.beta_rate = 0.0
-    if expected.known == 0 or not expected.lowest_rad_s <= omega <= expected.highest_rad_s:
+    following.told = 1 if expected.lowest_rad_s <= omega <= expected.highest_rad_s else 0
+    middle, half = (
+        0.5 * (expected.lowest_rad_s + expected.highest_rad_s),
+        0.5 * (expected.highest_rad_s - expected.lowest_rad_s),
+    )
+    if expected.known == 0 or abs(omega - middle) > WIDE * half:
         return
     z = complex(0.0, omega / expected.centre_rad_s)
     force_turn, drive_turn = omega * expected.force_skew_s, omega * expected.drive_skew_s
@@ -79,7 +87,7 @@ def contradicts_exciter(
     most = max(size(following.late_sent), size(for_force), size(for_motion), size(for_change))
     noise = size(following.alpha) * expected.noise_n + size(following.beta) * expected.noise_m_s2
     too_strong = size(following.needed) > max(TOO_STRONG * size(following.late_sent), noise)
-    unlike = most > noise and size(following.late_sent - following.needed) > UNLIKE * most
+    unlike = following.told == 1 and most > noise and size(following.late_sent - following.needed) > UNLIKE * most
     unlike = noise > 0.0 and (unlike or too_strong)
     following.unlike_s = following.unlike_s + dt_s if unlike else 0.0
     following.most_unlike_s = max(following.most_unlike_s, following.unlike_s)

@@ -37,6 +37,7 @@ FOLLOWING = np.dtype(
         ("late_force", "c16"),
         ("late_drive", "c16"),
         ("needed", "c16"),
+        ("told", "i8"),
         ("unlike_s", "f8"),
         ("most_unlike_s", "f8"),
         ("reference_v", "f8"),
@@ -47,9 +48,9 @@ FOLLOWING = np.dtype(
         ("most_periods", "i8"),
     ]
 )
-"""State of the watch (one record). ``alpha``, ``beta``: exciter at this period's frequency, ``_rate`` their derivatives
-by s; ``sent``: complex output as the detector's filter would show it; ``late_`` what has passed that filter once more;
-``needed``: output that the known exciter needs for it; ``unlike_s`` for which they contradict each other without a break, and
-the longest such time. ``reference_``: output (V), held
-quantity and the other of force and motion when the held quantity last followed; ``astray_periods`` since in which it did not,
-``most_periods`` of these there ever were, ``largest_rise`` of the output above its reference in them."""
+"""State of the watch (one record). ``alpha``, ``beta``: exciter at this period's frequency, ``_rate`` their derivatives by s,
+``told``: whether they are known apart there. ``sent``: complex output as the detector's filter would show it, ``late_`` what
+has passed that filter once more, ``needed``: output that the known exciter needs for it. ``unlike_s``: time without a break in
+which the two contradict each other, ``most_unlike_s`` the longest. ``reference_``: output (V), held quantity and the other of
+force and motion when the held quantity last followed. ``astray_periods`` since in which it did not, ``most_periods`` of these
+there ever were, ``largest_rise`` of the output above its reference in them."""
