@@ -318,12 +318,10 @@ def test_a_stop_by_request_is_an_orderly_end(monkeypatch):
 
 @pytest.mark.usefixtures("physical")
 def test_a_campaign_that_dies_leaves_a_caution(monkeypatch, tmp_path):
-    def dies(real, session, settings):
-        loop = real(session, settings)
-        loop.run = lambda: (_ for _ in ()).throw(SystemExit(9))
-        return loop
+    def dies(execution, information):
+        raise SystemExit(9)
 
-    Started(monkeypatch, dies)
+    monkeypatch.setattr("rig.campaigns.runner.Execution.go", dies)
     with pytest.raises(SystemExit):
         rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True)
     with pytest.raises(NotArmed, match=r"a run into .*run\.h5 was under way"):
