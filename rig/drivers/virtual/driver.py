@@ -113,8 +113,8 @@ class VirtualDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """A virtual rig takes any block, is not paced, and repeats itself."""
-        return Capabilities(largest_block=1_000_000, paced=False, virtual=True, repeatable=True)
+        """A virtual rig takes any block, is not paced, and repeats itself; nothing of it outlives its process."""
+        return Capabilities(largest_block=1_000_000, paced=False, virtual=True, repeatable=True, safe_without_host=True)
 
     @property
     def queue_samples(self) -> int:
