@@ -20,10 +20,15 @@ class FileDAQ(VirtualDAQ):
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
-        self.output.write_text(f"{voltages[-1]}")
+        self._put_out(voltages[-1])
 
     def _stop(self):
-        self.output.write_text("0")
+        self._put_out(0.0)
+
+    def _put_out(self, volts):
+        part = self.output.with_suffix(".part")
+        part.write_text(f"{volts}")
+        part.replace(self.output)  # whole, for whoever looks at the same time
 
 
 class HonestFileDAQ(FileDAQ):
