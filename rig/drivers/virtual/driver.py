@@ -146,7 +146,7 @@ class VirtualDAQ(DAQ):
 
     @property
     def output_v(self) -> float:
-        """What is on the converter, V, as it would be measured at the output: not what the driver believes of it."""
+        """What is on the converter, V, as it would be measured at the output; of a rig that is exchanged, not fused."""
         past = self._loopback.past
         return float(past[(self._first - 1) % past.size])
 
@@ -189,8 +189,12 @@ class VirtualDAQ(DAQ):
         return fused(t, self._arrays, self._state, self._under_way, volts, readings, rows, self._counts, self._loopback)
 
     def _stop(self) -> None:
-        self._queue[:] = 0.0
-        self._loopback.past[:] = 0.0
+        self._rest()
 
     def _close(self) -> None:
-        self._stop()
+        self._rest()
+
+    def _rest(self) -> None:
+        """0 V on the converter and on the way there."""
+        self._queue[:] = 0.0
+        self._loopback.past[:] = 0.0
