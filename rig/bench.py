@@ -95,6 +95,9 @@ class Arming(Configured):
     """Age up to which a check counts, h."""
     require_check: bool = True
     """Whether an automated bench needs a check that passed, of the same channels and driver."""
+    hardware_emergency_stop: bool = False
+    """Whether there is an emergency stop that cuts the amplifier without the computer, and a person has tested it; wanted by
+    drivers that are not `rig.daq.Capabilities.safe_without_host`."""
 
 
 class EmergencyStop(Configured):

@@ -1,6 +1,7 @@
 """``rig conformance``: the DAQ contract over an installed driver."""
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,6 +15,10 @@ def conformance(
     bench: Annotated[str, typer.Option(help="Bench whose driver is tested: a shipped name or TOML file.")],
     daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's, without its options.")] = None,
     arm: Annotated[bool, typer.Option("--arm", help="Let something physical move, by up to 0.05 V.")] = False,
+    output_log: Annotated[
+        Path | None,
+        typer.Option(help="What an emulator writes down of its output (rig emulate --log-output): a witness."),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Test an installed driver against the contract that every driver keeps."""
@@ -26,7 +31,7 @@ def conformance(
         chosen = chosen.model_copy(update={"driver": DriverChoice(name=daq)})
     require_arming(chosen, arm)
     found = []
-    for finding in check_driver(chosen):
+    for finding in check_driver(chosen, output_log):
         found.append(finding)
         if not json:
             print(

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from rig.configuration import Configured
-from rig.errors import DaqError, DaqRefused
+from rig.errors import DaqError, DaqRefused, RigError, as_daq_error
 
 __all__ = ["DAQ", "LOST", "Capabilities", "Channel", "Role", "State"]
 
@@ -120,6 +120,9 @@ class Capabilities(Configured):
     """Whether nothing physical moves: such a rig may arm itself."""
     repeatable: bool
     """Whether two runs with the same outputs return the same inputs."""
+    safe_without_host: bool = False
+    """Whether the output comes to 0 V by the device's own means when the host's process is killed. The conformance suite
+    kills one; where it is false, a person arms, or a hardware emergency stop is declared."""
 
 
 class State(Enum):
@@ -130,6 +133,22 @@ class State(Enum):
     RUNNING = "running"
 
 
+class _AsDaqError:
+    """Turns whatever a driver raises into a `DaqError`; so nobody above has to know the exceptions of a vendor."""
+
+    def __enter__(self) -> None:
+        """Nothing."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if isinstance(error, Exception) and not isinstance(error, RigError):
+            raise as_daq_error(error) from error
+
+
+_AS_DAQ_ERROR = _AsDaqError()
+
+
 class DAQ(ABC):
     """A data acquisition device with one output and several inputs.
 
@@ -137,13 +156,16 @@ class DAQ(ABC):
     by the constructor. `close` may be called at any time, any number of times, and leaves the output at 0 V; so does
     `stop`. A driver implements the methods with a leading underscore and leaves the rest alone.
 
+    Whoever ends a run calls `exchange_zeros` and then `stop`: 0 V is handed over like any other output, and by the driver's
+    own means besides. Neither relies on the other.
+
     ``flags`` (uint16[n]) are the device's own remarks on each sample of the last block, as bits: a driver that has any fills it
     in `_exchange` and names the bits, lowest first, by its `counters`. Samples that were lost on their way are rows of NaN with
     the bit `LOST`, in their place: the count of rows is the device's count of instants. `start` arms the device; whether it may
     be started at all is decided above, by a person. What the device has `latched` it keeps until `clear`, which a run calls.
 
     Errors: `DaqRefused` for what the device or the present state cannot do, `DaqTimeout`, `DaqDisconnected`,
-    `DaqOverrun` and the others of `rig.errors` for what happens on the way.
+    `DaqOverrun` and the others of `rig.errors` for what happens on the way; a driver's other exceptions become `DaqError`.
     """
 
     wall_clock: ClassVar[bool] = True
@@ -156,6 +178,8 @@ class DAQ(ABC):
         self.block = 0
         self.flags = np.zeros(0, np.uint16)
         self.state = State.CLOSED
+        self._driven = False
+        self._blocks_of_zero = 0
 
     @property
     @abstractmethod
@@ -171,6 +195,11 @@ class DAQ(ABC):
     def filter_delay_samples(self) -> float:
         """The part of the latency that is the mean delay of filters: an output begins to show that much earlier."""
         return 0.0
+
+    @property
+    def queue_blocks(self) -> int:
+        """q: whole blocks between the handing over of an output and the converter; known once started."""
+        return max(0, int((self.latency_samples - self.filter_delay_samples) // self.block))
 
     @property
     def counters(self) -> dict[str, int]:
@@ -224,7 +253,8 @@ class DAQ(ABC):
         """Open the device."""
         if self.state is not State.CLOSED:
             raise DaqRefused(f"the device is {self.state.value} already; close it before opening it again")
-        self._open()
+        with _AS_DAQ_ERROR:
+            self._open()
         self.state = State.OPEN
 
     def start(self, block: int = 1) -> None:
@@ -236,7 +266,9 @@ class DAQ(ABC):
             raise DaqRefused(f"block = {block}: allowed is 1 to {largest} samples")
         self.block = block
         self.flags = np.zeros(block, np.uint16)
-        self._start()
+        self._driven = False
+        with _AS_DAQ_ERROR:
+            self._start()
         self.state = State.RUNNING
 
     def exchange(self, voltages: np.ndarray) -> np.ndarray:
@@ -250,17 +282,38 @@ class DAQ(ABC):
             raise DaqRefused(
                 f"voltages of shape {voltages.shape}: allowed is ({self.block},), the block given to start"
             )
-        if not np.abs(voltages).max() <= self.output_range_v:
+        largest = np.abs(voltages).max()
+        if not largest <= self.output_range_v:
             worst = float(voltages[np.argmax(np.where(np.isfinite(voltages), np.abs(voltages), np.inf))])
             raise DaqRefused(f"an output of {worst:g} V was demanded: allowed is +-{self.output_range_v:g} V")
+        if largest > 0.0:
+            self._driven, self._blocks_of_zero = True, 0
         inputs = np.empty((self.block, len(self.channels)))
-        self._exchange(voltages, inputs)
+        with _AS_DAQ_ERROR:
+            self._exchange(voltages, inputs)
+        self._blocks_of_zero += int(largest == 0.0)
         return inputs
+
+    def exchange_zeros(self) -> None:
+        """Exchange 0 V until the last of what was driven is off the converter; for whoever ends a run, before `stop`.
+
+        At most the blocks of the queue and one more; fewer after blocks of 0 V, and where a block fails, which is no error
+        here: a device that does not answer any more is left to `stop`.
+        """
+        if self.state is not State.RUNNING or not self._driven:
+            return
+        try:
+            for _ in range(self.queue_blocks + 1 - self._blocks_of_zero):
+                self.exchange(np.zeros(self.block))
+        except Exception:
+            return
 
     def stop(self) -> None:
         """Output to 0 V and end sampling; no effect unless running."""
-        if self.state is State.RUNNING:
-            self.state = State.OPEN
+        if self.state is not State.RUNNING:
+            return
+        self.state = State.OPEN
+        with _AS_DAQ_ERROR:
             self._stop()
 
     def close(self) -> None:
@@ -273,7 +326,8 @@ class DAQ(ABC):
             pass  # the device may be gone, which is a reason to close it
         finally:
             self.state = State.CLOSED
-            self._close()
+            with _AS_DAQ_ERROR:
+                self._close()
 
     def __enter__(self) -> Self:
         self.open()

@@ -16,6 +16,7 @@ __all__ = [
     "NotArmed",
     "RecordingError",
     "RigError",
+    "as_daq_error",
 ]
 
 
@@ -77,3 +78,8 @@ class DaqEmergencyStop(DaqError):  # noqa: N818
 
 class NotArmed(RigError):  # noqa: N818
     """Something physical would move and nobody has armed the bench."""
+
+
+def as_daq_error(error: Exception) -> DaqError:
+    """An exception of a driver as a `DaqError`: itself where it is one, else one that names it."""
+    return error if isinstance(error, DaqError) else DaqError(f"the driver has failed: {type(error).__name__}: {error}")

@@ -8,14 +8,13 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from rig.daq import DAQ
+from rig.driven_loop import DrivenLoop
 from rig.errors import DaqError
-from rig.safety.layout import GuardMode
-from rig.safety.limits import end_reason_of
 from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
 
-__all__ = ["FusedDAQ", "Loop", "LoopStatistics", "RunningLoop", "end_by_driver"]
+__all__ = ["FusedDAQ", "Loop", "LoopStatistics", "RunningLoop"]
 
 CHUNK_S = 0.5
 PACED_CHUNK_S = 0.02
@@ -76,6 +75,9 @@ class RunningLoop(Protocol):
         Returns at once, may be called any time and from a signal handler.
         """
 
+    def bring_down(self) -> None:
+        """Ramp to 0 V what still runs, and wait for it: for whoever does not take its rows any more."""
+
     @property
     def counters(self) -> dict[str, int]:
         """The driver's counters."""
@@ -89,49 +91,48 @@ class RunningLoop(Protocol):
         """Statistics for the record, as plain data."""
 
 
-def end_by_driver(tick: Tick, error: DaqError) -> None:
-    """Note in the guard that the driver has failed, with which the output is off."""
-    guard = tick.guard
-    if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
-        guard["reason"] = end_reason_of(error)
-        guard["sample"] = tick.sample
-    guard["mode"] = GuardMode.OFF
-    guard["amplitude_v"] = 0.0
-
-
-class Loop:
+class Loop(DrivenLoop):
     """Runs a tick over a started driver until the guard has brought the output to 0 V.
 
     `run` yields structured rows in chunks; between two chunks the caller may `request_stop`. A driver that fails
-    ends the loop: the rows so far are yielded, ``failure`` holds the error. ``paced`` holds a virtual rig back to the
-    wall clock; a chunk that is done too late counts as an overrun. ``fused`` false makes a virtual rig go through
-    `DAQ.exchange` as a real one does.
+    ends the loop: the rows so far are yielded, ``failure`` holds the error. An interruption inside the driver
+    (`KeyboardInterrupt`, `SystemExit`) is raised by `run` once the output is off and all rows are yielded.
+
+    ``paced`` holds a virtual rig back to the wall clock; a chunk that is done too late counts as an overrun. ``fused`` false
+    makes a virtual rig go through `DAQ.exchange` as a real one does.
     """
 
     def __init__(self, daq: DAQ, tick: Tick, *, paced: bool = False, fused: bool = True) -> None:
-        self.daq = daq
-        self.tick = tick
+        super().__init__(daq, tick)
         self.paced = paced
-        self.failure: DaqError | None = None
-        self.cause = ""
         self.notes: tuple[str, ...] = ()
         self.statistics = LoopStatistics(daq.sample_rate_hz)
         self._fused = daq if fused and isinstance(daq, FusedDAQ) else None
-        self._voltages = np.zeros(daq.block)
 
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks, until the output is off."""
+        yield from self._chunks()
+        if self.interruption is not None:
+            raise self.interruption
+
+    def bring_down(self) -> None:
+        """Ramp to 0 V what still runs; nobody takes the rows."""
+        self.request_stop()
+        for _ in self._chunks():
+            pass
+
+    def _chunks(self) -> Iterator[np.ndarray]:
         chunk = self._chunk_samples()
         self._load_kernels()
         began = time.perf_counter()
-        while not self._over():
+        while not self.over:
             readings, rows = self.tick.buffers(chunk)
             start = time.perf_counter()
             done = self._advance(readings, rows)
             self.statistics.busy_s += time.perf_counter() - start
             self.statistics.samples += done
-            if self.daq.wall_clock and self._over():
-                self._stop_device()  # before its rows are taken, which may last
+            if self.over:
+                self.stop()  # before its rows are taken, which may last
             if self.paced:
                 self._wait_for_the_clock(began)
             self.statistics.wall_s = time.perf_counter() - began
@@ -143,11 +144,6 @@ class Loop:
         """Ask for the ramp to 0 V; it begins with the next chunk."""
         self.cause = self.cause or cause
         self.tick.request_stop()
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """The driver's counters."""
-        return self.daq.counters
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -168,7 +164,9 @@ class Loop:
             nothing = np.empty((0, len(self.daq.channels)))
             tick_block(self.tick.arrays, nothing, self.daq.flags, readings, rows, np.empty(0))
 
-    def _over(self) -> bool:
+    @property
+    def over(self) -> bool:
+        """Whether the output is off for good."""
         return self.failure is not None or self.tick.over
 
     def _chunk_samples(self) -> int:
@@ -181,26 +179,14 @@ class Loop:
             return self._fused.run_fused(self.tick.arrays, readings, rows)
         block = self.daq.block
         for first in range(0, rows.size, block):
-            try:
-                inputs = self.daq.exchange(self._voltages)
-            except DaqError as error:
-                self._fail(error)
+            swapped = self._swap()
+            if swapped is None:
                 return first
             part = slice(first, first + block)
-            tick_block(self.tick.arrays, inputs, self.daq.flags, readings[part], rows[part], self._voltages)
-            if self._over():
+            tick_block(self.tick.arrays, *swapped, readings[part], rows[part], self._voltages)
+            if self.over:
                 return first + block
         return int(rows.size)
-
-    def _fail(self, error: DaqError) -> None:
-        self.failure = error
-        end_by_driver(self.tick, error)
-
-    def _stop_device(self) -> None:
-        try:
-            self.daq.stop()
-        except DaqError as error:
-            self.failure = self.failure or error
 
     def _wait_for_the_clock(self, began: float) -> None:
         early = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()

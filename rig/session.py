@@ -3,6 +3,7 @@
 A virtual rig runs here, as fast as the machine allows; what has to keep to a clock runs in `rig.worker`.
 """
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from rig.bench import Bench
 from rig.bench_limits import refuse
 from rig.daq import DAQ, Capabilities
 from rig.drivers import make_daq
+from rig.errors import RigError
 from rig.loop import Loop, RunningLoop
 from rig.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
@@ -76,6 +78,7 @@ class LocalSession:
 
     def __init__(self, daq: DAQ, *, realtime: bool) -> None:
         self._daq, self._realtime = daq, realtime
+        self._loop: Loop | None = None
         self.capabilities = daq.capabilities
         self.identity = daq.identity
         self.latched = daq.latched
@@ -87,7 +90,13 @@ class LocalSession:
         loop = Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
         if self._realtime or self._daq.wall_clock:
             loop.notes = (NO_PROCESS,)
+        self._loop = loop
         return loop
+
+    def finish(self) -> None:
+        """Ramp down what still runs, for whoever leaves in mid-run."""
+        if self._loop is not None and not self._loop.over:
+            self._loop.bring_down()
 
 
 @contextmanager
@@ -107,5 +116,20 @@ def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iter
         with WorkerSession(bench, seed) as session:
             yield session
         return
-    with daq:
-        yield LocalSession(daq, realtime=realtime)
+    try:
+        daq.open()
+        local = LocalSession(daq, realtime=realtime)
+        try:
+            yield local
+        finally:
+            local.finish()
+    finally:
+        _closed(daq)
+
+
+def _closed(daq: DAQ) -> None:
+    """Close a driver; what it has to say at that is no reason to lose what was recorded."""
+    try:
+        daq.close()
+    except RigError as error:
+        warnings.warn(f"the driver failed when it was closed: {error}", RuntimeWarning, stacklevel=2)

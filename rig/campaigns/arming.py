@@ -9,10 +9,11 @@ from rig.bench import Bench
 from rig.bench_limits import cautions as cautions_of_limits
 from rig.campaigns.about import user_name
 from rig.campaigns.bench_memory import BenchMemory, fingerprint, memory_of, now, remember
+from rig.daq import Capabilities
 from rig.errors import NotArmed
 from rig.session import Session
 
-__all__ = ["Arm", "ArmingRequest", "armed", "asked_once", "cautions_of"]
+__all__ = ["Arm", "ArmingRequest", "armed", "asked_once", "cautions_of", "unguarded_text"]
 
 CHECK = "check"
 
@@ -33,6 +34,16 @@ class ArmingRequest:
     """What speaks against it, one line each."""
     unseen: tuple[str, ...] = ()
     """Those of them that only a person who is shown them takes back: a trip, a device that has latched."""
+    unguarded: str = ""
+    """Why a person has to stand by, and no switch or bench may arm: the output outlives the host; empty where it does not."""
+
+    @property
+    def unguarded_refusal(self) -> str:
+        """The line with which a switch, or a bench that arms itself, is refused where it is ``unguarded``."""
+        return (
+            f"bench {self.bench.name}: {self.unguarded}; run at a terminal without --arm and type the bench's name, or test "
+            "such a stop and set [arming] hardware_emergency_stop = true"
+        )
 
     def lines(self) -> list[str]:
         """All of it for the terminal."""
@@ -59,15 +70,17 @@ def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]
     """How the bench was armed and by whom, for the record; a person who is asked also takes back a trip.
 
     A rig whose driver says ``virtual`` arms itself. ``[arming] automated`` does where nothing speaks against it. A word given
-    beforehand, ``arm`` True, does where no trip is remembered and the device has not latched: nobody has seen those. Raises
-    `NotArmed`, which says how to arm, before anything has moved.
+    beforehand, ``arm`` True, does where no trip is remembered and the device has not latched: nobody has seen those. Neither
+    does where the output would outlive the host and no hardware emergency stop is declared. Raises `NotArmed`, which says how
+    to arm, before anything has moved.
     """
     if session.capabilities.virtual:
         return {"how": "virtual", "by": "", "at": now(), "cautions": []}
     memory = memory_of(bench)
     unseen = _unseen(memory, session.latched)
-    cautions = (*unseen, *cautions_of(bench, memory, what, session.identity))
-    how = _how(ArmingRequest(bench, what, session.identity, memory, cautions, unseen), arm)
+    unguarded = unguarded_text(bench, session.capabilities)
+    cautions = (*unseen, *filter(None, [unguarded]), *cautions_of(bench, memory, what, session.identity))
+    how = _how(ArmingRequest(bench, what, session.identity, memory, cautions, unseen, unguarded), arm)
     if memory.trip is not None and how == "person":
         remember(bench, trip=None)
     return {"how": how, "by": user_name(), "at": now(), "cautions": list(cautions)}
@@ -76,24 +89,28 @@ def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]
 def _how(request: ArmingRequest, arm: Arm) -> str:
     bench = request.bench
     checked = not request.cautions or not bench.arming.require_check
-    if bench.arming.automated and arm is not False and arm is not True and not request.unseen and checked:
+    alone = not request.unseen and not request.unguarded
+    if bench.arming.automated and arm is not False and arm is not True and alone and checked:
         return "automated"
     if callable(arm):
         if arm(request):
             return "person"
         raise NotArmed(f"bench {bench.name}: was not armed; nothing has moved")
-    if arm and not request.unseen:
+    if arm and alone:
         return "switch"
     if request.unseen:
         raise NotArmed(
             f"bench {bench.name}: something physical would move and nobody has seen that {'; '.join(request.unseen)}; run at a "
             "terminal without --arm and type the bench's name, or ask with a callable (arm=ask from Python)"
         )
+    if request.unguarded and (arm or bench.arming.automated):
+        raise NotArmed(request.unguarded_refusal)
     against = f" ({'; '.join(request.cautions)})" if request.cautions else ""
+    switch = "" if request.unguarded else ", or give --arm (arm=True from Python)"
     automated = "" if bench.arming.automated else ", or [arming] automated = true in a bench made for it"
     raise NotArmed(
         f"bench {bench.name}: something physical would move and nobody has armed it{against}; run on a terminal and type the "
-        f"bench's name, or give --arm (arm=True from Python){automated}"
+        f"bench's name{switch}{automated}"
     )
 
 
@@ -118,6 +135,19 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[
     if check.fingerprint != fingerprint(bench, identity):
         out.append("the last check was of other channels, another rate, another driver or another device")
     return tuple(out)
+
+
+def unguarded_text(bench: Bench, capabilities: Capabilities) -> str:
+    """Why a hardware emergency stop is asked for, for a caution; empty where none is.
+
+    A switch on an input channel (``[emergency_stop]``) does not count: the host reads it, and it is the host that is gone.
+    """
+    if capabilities.safe_without_host or bench.arming.hardware_emergency_stop:
+        return ""
+    return (
+        f"driver {bench.driver.name} does not bring the output to 0 V by itself if this computer's process dies: keep a "
+        "hardware emergency stop within reach that cuts the amplifier"
+    )
 
 
 def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:

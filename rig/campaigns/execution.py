@@ -100,7 +100,7 @@ class Execution:
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = KeptRows(loop.tick.row_dtype)
         self.write_error: RecordingError | None = None
-        self.failure: Exception | None = None
+        self.failure: BaseException | None = None
 
     def go(self, information: Mapping[str, Any]) -> None:
         """Run to the end of the plan or of what can be done of it; raises only what could not be recorded.
@@ -113,11 +113,12 @@ class Execution:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
         with stop_on_signals(self.loop.request_stop):
-            for rows in self.loop.run():
-                self._write(self.journal.rows, rows)
-                self._attempt(self._note_changes, rows)
-                self._attempt(self._collect, rows)
-                self._attempt(self.progress.advance, rows, self.tick)
+            try:
+                for rows in self.loop.run():
+                    self._take(rows)
+            except BaseException as error:  # also what interrupted the loop: its end is recorded all the same
+                self.failure = self.failure or error
+                self.loop.bring_down()
         self._attempt(self._mark_interrupted)
         self._attempt(self._mark_unlocked)
         self._write(self.journal.end, self._end())
@@ -126,13 +127,20 @@ class Execution:
         if self.write_error is not None:
             raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
 
+    def _take(self, rows: np.ndarray) -> None:
+        """Record and evaluate a chunk."""
+        self._write(self.journal.rows, rows)
+        self._attempt(self._note_changes, rows)
+        self._attempt(self._collect, rows)
+        self._attempt(self.progress.advance, rows, self.tick)
+
     def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
         """Do what is not the loop; where it fails, the rig is ramped down first and the failure raised at the end."""
         if self.failure is not None:
             return
         try:
             step(*arguments)
-        except Exception as error:  # whatever it is: a driven rig is brought down before anything is said
+        except BaseException as error:  # whatever it is: a driven rig is brought down before anything is said
             self.failure = error
             self.loop.request_stop()
 
@@ -291,7 +299,7 @@ class Execution:
         if self.loop.failure is not None:
             down = "" if reason.is_trip else f"{TEXT[reason]}, but the driver failed at the end: "
             return f"{down}{self.loop.failure}"
-        if self.failure is not None:
+        if self.failure is not None and not self.loop.cause:
             return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
         return (
             self.loop.cause

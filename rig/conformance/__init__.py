@@ -4,6 +4,9 @@ For a driver's own tests derive from `DriverContract`; for any installed driver 
 ``pytest --pyargs rig.conformance --rig-bench BENCH``.
 """
 
-from rig.conformance.contract import DriverContract, NotApplicable
+from rig.conformance.contract import DriverContract
+from rig.conformance.loopback import with_loopback
+from rig.conformance.subject import NotApplicable
+from rig.conformance.ways_out import last_output_v
 
-__all__ = ["DriverContract", "NotApplicable"]
+__all__ = ["DriverContract", "NotApplicable", "last_output_v", "with_loopback"]

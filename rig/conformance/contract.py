@@ -10,69 +10,25 @@ Tests that a driver cannot take part in by its `rig.daq.Capabilities` say so ins
 Outputs stay within ``amplitude_v``; nothing is driven at more than that.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import math
 from functools import partial
 
 import numpy as np
 
+from rig.conformance.loopback import LoopbackTests
+from rig.conformance.timing import TimingTests
+from rig.conformance.ways_out import WaysOutTests
 from rig.daq import DAQ, LOST, State
 from rig.errors import DaqError, DaqRefused
 
-__all__ = ["DriverContract", "NotApplicable"]
+__all__ = ["DriverContract"]
 
 
-class NotApplicable(Exception):  # noqa: N818 (not an error)
-    """A test asks for a capability that the driver says it has not; a reason to skip, said aloud."""
-
-
-class DriverContract(ABC):
+class DriverContract(LoopbackTests, WaysOutTests, TimingTests):
     """Tests of one driver. Override `make`; and ``amplitude_v``, ``tolerance_v`` for a physical bench."""
 
-    amplitude_v = 0.05
-    """Largest output of any test, V."""
-    tolerance_v = 0.02
-    """How still the inputs are with 0 V on the output, V RMS."""
-    blocks = (1, 4, 10)
-    """Block sizes that are tried, as far as the driver takes them."""
-
-    @abstractmethod
-    def make(self) -> DAQ:
-        """A driver that is not open."""
-
-    def unplug(self, daq: DAQ) -> bool:
-        """Take the device away while it is running; False where the contract does not know how."""
-        return False
-
-    def skip(self, reason: str) -> None:
-        """What to do with a test that does not apply; pytest's skip where pytest runs the suite."""
-        try:
-            import pytest
-        except ImportError:
-            raise NotApplicable(reason) from None
-        pytest.skip(reason)
-
-    @contextmanager
-    def running(self, block: int = 1) -> Iterator[DAQ]:
-        """A driver that is running."""
-        with self.make() as daq:
-            if block > daq.capabilities.largest_block:
-                self.skip(f"block {block}: the driver takes up to {daq.capabilities.largest_block}")
-            daq.start(block)
-            yield daq
-
-    def sine(self, samples: int, rate_hz: float) -> np.ndarray:
-        """A quiet sine of 20 Hz."""
-        return np.asarray(self.amplitude_v * np.sin(2.0 * np.pi * 20.0 * np.arange(samples) / rate_hz))
-
-    def refused(self, action: Callable[[], object]) -> str:
-        """The message of the `DaqRefused` that an action must raise."""
-        try:
-            action()
-        except DaqRefused as error:
-            return str(error)
-        raise AssertionError("was not refused")
+    answer_samples = 2
+    """Samples after the latency within which a repeatable device has begun to answer."""
 
     def test_nothing_is_opened_by_the_constructor(self) -> None:
         """A driver that was made and thrown away leaves no trace."""
@@ -175,6 +131,15 @@ class DriverContract(ABC):
             daq.exchange(voltages)
             np.testing.assert_array_equal(first, kept)
 
+    def test_the_voltages_handed_over_are_left_as_they_are(self) -> None:
+        """They are the caller's, who may hand them over again."""
+        with self.running(4) as daq:
+            voltages = np.linspace(-self.amplitude_v, self.amplitude_v, 4)
+            kept = voltages.copy()
+            for _ in range(3):
+                daq.exchange(voltages)
+                np.testing.assert_array_equal(voltages, kept)
+
     def test_the_latency_is_known_and_not_negative(self) -> None:
         """u[i] cannot show before y[i], and filters are part of the latency."""
         for block in self.blocks:
@@ -187,14 +152,28 @@ class DriverContract(ABC):
         Of the latency the delay of filters is left out: they begin to answer at once and are late on the average.
         """
         for block in self.blocks:
-            with self.make() as daq:
-                if not daq.capabilities.repeatable:
-                    self.skip("the device does not repeat itself, so that two runs cannot be compared")
-                steps = int(daq.sample_rate_hz * 0.02) // block + 1
-                quiet, driven = (self._answer(daq, block, steps, level) for level in (0.0, self.amplitude_v))
-                daq.start(block)
-                first = int(np.flatnonzero((quiet != driven).any(axis=1))[0])
-                assert first >= int(daq.latency_samples - daq.filter_delay_samples)
+            first, latency, filter_delay = self._first_answer(block)
+            assert first >= int(latency - filter_delay), f"block {block}: shows {first} samples later"
+
+    def test_an_output_shows_once_its_latency_is_over(self) -> None:
+        """A repeatable device answers a step within its latency and the few samples that a rig takes to move."""
+        for block in self.blocks:
+            first, latency, _ = self._first_answer(block)
+            assert first <= math.ceil(latency) + self.answer_samples, (
+                f"block {block}: the first answer comes after {first} samples, the latency is said to be {latency:g}"
+            )
+
+    def _first_answer(self, block: int) -> tuple[int, float, float]:
+        """Index of the first reading that a step changes; latency and filter delay as the driver says."""
+        with self.make() as daq:
+            if not daq.capabilities.repeatable:
+                self.skip("the device does not repeat itself, so that two runs cannot be compared")
+            steps = int(daq.sample_rate_hz * 0.02) // block + 1
+            quiet, driven = (self._answer(daq, block, steps, level) for level in (0.0, self.amplitude_v))
+            daq.start(block)
+            changed = np.flatnonzero((quiet != driven).any(axis=1))
+            assert changed.size, f"nothing answers a step of {self.amplitude_v:g} V within {steps * block} samples"
+            return int(changed[0]), daq.latency_samples, daq.filter_delay_samples
 
     def _answer(self, daq: DAQ, block: int, calls: int, level: float) -> np.ndarray:
         daq.start(block)

@@ -3,10 +3,15 @@
 import inspect
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from rig.bench import Bench
-from rig.conformance.contract import DriverContract, NotApplicable
+from rig.conformance.contract import DriverContract
+from rig.conformance.loopback import with_loopback
+from rig.conformance.subject import NotApplicable
+from rig.conformance.timing import SLOW_TEST
+from rig.conformance.ways_out import last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import NotArmed
@@ -27,11 +32,21 @@ class Finding:
 class _OnBench(DriverContract):
     """The contract over the driver of a bench."""
 
-    def __init__(self, bench: Bench) -> None:
-        self._bench = bench
+    def __init__(self, bench: Bench, output_log: Path | None) -> None:
+        self._bench, self._output_log = bench, output_log
 
     def make(self) -> DAQ:
         return make_daq(self._bench)
+
+    def make_loopback(self) -> DAQ | None:
+        bench = with_loopback(self._bench)
+        return None if bench is None else make_daq(bench)
+
+    def bench_for_another_process(self) -> Bench:
+        return self._bench
+
+    def witness(self, daq: DAQ | None) -> float | None:
+        return super().witness(daq) if self._output_log is None else last_output_v(self._output_log)
 
     def skip(self, reason: str) -> None:
         raise NotApplicable(reason)
@@ -51,19 +66,38 @@ def require_arming(bench: Bench, arm: bool) -> None:
         daq.clear()
 
 
-def check_driver(bench: Bench) -> Iterator[Finding]:
-    """Every test of the contract over the bench's driver, one after the other. Nothing is asked about arming here."""
-    contract = _OnBench(bench)
-    for name, method in inspect.getmembers(contract, inspect.ismethod):
-        if not name.startswith("test_"):
-            continue
-        words = name.removeprefix("test_").replace("_", " ")
-        duty = " ".join((inspect.getdoc(method) or "").split())
-        try:
-            method()
-        except NotApplicable as reason:
-            yield Finding(words, duty, "not applicable", str(reason))
-        except Exception as error:  # a driver may fail in any way: that is what is looked for
-            yield Finding(words, duty, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
-        else:
-            yield Finding(words, duty, "passed")
+def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Finding]:
+    """Every test of the contract over the bench's driver, one after the other. Nothing is asked about arming here.
+
+    ``output_log``: where the device is an emulator that writes its outputs down (``rig emulate --log-output``), that file.
+    A driver that is too slow for any test is not tested further, for it would take hours.
+    """
+    contract = _OnBench(bench, output_log)
+    names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]
+    slow = False
+    for name in sorted(names, key=lambda name: name != SLOW_TEST):
+        found = _found(contract, name) if not slow else _left_out(contract, name)
+        yield found
+        slow = slow or (name == SLOW_TEST and found.outcome == "failed")
+
+
+def _found(contract: DriverContract, name: str) -> Finding:
+    words, duty = _words(contract, name)
+    try:
+        getattr(contract, name)()
+    except NotApplicable as reason:
+        return Finding(words, duty, "not applicable", str(reason))
+    except Exception as error:  # a driver may fail in any way: that is what is looked for
+        return Finding(words, duty, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
+    return Finding(words, duty, "passed")
+
+
+def _left_out(contract: DriverContract, name: str) -> Finding:
+    return Finding(*_words(contract, name), "not applicable", "the driver is too slow to be tested any further")
+
+
+def _words(contract: DriverContract, name: str) -> tuple[str, str]:
+    """Name and duty of a test."""
+    return name.removeprefix("test_").replace("_", " "), " ".join(
+        (inspect.getdoc(getattr(contract, name)) or "").split()
+    )

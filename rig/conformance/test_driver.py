@@ -2,7 +2,9 @@
 
 import pytest
 
+from rig.bench import Bench
 from rig.conformance.contract import DriverContract as _Contract
+from rig.conformance.loopback import with_loopback
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.hil.subject import Subject
@@ -19,3 +21,12 @@ class TestDriver(_Contract):
     def make(self) -> DAQ:
         """A driver as the bench asks for it."""
         return make_daq(self._bench)
+
+    def make_loopback(self) -> DAQ | None:
+        """The same with a loopback, if it has one or is virtual."""
+        bench = with_loopback(self._bench)
+        return None if bench is None else make_daq(bench)
+
+    def bench_for_another_process(self) -> Bench:
+        """The bench itself."""
+        return self._bench

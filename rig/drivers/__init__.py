@@ -8,7 +8,7 @@ from typing import Any
 
 from rig.bench import Bench
 from rig.daq import DAQ
-from rig.errors import ConfigurationError
+from rig.errors import ConfigurationError, RigError, as_daq_error
 
 __all__ = ["GROUP", "driver_names", "make_daq"]
 
@@ -27,7 +27,8 @@ def driver_names() -> list[str]:
 def make_daq(bench: Bench, seed: int = 0) -> DAQ:
     """The driver that a bench asks for, not yet open.
 
-    Raises `ConfigurationError` for an unknown name, a driver that cannot be imported, or options it refuses.
+    Raises `ConfigurationError` for an unknown name, a driver that cannot be imported, or options it refuses; `DaqError` for
+    any other exception of it.
     """
     name = bench.driver.name
     found = _found()
@@ -39,7 +40,12 @@ def make_daq(bench: Bench, seed: int = 0) -> DAQ:
         driver: Any = found[name].load()
     except (ImportError, AttributeError) as error:
         raise ConfigurationError(f"driver.name = {name!r}: its code cannot be imported: {error}") from error
-    daq = driver(bench, seed)
+    try:
+        daq = driver(bench, seed)
+    except RigError:
+        raise
+    except Exception as error:
+        raise as_daq_error(error) from error
     if not isinstance(daq, DAQ):
         raise ConfigurationError(f"driver.name = {name!r}: {found[name].value} is not a rig.daq.DAQ")
     return daq

@@ -129,7 +129,12 @@ class ArmedRig:
         return done
 
     def _armed(self, request: ArmingRequest) -> bool:
-        """Whether ``--rig-arm`` is enough: a trip from before these tests is for a person to see, one provoked here is not."""
+        """Whether ``--rig-arm`` is enough: a trip from before these tests is for a person to see, one provoked here is not.
+
+        It is a switch, and so never enough where the output would outlive the host.
+        """
+        if request.unguarded:
+            raise NotArmed(request.unguarded_refusal)
         return not request.unseen or bool(self._runs)
 
     def notes(self, numbers: Mapping[str, object]) -> None:

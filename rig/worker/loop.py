@@ -9,8 +9,8 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from rig.daq import DAQ
+from rig.driven_loop import DrivenLoop
 from rig.errors import DaqError
-from rig.loop import end_by_driver
 from rig.safety.layout import GuardMode
 from rig.tick.kernels import tick_block
 from rig.tick.tick import Tick
@@ -37,11 +37,7 @@ def suspended_s() -> float:
     return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
-def _own(error: Exception) -> DaqError:
-    return DaqError(f"the driver has failed: {type(error).__name__}: {error}")
-
-
-class WallClockLoop:
+class WallClockLoop(DrivenLoop):
     """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
 
     ``tick`` must have its state in ``state`` (`rig.worker.memory.packed`). ``asked`` returns in a sentence who has asked the
@@ -55,9 +51,7 @@ class WallClockLoop:
     def __init__(
         self, daq: DAQ, tick: Tick, state: np.ndarray, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
     ) -> None:
-        self.daq, self.tick = daq, tick
-        self.failure: DaqError | None = None
-        self.cause = ""
+        super().__init__(daq, tick)
         self._state, self._memory, self._asked = state, memory, asked
         self._facts_descriptor = facts.fileno()
         self._parent = os.getppid()
@@ -65,11 +59,10 @@ class WallClockLoop:
         self._slept_s = suspended_s()
         self._pace = pace_of(daq)
         period_ns = 1e9 * daq.block / daq.sample_rate_hz
-        queue = int((daq.latency_samples - daq.filter_delay_samples) // daq.block) if self._pace.by_device else 1
+        queue = daq.queue_blocks if self._pace.by_device else 1
         self._deadline_ns = int(period_ns * max(1, queue))
         self.times = BlockTimes(self._pace, memory, self._deadline_ns)
         self._stall_ns = int(max(1e9 * LONGEST_STALL_S, 10 * period_ns))
-        self._voltages = np.zeros(daq.block)
         self._unsaid = False
         # Spread over the blocks of a chunk, for each costs as much as a block does; a chunk of one block does both in one.
         chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
@@ -98,19 +91,10 @@ class WallClockLoop:
         self._announce()
         self.disturbances = since(before)
 
-    def stop(self) -> None:
-        """Stop the device, with which its output is at 0 V; an error of it is the loop's failure unless there is one."""
-        try:
-            self.daq.stop()
-        except DaqError as error:
-            self.failure = self.failure or error
-        except Exception as error:
-            self.failure = self.failure or _own(error)
-
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; returns the rows that it holds."""
-        tick, words, pace, daq, voltages = self.tick, self._memory.words, self._pace, self.daq, self._voltages
-        arrays, block, by_device = tick.arrays, daq.block, self._pace.by_device
+        tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
+        arrays, block, by_device = tick.arrays, self.daq.block, self._pace.by_device
         chores = self._chores
         guard = arrays.guard.view(np.int64).data
         for first in range(0, self._memory.layout.chunk, block):
@@ -123,17 +107,12 @@ class WallClockLoop:
             self._account()
             pace.wait()
             begun = 0 if by_device else _now()
-            try:
-                inputs = daq.exchange(voltages)
-            except DaqError as error:
-                self._fail(error)
-                return first
-            except Exception as error:  # a driver that fails in its own way: the rows so far are kept all the same
-                self._fail(_own(error))
+            swapped = self._swap()
+            if swapped is None:
                 return first
             begun = _now() if by_device else begun
             end = first + block
-            tick_block(arrays, inputs, daq.flags, slot.readings[first:end], slot.rows[first:end], voltages)
+            tick_block(arrays, *swapped, slot.readings[first:end], slot.rows[first:end], voltages)
             self.times.begun(begun)
             self._samples += block
             if guard[0] == OFF and tick.over:
@@ -147,10 +126,6 @@ class WallClockLoop:
         if response > self._stall_ns and not self._pace.by_device:
             self._end(f"the loop stood still for {1e-9 * response:.1f} s")
 
-    def _fail(self, error: DaqError) -> None:
-        self.failure = error
-        end_by_driver(self.tick, error)
-
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
         """Complete a chunk and announce it.
 
@@ -160,7 +135,7 @@ class WallClockLoop:
         if self._alone or self._memory.free < 1:
             return
         slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns
-        counts = list(self.daq.counters.values())[: slot.counters.size]
+        counts = list(self.counters.values())[: slot.counters.size]
         slot.counters[: len(counts)] = counts
         slot.state[:] = self._state
         self._memory.publish()

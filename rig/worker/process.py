@@ -86,7 +86,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
             loop.stop()
         statistics = _statistics(loop, said)
     failure = None if loop.failure is None else described(loop.failure)
-    facts.send(("ended", failure, loop.cause, dict(daq.counters), statistics))
+    facts.send(("ended", failure, loop.cause, loop.counters, statistics))
 
 
 def _presumed_latency(daq: DAQ, bench: Bench) -> float:

@@ -11,8 +11,9 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.daq import Capabilities
+from rig.driven_loop import end_by_driver
 from rig.errors import DaqError
-from rig.loop import LoopStatistics, RunningLoop, end_by_driver
+from rig.loop import LoopStatistics, RunningLoop
 from rig.session import TickSettings
 from rig.worker.loop import CHUNK_DONE
 from rig.worker.memory import TIMES, Layout, SharedMemory, packed
@@ -69,6 +70,12 @@ class WorkerLoop:
         """Ask for the ramp to 0 V; the loop looks at every block."""
         self.cause = self.cause or cause
         self._memory.request_stop()
+
+    def bring_down(self) -> None:
+        """Ramp to 0 V what still runs, and wait for it; nobody takes the rows."""
+        self.request_stop()
+        for _ in self.run():
+            pass
 
     @property
     def report(self) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """A driver that breaks a rule is caught by the kit under the rule's name, in words and as JSON, and the command fails."""
 
 import json
+import time
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rig.bench import DriverChoice
 from rig.cli import app
 from rig.daq import State
 from rig.drivers.virtual import VirtualDAQ
@@ -95,7 +97,96 @@ class CannotStartAgain(VirtualDAQ):
         super()._open()
 
 
+class ShiftsItsOutputs(VirtualDAQ):
+    """By one sample, across the blocks."""
+
+    last_v = 0.0
+
+    def _exchange(self, voltages, inputs):
+        shifted = np.concatenate([[self.last_v], voltages[:-1]])
+        self.last_v = voltages[-1]
+        super()._exchange(shifted, inputs)
+
+
+class LosesABlock(VirtualDAQ):
+    calls = 0
+
+    def _exchange(self, voltages, inputs):
+        self.calls += 1
+        super()._exchange(np.zeros_like(voltages) if self.calls % 30 == 0 else voltages, inputs)
+
+
+class SaysNoLatency(VirtualDAQ):
+    latency_samples = 0.0
+    filter_delay_samples = 0.0
+
+
+class SaysNoQueue(VirtualDAQ):
+    """It has one; to be made over a bench without a loopback too."""
+
+    def __init__(self, bench, seed=0):
+        options = {**bench.driver.options, "queue_blocks": 1}
+        super().__init__(bench.model_copy(update={"driver": DriverChoice(name="virtual", options=options)}), seed)
+
+    @property
+    def latency_samples(self):
+        return super().latency_samples - self.block
+
+
+class DoesNotStop(VirtualDAQ):
+    def _stop(self):
+        pass
+
+    def _close(self):
+        super()._stop()
+
+
+class DoesNotClose(VirtualDAQ):
+    def _close(self):
+        pass
+
+
+class KeepsItsQueue(VirtualDAQ):
+    """Says that 0 V is out once it is handed over, and has not put it out."""
+
+    def _exchange(self, voltages, inputs):
+        super()._exchange(voltages if voltages.any() else np.full_like(voltages, 0.05), inputs)
+
+
+class StaysDrivenAfterAnException(VirtualDAQ):
+    """Its stop asks for an exchange of its own, and gives up where that fails."""
+
+    def _stop(self):
+        self._exchange(np.zeros(self.block), np.zeros((self.block, len(self.channels))))
+        super()._stop()
+
+    def _close(self):
+        super()._stop()
+
+
+class SleepsForASecond(VirtualDAQ):
+    def _exchange(self, voltages, inputs):
+        time.sleep(1.0)
+        super()._exchange(voltages, inputs)
+
+
+class WritesIntoTheVoltages(VirtualDAQ):
+    def _exchange(self, voltages, inputs):
+        super()._exchange(voltages, inputs)
+        voltages *= 0.5
+
+
 RULES = {
+    ShiftsItsOutputs: "the latency is that of the loopback",
+    LosesABlock: "every output shows in the loopback once and in its order",
+    SaysNoLatency: "the latency is that of the loopback",
+    SaysNoQueue: "an output shows once its latency is over",
+    DoesNotStop: "stop alone brings the output to 0 v",
+    DoesNotClose: "close alone brings the output to 0 v",
+    KeepsItsQueue: "0 v that are exchanged are on the converter",
+    StaysDrivenAfterAnException: "an exception in exchange ends at 0 v",
+    SleepsForASecond: "a block takes no longer than it lasts",
+    WritesIntoTheVoltages: "the voltages handed over are left as they are",
     OpensItself: "nothing is opened by the constructor",
     FailsWhereGone: "close may be called at any time and again",
     TakesAnyBlock: "blocks beyond the device are refused with what is allowed",
@@ -129,10 +220,20 @@ def test_a_driver_that_keeps_all_rules_passes_in_words_and_the_command_succeeds(
     *lines, summary = done.stdout.splitlines()
     assert "failed" not in [line.split()[0] for line in lines]
     assert summary.startswith("driver virtual: ")
-    assert " 0 failed, 1 not applicable" in summary
+    assert " 0 failed, 2 not applicable" in summary
 
 
 def test_what_is_broken_stands_in_words_too(monkeypatch):
     done = conformance(monkeypatch, CountsDown)
     assert done.exit_code == 1
     assert f"failed         {RULES[CountsDown]}: " in done.stdout
+
+
+def test_a_driver_that_is_too_slow_for_any_test_is_not_tested_for_hours(monkeypatch):
+    done = conformance(monkeypatch, SleepsForASecond, "--json")
+    first, *others = json.loads(done.stdout)["tests"]
+    assert first["outcome"] == "failed"
+    assert "lasts 0.05 s and takes 1" in first["detail"]
+    assert {(test["outcome"], test["detail"]) for test in others} == {
+        ("not applicable", "the driver is too slow to be tested any further")
+    }

@@ -3,31 +3,40 @@
 import numpy as np
 import pytest
 
-from rig.conformance import DriverContract
+from rig.conformance import DriverContract, with_loopback
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
+from rig.errors import DaqError
 from tests.rig.rigs import bench_with
 
 
-class TestVirtualRig(DriverContract):
+class VirtualContract(DriverContract):
+    """The contract over a virtual bench, and over the same with a loopback."""
+
+    bench = bench_with()
+
     def make(self) -> DAQ:
-        return make_daq(bench_with())
+        return make_daq(self.bench)
+
+    def make_loopback(self) -> DAQ:
+        return make_daq(with_loopback(self.bench))
 
 
-class TestSymmetricRig(DriverContract):
-    def make(self) -> DAQ:
-        return make_daq(bench_with(name="magnet-beam-symmetric"))
+class TestVirtualRig(VirtualContract):
+    pass
 
 
-class TestVirtualRigWithDelay(DriverContract):
-    def make(self) -> DAQ:
-        return make_daq(bench_with(delay_samples=3))
+class TestSymmetricRig(VirtualContract):
+    bench = bench_with(name="magnet-beam-symmetric")
 
 
-class TestVirtualRigWithQueue(DriverContract):
-    def make(self) -> DAQ:
-        return make_daq(bench_with(queue_blocks=2))
+class TestVirtualRigWithDelay(VirtualContract):
+    bench = bench_with(delay_samples=3)
+
+
+class TestVirtualRigWithQueue(VirtualContract):
+    bench = bench_with(queue_blocks=2)
 
 
 def _broken(cls, **overrides):
@@ -107,5 +116,5 @@ def test_the_contract_catches_filters_that_are_later_than_the_whole_device():
 )
 def test_the_contract_catches_a_driver_that_breaks_it(override, test):
     contract = _broken(DriverContract, **override)
-    with pytest.raises((AssertionError, RuntimeError)):
+    with pytest.raises((AssertionError, DaqError)):
         getattr(contract, test)()

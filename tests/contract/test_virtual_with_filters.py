@@ -1,16 +1,15 @@
-from rig.conformance import DriverContract
-from rig.daq import DAQ
-from rig.drivers import make_daq
+from tests.contract.test_virtual import VirtualContract
 from tests.rig.rigs import bench_with
 
-
-class TestVirtualRigWithFilters(DriverContract):
-    def make(self) -> DAQ:
-        converter = {"oversampling": 2, "anti_alias_hz": 800.0, "reconstruction_hz": 800.0}
-        return make_daq(bench_with(converter=converter))
+CONVERTER = {"oversampling": 2, "anti_alias_hz": 800.0}
 
 
-class TestVirtualRigWithFiltersAndDelay(DriverContract):
-    def make(self) -> DAQ:
-        converter = {"oversampling": 2, "anti_alias_hz": 800.0}
-        return make_daq(bench_with(converter=converter, delay_samples=4))
+class TestVirtualRigWithFilters(VirtualContract):
+    bench = bench_with(converter=CONVERTER | {"reconstruction_hz": 800.0})
+
+
+class TestVirtualRigWithFiltersAndDelay(VirtualContract):
+    bench = bench_with(converter=CONVERTER, delay_samples=4)
+
+
+del VirtualContract

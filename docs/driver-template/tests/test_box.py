@@ -21,6 +21,10 @@ class TestBox(DriverContract):
         """A box that is not open."""
         return BoxDAQ(load_bench(BENCH))
 
+    def witness(self, daq: DAQ | None) -> float | None:
+        """What is on the stand-in's output; with a real box, what a meter reads there."""
+        return abs(daq.device.output_v) if isinstance(daq, BoxDAQ) and daq.device is not None else None
+
     def unplug(self, daq: DAQ) -> bool:
         """Pull the stand-in's cable."""
         assert isinstance(daq, BoxDAQ)

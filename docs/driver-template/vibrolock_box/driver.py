@@ -60,8 +60,11 @@ class BoxDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Up to 256 samples a call; a real box is paced, not virtual, and does not repeat itself."""
-        return Capabilities(largest_block=256, paced=False, virtual=True, repeatable=True)
+        """Up to 256 samples a call; a real box is paced, not virtual, and does not repeat itself.
+
+        ``safe_without_host`` only where the device has a watchdog of its own: the conformance suite kills a host to see.
+        """
+        return Capabilities(largest_block=256, paced=False, virtual=True, repeatable=True, safe_without_host=False)
 
     @property
     def latency_samples(self) -> float:

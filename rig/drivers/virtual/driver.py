@@ -10,6 +10,7 @@ from rig.bench import Bench
 from rig.configuration import Configured, validated
 from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.kernels import exchange_block, fused
+from rig.drivers.virtual.loopback import loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from simulators.layout import Flag
@@ -39,6 +40,9 @@ class VirtualDAQ(DAQ):
     Options: those of `simulators.VirtualRig` (``specimen`` and its parts), ``queue_blocks`` and ``delay_samples``. The
     seed draws the noise; a run with the same seed and outputs returns the same inputs bit for bit, whatever the block.
 
+    Channels with ``loopback = true`` behind those of the rig's sensors read the output itself, late by hold and filters as the
+    sensors are, without noise or steps.
+
     It returns at once: pacing is the loop's. Not modelled: lost samples, jitter, a device that fails.
     """
 
@@ -61,14 +65,18 @@ class VirtualDAQ(DAQ):
         self._seed = seed
         self._specimen = bench.specimen
         self._queue = np.zeros(0)
+        self._loopback = loopback_of(self.channels, 0.0)
         self._counts = np.zeros(len(Flag), np.int64)
         self._first = 0
 
     def _compare_channels(self) -> None:
         ours = [channel.name for channel in self.channels]
         theirs = [sensor.name for sensor in self.rig.sensors]
-        if ours != theirs:
-            raise ConfigurationError(f"channels: {ours} in the bench, the virtual rig has {theirs}, in this order")
+        sensed = len(theirs)
+        if ours[:sensed] != theirs or not all(channel.loopback for channel in self.channels[sensed:]):
+            raise ConfigurationError(
+                f"channels: {ours} in the bench, the virtual rig has {theirs}, in this order, and loopbacks behind them"
+            )
         if self.rig.converter.sample_rate_hz != self.sample_rate_hz:
             raise ConfigurationError(
                 f"driver.options.converter.sample_rate_hz = {self.rig.converter.sample_rate_hz:g}: "
@@ -86,7 +94,7 @@ class VirtualDAQ(DAQ):
                 "(driver.options.converter: oversampling, anti_alias_hz)"
             )
         delays = self.rig.channel_delays_samples
-        for channel, sensor, delay in zip(self.channels, self.rig.sensors, delays, strict=True):
+        for channel, sensor, delay in zip(self.channels[: delays.size], self.rig.sensors, delays, strict=True):
             if channel.sensitivity_v_per_unit != sensor.sensitivity_v_per_unit:
                 out.append(
                     f"channel {channel.name}: the bench says {channel.sensitivity_v_per_unit:g} V per {channel.unit}, "
@@ -113,8 +121,8 @@ class VirtualDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """A virtual rig takes any block, is not paced, and repeats itself."""
-        return Capabilities(largest_block=1_000_000, paced=False, virtual=True, repeatable=True)
+        """A virtual rig takes any block, is not paced, and repeats itself; nothing of it outlives its process."""
+        return Capabilities(largest_block=1_000_000, paced=False, virtual=True, repeatable=True, safe_without_host=True)
 
     @property
     def queue_samples(self) -> int:
@@ -136,18 +144,35 @@ class VirtualDAQ(DAQ):
         """Samples at which each flag of the rig was up."""
         return dict(zip(FLAG_NAMES, self._counts.tolist(), strict=True))
 
+    @property
+    def output_v(self) -> float:
+        """What is on the converter, V, as it would be measured at the output; of a rig that is exchanged, not fused."""
+        past = self._loopback.past
+        return float(past[(self._first - 1) % past.size])
+
     def _open(self) -> None:
         pass
 
     def _start(self) -> None:
         self._arrays, self._state = self.rig.build(self._seed)
         self._queue = np.zeros(self.queue_samples)
+        self._loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
         self._under_way = np.zeros(self.block + self.queue_samples)
         self._counts[:] = 0
         self._first = 0
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        exchange_block(self._arrays, self._state, self._queue, self._first, voltages, inputs, self.flags, self._counts)
+        exchange_block(
+            self._arrays,
+            self._state,
+            self._queue,
+            self._first,
+            voltages,
+            inputs,
+            self.flags,
+            self._counts,
+            self._loopback,
+        )
         self._first += voltages.size
 
     def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
@@ -161,10 +186,15 @@ class VirtualDAQ(DAQ):
                 f"the tick expects a lead of {lead} samples, this device has {math.floor(self.block + self.latency_samples)}"
             )
         volts = np.empty(len(self.channels))
-        return fused(t, self._arrays, self._state, self._under_way, volts, readings, rows, self._counts)
+        return fused(t, self._arrays, self._state, self._under_way, volts, readings, rows, self._counts, self._loopback)
 
     def _stop(self) -> None:
-        self._queue[:] = 0.0
+        self._rest()
 
     def _close(self) -> None:
-        pass
+        self._rest()
+
+    def _rest(self) -> None:
+        """0 V on the converter and on the way there."""
+        self._queue[:] = 0.0
+        self._loopback.past[:] = 0.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rig.drivers.virtual.loopback import Loopback, read_output
 from rig.safety.kernels import is_over
 from rig.tick.kernels import tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
@@ -20,6 +21,7 @@ def exchange_block(
     inputs: np.ndarray,
     flags: np.ndarray,
     counts: np.ndarray,
+    loop: Loopback,
 ) -> None:
     """Swap one block with the rig; ``flags`` (uint16[n]) are the rig's for each sample.
 
@@ -27,13 +29,16 @@ def exchange_block(
     the block's first sample; ``counts`` (int64[bits]) counts the samples at which each flag of the rig was up.
     """
     delay = queue.size
+    sensed = inputs.shape[1] - loop.v_per_v.size
     for index in range(voltages.size):
         voltage = voltages[index]
         if delay > 0:
             slot = (first + index) % delay
             voltage = queue[slot]
             queue[slot] = voltages[index]
-        flags[index] = sample(rig, state, voltage, inputs[index])
+        row = inputs[index]
+        read_output(loop, first + index, voltage, row)
+        flags[index] = sample(rig, state, voltage, row[:sensed])
         count_flags(flags[index], counts)
 
 
@@ -56,15 +61,18 @@ def fused(
     readings: np.ndarray,
     rows: np.ndarray,
     counts: np.ndarray,
+    loop: Loopback,
 ) -> int:
     """Tick and rig in one loop; returns the number of samples done, fewer than ``rows`` once the output is off.
 
     ``queue`` (float64[d]) holds the outputs under way: what the tick computes at a sample is on the converter d later.
     """
     delay = queue.size
+    sensed = volts.size - loop.v_per_v.size
     for index in range(rows.size):
         slot = t.loop[0].sample % delay
-        flags = sample(rig, state, queue[slot], volts)
+        read_output(loop, t.loop[0].sample, queue[slot], volts)
+        flags = sample(rig, state, queue[slot], volts[:sensed])
         count_flags(flags, counts)
         queue[slot] = tick(t, volts, False, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)

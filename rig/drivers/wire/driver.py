@@ -53,7 +53,10 @@ class WireDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Paced by the device; virtual where the device says that nothing physical moves; known once open."""
+        """Paced by the device; virtual where the device says that nothing physical moves; known once open.
+
+        Safe without the host: a device is armed with the watchdog that it has confirmed (`Connection.set`), or not at all.
+        """
         connection, facts = self._connection, self._facts
         return Capabilities(
             largest_block=min(facts.largest_block, connection.link.largest_block)
@@ -62,6 +65,7 @@ class WireDAQ(DAQ):
             paced=True,
             virtual=facts is not None and facts.simulated,
             repeatable=facts is not None and facts.repeatable,
+            safe_without_host=facts is not None,
         )
 
     @property

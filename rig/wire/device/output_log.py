@@ -16,6 +16,8 @@ __all__ = ["LoggedPlant"]
 class LoggedPlant:
     """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V.
 
+    One with 0 V more says that the device was stopped and put out nothing any more.
+
     A file that cannot be made is a `ConfigurationError`; a disk that is full later ends the writing and nothing else.
     """
 
@@ -45,17 +47,21 @@ class LoggedPlant:
         return getattr(self._plant, name)
 
     def reset(self) -> None:
-        """Sample 0."""
+        """Sample 0, and 0 V on the converter."""
         self._plant.reset()
         self._first = 0
+        self._write(0.0)
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
         """Write down, then measure."""
-        if not self._is_full:
-            line = f"{time.monotonic():.6f} {self._first} {np.abs(voltages).max():.6g}\n"
-            try:
-                os.write(self._descriptor, line.encode("ascii"))
-            except OSError:
-                self._is_full = True
+        self._write(float(np.abs(voltages).max()))
         self._first += voltages.size
         return self._plant.step(voltages)
+
+    def _write(self, largest_v: float) -> None:
+        if self._is_full:
+            return
+        try:
+            os.write(self._descriptor, f"{time.monotonic():.6f} {self._first} {largest_v:.6g}\n".encode("ascii"))
+        except OSError:
+            self._is_full = True

@@ -7,7 +7,9 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
+from rig.drivers.virtual.driver import HOLD_SAMPLES
 from rig.drivers.virtual.kernels import exchange_block
+from rig.drivers.virtual.loopback import loopback_of
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.layout import Flag
@@ -101,12 +103,14 @@ class VirtualPlant:
         driver = bench.driver.model_copy(update={"options": dict(options)})
         self._rig, self._seed = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed).rig, seed
         converter = self._rig.converter
-        self.names = tuple(self._rig.channel_names)
+        self._channels = bench.channels
+        self.names = tuple(channel.name for channel in bench.channels)
+        loopbacks = len(self.names) - len(self._rig.channel_names)
         self.bits = 16 if 1 <= converter.adc_bits <= 16 and 1 <= converter.dac_bits <= 16 else 32
         step_v = converter.adc_step_v or converter.adc_range_v / WHOLE_RANGE
         self.v_per_count = np.full(len(self.names), step_v)
         self.range_v = np.full(len(self.names), converter.adc_range_v)
-        self.skew_s = self._rig.channel_delays_samples / bench.sample_rate_hz
+        self.skew_s = np.append(self._rig.channel_delays_samples, np.zeros(loopbacks)) / bench.sample_rate_hz
         self.output_range_v = converter.dac_range_v
         self.output_v_per_count = converter.dac_step_v or converter.dac_range_v / WHOLE_RANGE
         self.rate_hz = bench.sample_rate_hz
@@ -125,6 +129,7 @@ class VirtualPlant:
     def reset(self) -> None:
         """Back to rest, at sample 0, with the noise of the same seed."""
         self._arrays, self._state = self._rig.build(self._seed)
+        self._loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
         self._first = 0
         self._buffers_for(0)
 
@@ -147,6 +152,7 @@ class VirtualPlant:
             self._readings_v,
             self._raised,
             self._raised_count,
+            self._loopback,
         )
         counts, flags = self._counted()
         if self._wiring is not None:

@@ -10,11 +10,11 @@ import pytest
 import rig
 from rig.bench import Bench
 from rig.campaigns.about import About
-from rig.campaigns.arming import ArmingRequest, asked_once
+from rig.campaigns.arming import ArmingRequest, asked_once, unguarded_text
 from rig.campaigns.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.check.check import check
 from rig.cli_arming import ask
-from rig.daq import DAQ
+from rig.daq import DAQ, Capabilities
 from rig.errors import ConfigurationError, DaqDisconnected, DaqRefused, NotArmed, RecordingError
 from rig.recording.journal import journal_path
 from rig.session import LocalSession
@@ -25,6 +25,8 @@ from tests.rig.check.rewired import flipped, rewire
 from tests.rig.rigs import bench_with
 from tests.rig.test_runs import plan_with
 
+ESTOP = {"name": "estop", "role": "monitor", "unit": "V", "sensitivity_v_per_unit": 1.0}
+UNSAFE = {"largest_block": 1, "paced": True, "virtual": False, "repeatable": False}
 DEVICE = {"serial_number": "7"}
 PLAN = plan_with(levels_v=(0.4,), record_periods=4)
 
@@ -252,6 +254,55 @@ def test_a_device_that_has_latched_waits_for_a_person(monkeypatch, capsys, word)
     assert "CAUTION  the device's watchdog had latched" in capsys.readouterr().err
 
 
+@pytest.fixture
+def outliving(monkeypatch):
+    """A physical device that goes on putting out what it was given last when the host is killed."""
+    rewire(monkeypatch, None, virtual=False, safe_without_host=False)
+
+
+@pytest.mark.usefixtures("outliving")
+@pytest.mark.parametrize("word", [None, True])
+def test_an_output_that_outlives_the_host_is_not_armed_by_a_switch_or_by_itself(word):
+    chosen = bench(automated=word is None, require_check=False)
+    with pytest.raises(
+        NotArmed, match=r"driver virtual does not bring the output to 0 V .* hardware_emergency_stop = t"
+    ) as no:
+        rig.run(PLAN, bench=chosen, arm=word)
+    assert "\n" not in str(no.value)
+
+
+@pytest.mark.usefixtures("outliving")
+def test_where_nobody_said_anything_the_switch_that_would_be_refused_is_not_offered():
+    with pytest.raises(NotArmed, match=r"nobody has armed it .*0 V by itself") as refused:
+        rig.run(PLAN, bench=bench())
+    assert "--arm" not in str(refused.value)
+
+
+@pytest.mark.usefixtures("outliving")
+def test_a_person_who_is_told_that_the_output_outlives_the_host_may_arm(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdin", io.StringIO("beam next door\n"))
+    with rig.run(PLAN, bench=bench(), arm=ask) as run:
+        assert armed(run)["how"] == "person"
+        assert "hardware emergency stop within reach" in armed(run)["cautions"][0]
+    assert "CAUTION  driver virtual does not bring the output to 0 V by itself" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("outliving")
+@pytest.mark.parametrize("word", [None, True])
+def test_a_hardware_emergency_stop_that_was_tested_stands_in_for_the_device(word):
+    chosen = bench(automated=True, require_check=False, hardware_emergency_stop=True)
+    with rig.run(PLAN, bench=chosen, arm=word) as run:
+        assert armed(run)["how"] == ("switch" if word else "automated")
+        assert not any("emergency stop" in caution for caution in armed(run)["cautions"])
+
+
+def test_a_switch_that_the_host_reads_does_not_stand_in_for_the_device():
+    channels = [*bench().model_dump()["channels"], ESTOP]
+    stop = {"channel": "estop", "below_v": -50.0}
+    chosen = Bench.model_validate({**bench().model_dump(), "channels": channels, "emergency_stop": stop})
+    assert "keep a hardware emergency stop within reach" in unguarded_text(chosen, Capabilities(**UNSAFE))
+
+
 def test_whoever_is_asked_once_is_asked_again_after_a_trip():
     asked = []
     once = asked_once(lambda request: asked.append(request.unseen) or len(asked) == 1)
@@ -318,12 +369,10 @@ def test_a_stop_by_request_is_an_orderly_end(monkeypatch):
 
 @pytest.mark.usefixtures("physical")
 def test_a_campaign_that_dies_leaves_a_caution(monkeypatch, tmp_path):
-    def dies(real, session, settings):
-        loop = real(session, settings)
-        loop.run = lambda: (_ for _ in ()).throw(SystemExit(9))
-        return loop
+    def dies(execution, information):
+        raise SystemExit(9)
 
-    Started(monkeypatch, dies)
+    monkeypatch.setattr("rig.campaigns.runner.Execution.go", dies)
     with pytest.raises(SystemExit):
         rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True)
     with pytest.raises(NotArmed, match=r"a run into .*run\.h5 was under way"):

@@ -70,15 +70,24 @@ class RewiredDAQ(DAQ):
 
     wall_clock = False  # in the test's own process
 
-    def __init__(self, bench: Bench, seed: int, rewire: Rewiring | None, *, virtual: bool = True) -> None:
+    def __init__(
+        self,
+        bench: Bench,
+        seed: int,
+        rewire: Rewiring | None,
+        *,
+        virtual: bool = True,
+        safe_without_host: bool = True,
+    ) -> None:
         super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
         self.inner = VirtualDAQ(bench, seed)
-        self.bench, self.rewire, self.virtual = bench, rewire, virtual
+        self.bench, self.rewire = bench, rewire
+        self.differently = {"virtual": virtual, "safe_without_host": safe_without_host}
 
     @property
     def capabilities(self) -> Capabilities:
-        """Those of the rig, but for whether anything moves."""
-        return self.inner.capabilities.model_copy(update={"virtual": self.virtual})
+        """Those of the rig, but for whether anything moves, and what becomes of it without the host."""
+        return self.inner.capabilities.model_copy(update=self.differently)
 
     @property
     def latency_samples(self) -> float:
@@ -108,9 +117,9 @@ class RewiredDAQ(DAQ):
         self.inner.close()
 
 
-def rewire(patch: pytest.MonkeyPatch, rewiring: Rewiring | None, *, virtual: bool = True) -> None:
+def rewire(patch: pytest.MonkeyPatch, rewiring: Rewiring | None, **differently: bool) -> None:
     """Have every bench that is opened from now on rewired."""
-    patch.setattr("rig.session.make_daq", lambda bench, seed: RewiredDAQ(bench, seed, rewiring, virtual=virtual))
+    patch.setattr("rig.session.make_daq", lambda bench, seed: RewiredDAQ(bench, seed, rewiring, **differently))
 
 
 Column = Callable[[int, np.ndarray], np.ndarray]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rig.check.check import check
+from rig.conformance import with_loopback
 from rig.drivers.virtual.driver import VirtualDAQ
 from tests.rig.check.rewired import add_channel
 from tests.rig.rigs import bench_with
@@ -35,3 +36,10 @@ def test_a_loopback_tells_by_how_much_the_driver_is_wrong_about_its_latency(late
     latency = next(f for f in found.findings if f.name == "latency")
     assert latency.verdict == verdict
     assert latency.value == pytest.approx(late, abs=0.02)
+
+
+def test_the_loopback_of_a_virtual_rig_agrees_with_its_driver(tmp_path):
+    found = check(with_loopback(bench_with({"block": 50}, queue_blocks=1)), tmp_path / "check.h5")
+    latency = next(f for f in found.findings if f.name == "latency")
+    assert latency.verdict == "ok"
+    assert latency.value == pytest.approx(0.0, abs=0.02)

@@ -6,7 +6,9 @@ import pytest
 import rig
 from identification import nonlinear_mode
 from rig.bench import Bench
+from rig.conformance import with_loopback
 from rig.drivers import make_daq
+from rig.errors import ConfigurationError
 from rig.loop import Loop
 from tests.rig.rigs import bench_with, tick_for
 from tests.simulators.references import UNFILTERED
@@ -83,6 +85,26 @@ def test_fused_and_exchanged_runs_agree_with_filters(block: int) -> None:
     assert shortest > 800
     for name in rows[0].dtype.names:
         np.testing.assert_array_equal(rows[0][name][:shortest], rows[1][name][:shortest])
+
+
+def test_a_loopback_reads_the_same_fused_and_exchanged_and_changes_no_other_channel() -> None:
+    plain = bench_with(queue_blocks=1)
+    bench, rows = with_loopback(plain), []
+    for chosen, fused in ((bench, True), (bench, False), (plain, True)):
+        with make_daq(chosen) as daq:
+            daq.start(4)
+            rows.append(np.concatenate([*Loop(daq, tick_for(chosen, 4 + daq.latency_samples, 0.3), fused=fused).run()]))
+    shortest = min(part.size for part in rows)
+    inputs = [part["inputs"][:shortest] for part in rows]
+    np.testing.assert_array_equal(inputs[0], inputs[1])
+    np.testing.assert_array_equal(inputs[0][:, :-1], inputs[2])
+    assert np.abs(inputs[0][:, -1]).max() == pytest.approx(0.3, rel=0.01)
+
+
+def test_a_channel_that_the_rig_has_not_is_refused_unless_it_is_a_loopback() -> None:
+    other = {"name": "estop", "role": "monitor", "unit": "V", "sensitivity_v_per_unit": 1.0}
+    with pytest.raises(ConfigurationError, match="in this order, and loopbacks behind them"):
+        make_daq(bench_with({"channels": [*bench_with().model_dump()["channels"], other]}))
 
 
 def test_facts_of_a_free_specimen_are_compared_with_a_mode_that_vibrates() -> None:

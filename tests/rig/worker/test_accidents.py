@@ -29,6 +29,11 @@ def loop_here(bench, settings, asked=lambda: ""):
     daq = NotingDAQ(bench)
     daq.open()
     daq.start(bench.block)
+    return loop_over(daq, bench, settings, asked)
+
+
+def loop_over(daq, bench, settings, asked=lambda: ""):
+    """The same over a driver that is running."""
     tick = settings.build(daq.latency_samples)
     tick.arrays, state = packed(tick.arrays)
     layout = Layout.of(bench, tick.arrays, len(daq.counters), 30.0)
