@@ -12,8 +12,9 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 NO_RESONANCE = "force_per_v, acceleration_per_v: their ratio shows no damped resonance inside the band"
 NO_MODE = 0.15
-"""Part of the accelerance that other modes' residuals may leave unexplained where it is taken to show no mode: one inside
-the band leaves 0.8 and more. Below, the equations for the pole hold next to nothing but noise, or the rounding of the processor."""
+"""The accelerance shows no mode where the residuals of other modes leave no more than this part of it unexplained.
+
+A mode inside the band leaves 0.8 and more. Without one, the equations for the pole hold noise or rounding alone."""
 
 
 def fitted(

@@ -34,8 +34,9 @@ def device():
             process.kill()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def port():
+    """A device of the test's own: a latched one would be the next test's trouble."""
     with device() as (_, path):
         yield path
 
@@ -97,10 +98,10 @@ def test_it_says_who_it_is(port):
 
 
 def test_its_watchdog_is_told_with_its_error_and_cleared_when_it_is_asked_to(port):
-    with make_daq(bench_at(port, watchdog_s=0.3)) as daq:
+    with make_daq(bench_at(port, watchdog_s=1.0)) as daq:
         daq.start(10)
         daq.exchange(np.full(10, 1.0))
-        time.sleep(0.5)  # a host that does nothing is the subject
+        time.sleep(1.5)  # a host that does nothing is the subject
         with pytest.raises(DaqWatchdog):
             any(daq.exchange(np.full(10, 1.0)) is None for _ in range(400))
     with daq:
