@@ -86,6 +86,7 @@ def test_outputs_are_read_back_at_the_index_they_were_meant_for(port, block):
     driven, clean = np.vstack(inputs)[QUEUE * block :], np.concatenate(flags)[QUEUE * block :] == 0
     expected = volts.ravel()[: len(driven)]
     assert not np.vstack(inputs)[: QUEUE * block].any()
+    clean[: np.flatnonzero(driven[:, 0])[0]] = False  # until the first output has come, nothing is held and flagged
     assert clean.any()  # a machine that is busy may be late with some
     np.testing.assert_allclose(driven[clean, 0], expected[clean], atol=1e-9)
     np.testing.assert_allclose(driven[clean, 1], expected[clean] / 2, atol=1.1e-3)
