@@ -37,7 +37,8 @@ class VirtualDAQ(DAQ):
     """A virtual rig behind the DAQ contract.
 
     Options: those of `simulators.VirtualRig` (``specimen`` and its parts), ``queue_blocks`` and ``delay_samples``. The
-    seed draws the noise; a run with the same seed and outputs returns the same inputs bit for bit on one machine, whatever the block.
+    seed draws the noise; on one machine a run with the same seed and outputs returns the same inputs bit for bit,
+    whatever the block.
 
     It returns at once: pacing is the loop's. Not modelled: lost samples, jitter, a device that fails.
     """
