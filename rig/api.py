@@ -119,7 +119,7 @@ def run(
     """Carry out a plan: a plan object, the name of a shipped one (``"magnet-beam/backbone"``) or a TOML file.
 
     ``bench`` replaces the bench that the plan names. ``seed`` draws the noise of a virtual rig; the same seed gives the
-    same recording bit for bit. ``realtime`` holds a virtual rig back to the wall clock.
+    same recording bit for bit on the same machine. ``realtime`` holds a virtual rig back to the wall clock.
 
     A bench on which something physical moves is armed by a person: ``arm`` is True, or a callable that is given a
     `rig.campaigns.arming.ArmingRequest` and answers. ``operator`` (the user if not given), ``specimen_serial`` and

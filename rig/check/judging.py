@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
-from rig.check.responses import BAND, Mode, Responses, fit_mode
+from rig.check.responses import BAND, FITS, Mode, Responses, fit_mode
 from rig.check.wiring import ALIKE, best_assignment, by_magnitude
 
 __all__ = ["driven_findings"]
@@ -18,7 +18,6 @@ SIZE_OK, SIZE_TOLERATED = (0.9, 1.1), (0.67, 1.5)
 FREQUENCY_OK, FREQUENCY_TOLERATED = (0.98, 1.02), (0.9, 1.1)
 TURN_DEG = 3.0
 DISTORTED = 0.05
-FITS = 0.15
 
 
 def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], Mode | None]:

@@ -14,6 +14,7 @@ import pytest
 from rig.cli import main
 from tests.docs.output import assert_shows
 from tests.docs.pages import INTERRUPTED, Block, blocks, rig_commands, write
+from tests.waiting import LONG_S
 
 
 @dataclass
@@ -82,7 +83,7 @@ def interrupted(words: list[str]) -> str:
         assert child.stderr is not None
         first = child.stderr.readline()
         child.send_signal(signal.SIGINT)
-        out, err = child.communicate(timeout=60)
+        out, err = child.communicate(timeout=LONG_S)
     assert first.startswith("point"), first + err
     assert child.returncode == 1, err
     return first + err + out

@@ -10,6 +10,7 @@ import uuid
 from pathlib import Path
 
 from tests.docs.pages import ROOT
+from tests.waiting import LONG_S
 
 INSTALLED = any(entry.value == "rig.pytest_plugin" for entry in importlib.metadata.entry_points(group="pytest11"))
 PLUGIN = [] if INSTALLED else ["-p", "rig.pytest_plugin"]
@@ -35,7 +36,7 @@ def started(folder, *arguments):
 def ended(folder, *arguments):
     """pytest in that folder, at its end: exit status, text, result file, outcome and reason by the name of the test."""
     process, _ = started(folder, *arguments)
-    text, _ = process.communicate(timeout=300)
+    text, _ = process.communicate(timeout=LONG_S)
     path = folder / "result.json"
     result = json.loads(path.read_text()) if path.exists() else {"tests": []}
     found = {test["test"].rpartition("::")[2]: (test["outcome"], test["reason"]) for test in result["tests"]}

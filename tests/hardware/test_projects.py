@@ -9,6 +9,7 @@ import pytest
 
 from tests.docs.pages import ROOT, blocks
 from tests.hardware.projects import alive, ended, started
+from tests.waiting import LONG_S
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
 
@@ -133,7 +134,7 @@ def test_ctrl_c_in_mid_test_ramps_down_and_leaves_no_process(tmp_path):
             os.sched_yield()
         assert len(alive(mark)) >= 2
         os.killpg(process.pid, signal.SIGINT)
-        text, _ = process.communicate(timeout=120)
+        text, _ = process.communicate(timeout=LONG_S)
     finally:
         process.kill()
         process.stdout.close()

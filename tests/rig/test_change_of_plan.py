@@ -24,7 +24,7 @@ from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.sequencer.segments import SettleRule
 from rig.summary import summarise
-from tests.rig.test_runs import _wait_for_points, plan_with
+from tests.rig.test_runs import plan_with, running
 
 ROOT = Path(__file__).parents[2]
 FIRST = plan_with(levels_v=(0.4, 0.8))
@@ -214,10 +214,9 @@ rig.resume(sys.argv[1], plan=SECOND, realtime=True)
 
 
 def test_kill_9_in_the_second_part_loses_no_point_of_either(output):
-    child = subprocess.Popen([sys.executable, "-c", CHILD, str(output)], cwd=ROOT)
-    _wait_for_points(output, 3)
-    child.kill()
-    assert child.wait() == -signal.SIGKILL
+    with running(CHILD, output, 3) as child:
+        child.kill()
+        assert child.wait() == -signal.SIGKILL
     with Recording(output) as recording:
         assert [point["level"] for point in recording.latest.values()] == [0.3, 0.4]
         assert not recording.complete

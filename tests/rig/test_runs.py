@@ -1,10 +1,10 @@
 """Runs that go wrong half-way: killed, interrupted, out of disk, out of reach, unlocked; and what is kept of them."""
 
+import contextlib
 import resource
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.sequencer.segments import SettleRule
 from tests.rig.rigs import bench_with
+from tests.waiting import wait_until
 
 LEVELS = (0.4, 0.8, 1.2, 1.6)
 
@@ -52,22 +53,27 @@ sys.exit(0 if run.complete else 1)
 """
 
 
-def _child(output):
-    return subprocess.Popen([sys.executable, "-c", CHILD, str(output)], cwd=Path(__file__).parents[2])
+@contextlib.contextmanager
+def running(script, output, points):
+    """A script in a process of its own that writes a recording, once that holds some points; none outlives the test."""
+    command = [sys.executable, "-c", script, str(output)]
+    with subprocess.Popen(command, cwd=Path(__file__).parents[2]) as child:
+        try:
+            wait_until(lambda: _holds(output, points) or child.poll() is not None, f"{points} points")
+            assert child.poll() is None, "the run ended before it was to be stopped"
+            yield child
+        finally:
+            child.kill()
 
 
-def _wait_for_points(output, points):
-    """Wait until a recording that another process is writing holds some points."""
-    for _ in range(600):
-        time.sleep(0.05)
-        if journal_path(output).exists():
-            try:
-                with Recording(output) as recording:
-                    if len(recording.points) >= points:
-                        return
-            except RecordingError:
-                continue
-    raise AssertionError("the run made no points")
+def _holds(output, points):
+    if not journal_path(output).exists():
+        return False
+    try:
+        with Recording(output) as recording:
+            return len(recording.points) >= points
+    except RecordingError:
+        return False
 
 
 def _same_points(points, whole):
@@ -81,13 +87,12 @@ def _same_points(points, whole):
 
 def test_a_killed_run_keeps_its_rows_and_points_and_is_resumed_to_the_same_result(tmp_path, whole):
     output = tmp_path / "run.h5"
-    child = _child(output)
-    _wait_for_points(output, 1)
-    with Recording(output) as recording:
-        rows_seen, points_seen = recording.n_rows, len(recording.points)
-        kept = recording.parts[0].read(0, rows_seen)
-    child.kill()
-    assert child.wait() == -signal.SIGKILL
+    with running(CHILD, output, 1) as child:
+        with Recording(output) as recording:
+            rows_seen, points_seen = recording.n_rows, len(recording.points)
+            kept = recording.parts[0].read(0, rows_seen)
+        child.kill()
+        assert child.wait() == -signal.SIGKILL
     assert not output.exists()
     with Recording(output) as recording:
         assert recording.n_rows >= rows_seen
@@ -106,10 +111,9 @@ def test_a_killed_run_keeps_its_rows_and_points_and_is_resumed_to_the_same_resul
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_ramps_down_closes_its_file_and_says_so(tmp_path, number):
     output = tmp_path / "run.h5"
-    child = _child(output)
-    _wait_for_points(output, 1)
-    child.send_signal(number)
-    assert child.wait() == 1
+    with running(CHILD, output, 1) as child:
+        child.send_signal(number)
+        assert child.wait() == 1
     with Recording(output) as recording:
         end = recording.parts[0].end
         assert end["reason"] == "stop_requested"

@@ -38,7 +38,8 @@ class VirtualDAQ(DAQ):
     """A virtual rig behind the DAQ contract.
 
     Options: those of `simulators.VirtualRig` (``specimen`` and its parts), ``queue_blocks`` and ``delay_samples``. The
-    seed draws the noise; a run with the same seed and outputs returns the same inputs bit for bit, whatever the block.
+    seed draws the noise; on one machine a run with the same seed and outputs returns the same inputs bit for bit,
+    whatever the block.
 
     Channels with ``loopback = true`` behind those of the rig's sensors read the output itself, late by hold and filters as the
     sensors are, without noise or steps.

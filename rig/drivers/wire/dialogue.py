@@ -1,6 +1,5 @@
 """The host's half of the commands: every request is repeated until it is answered."""
 
-import time
 from collections import deque
 from collections.abc import Callable
 
@@ -44,7 +43,7 @@ class Dialogue:
         self.stray_answers = 0
         self._doubled = 0
         self._answered: deque[tuple[Answer, int]] = deque(maxlen=REMEMBERED_ANSWERS)  # and how often each was asked for
-        self._number = time.monotonic_ns() // 1000 % 255  # another one than the last host's, most likely
+        self._number = round(1e6 * clock()) % 255  # another one than the last host's, most likely
 
     def ask(
         self,

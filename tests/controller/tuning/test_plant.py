@@ -100,3 +100,13 @@ def test_a_band_without_the_mode_is_refused():
     above = frequency > 26.0
     with pytest.raises(ValueError, match="no damped resonance"):
         PlantModel.from_frequency_responses(frequency[above], force[above], acceleration[above], **RATE)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-9, 1e-3, 0.05])
+def test_responses_without_a_mode_give_no_plant_whatever_the_rounding_and_the_noise(noise):
+    frequency, generator = np.linspace(20.0, 30.0, 200), np.random.default_rng(0)
+    force = 1.0 / (0.3 + 0.0008j * frequency)
+    for _ in range(10):
+        accelerance = (0.5 - 2.0 * (frequency / 25.0) ** 2) * (1.0 + noise * generator.standard_normal(200))
+        with pytest.raises(ValueError, match="no damped resonance"):
+            PlantModel.from_frequency_responses(frequency, force, accelerance * force, **RATE)

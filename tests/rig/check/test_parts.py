@@ -46,9 +46,19 @@ def test_a_delay_turns_the_residue():
     assert np.angle(mode.residue[0]) == pytest.approx(-2.0 * np.pi * 50.0 * late_s, rel=0.02)
 
 
-def test_where_no_mode_is_none_is_found():
+@pytest.mark.parametrize("disturbance", [0.0, 1e-15, 1e-9, 1e-3, 0.05])
+def test_where_no_mode_is_none_is_found_whatever_the_rounding_and_the_noise(disturbance):
     frequency = np.arange(20.0, 125.0, 0.5)
-    assert fit_mode(frequency, np.full((1, frequency.size), 2.0 + 0.0j) * frequency**2, 50.0) is None
+    rigid = two_modes(frequency, [(0.0, 0.5)]) + 2.0 * frequency**2 / 140.0**2
+    generator = np.random.default_rng(4)
+    for values in (np.full((1, frequency.size), 2.0 + 0.0j) * frequency**2, rigid):
+        for _ in range(20):
+            noise = 1.0 + disturbance * generator.standard_normal(values.shape)
+            assert fit_mode(frequency, values * noise, 50.0) is None
+
+
+def test_too_few_lines_give_no_mode():
+    frequency = np.arange(20.0, 125.0, 0.5)
     assert fit_mode(frequency[:5], two_modes(frequency[:5], [(1.0, 0.0)]), 50.0) is None
 
 

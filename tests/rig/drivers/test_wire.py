@@ -426,6 +426,21 @@ def test_another_who_starts_the_device_is_noticed() -> None:
             drive(daq, 50)
 
 
+def test_the_numbers_of_requests_follow_the_clock_of_the_driver_alone() -> None:
+    daqs, heard = [MemoryDAQ(bench_with(), 3) for _ in range(2)], ([], [])
+    for daq, numbers in zip(daqs, heard, strict=True):
+        handle = daq.device.handle
+
+        def noting(message: Message, now_s: float, handle: Any = handle, numbers: list[int] = numbers) -> None:
+            numbers.append(message[0])
+            handle(message, now_s)
+
+        daq.device.handle = noting  # type: ignore[method-assign]
+        with daq:
+            pass
+    assert heard[0] == heard[1] != []
+
+
 def test_another_who_disarms_the_device_is_noticed() -> None:
     daq = MemoryDAQ(bench_with(), 3, lockstep=False)
     with daq:

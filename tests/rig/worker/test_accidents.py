@@ -22,6 +22,7 @@ from rig.worker.spawn import Worker
 from tests.rig.worker.drivers import NotingDAQ
 from tests.rig.worker.rigs import slow_bench, tone
 from tests.rig.worker.test_worker import ROOT, is_there, ramped, ran
+from tests.waiting import LONG_S
 
 
 def loop_here(bench, settings, asked=lambda: ""):
@@ -87,16 +88,17 @@ def test_a_loop_killed_before_it_is_started_or_before_its_rows_are_asked_for_is_
     assert "has ended (SIGKILL)" in str(loop.failure)
 
 
-def test_a_campaign_interrupted_while_the_loop_starts_leaves_nothing_driven(tmp_path, noting):
+def test_a_campaign_interrupted_while_the_loop_starts_leaves_nothing_driven(tmp_path, noting, monkeypatch):
+    monkeypatch.setattr(rig.worker.session, "PATIENCE_S", 2.0 * LONG_S)  # after which it would be told to
     log = tmp_path / "outputs"
     with WorkerSession(slow_bench(log=str(log))) as session:
         session._worker.send("start", tone(slow_bench(), 60.0), 10.0)
-        assert session._worker.facts.poll(60.0)  # it runs, and the campaign was interrupted before it knew
+        assert session._worker.facts.poll(LONG_S)  # it runs, and the campaign was interrupted before it knew
         while not log.exists() or log.stat().st_size < 8 * 800:
             assert is_there(session.pid)
             time.sleep(0.02)
         began = time.monotonic()
-    assert time.monotonic() - began < 3.0  # not the patience after which it would have been told to
+    assert time.monotonic() - began < LONG_S
     assert not is_there(session.pid)
     assert ramped(np.fromfile(log, "<f8"))
 
@@ -119,7 +121,7 @@ def test_a_stop_by_a_signal_is_recorded_with_its_name(tmp_path, noting):
             assert campaign.poll() is None
             time.sleep(0.02)
         campaign.send_signal(signal.SIGTERM)
-        assert campaign.wait(30.0) == 0
+        assert campaign.wait(LONG_S) == 0
     with rig.Recording(output) as recording:
         assert recording.parts[-1].end["text"] == "stopped by request (SIGTERM)"
 

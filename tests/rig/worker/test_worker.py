@@ -1,6 +1,7 @@
 """The loop in a process of its own: the same rows, and a safe end whoever is killed, stopped or unplugged."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from rig.safety.layout import EndReason, GuardMode
 from rig.session import LocalSession, open_session
 from rig.worker.session import WorkerSession
 from tests.rig.worker.rigs import RATE_HZ, VOLTS, slow_bench, tone
+from tests.waiting import wait_until
 
 ROOT = Path(__file__).parents[3]
 
@@ -75,7 +77,7 @@ def test_rows_and_state_are_those_of_a_loop_in_this_process_bit_for_bit():
     for name in ("wake_up", "execution", "response"):
         assert sum(report["histograms"][name]["count"]) == there.size // 4
         assert 0 <= report[f"{name}_us"]["p50"] <= report[f"{name}_us"]["p99"] <= report[f"{name}_us"]["largest"]
-    assert report["wall_s"] == pytest.approx(there.size / RATE_HZ, rel=0.2)
+    assert report["wall_s"] >= (there.size - bench.block) / RATE_HZ  # later than the clock it may be, never earlier
     assert report["real_time"]["pacing"] == "host"
 
 
@@ -107,11 +109,7 @@ def test_when_the_campaign_is_killed_the_loop_ramps_down_and_leaves_nothing(tmp_
     ) as parent:
         pid = int(parent.stdout.readline())
         parent.kill()
-    for _ in range(200):
-        if not is_there(pid):
-            break
-        time.sleep(0.05)
-    assert not is_there(pid)
+    wait_until(lambda: not is_there(pid), "end of the loop's process")
     assert ramped(np.fromfile(log, "<f8"))
     assert set(named_memory()) <= before
 
@@ -180,7 +178,9 @@ def test_a_loop_that_stood_still_ramps_down_and_says_how_long(tmp_path, noting):
 
     with WorkerSession(bench) as session:
         _, loop = ran(session, tone(bench, 60.0), halt)
-    assert loop.cause.startswith("the loop stood still for 1.")
+    stood_s = re.fullmatch(r"the loop stood still for ([0-9.]+) s.*", loop.cause)
+    assert stood_s is not None, loop.cause
+    assert float(stood_s[1]) > 1.0
     assert loop.statistics.overruns >= 1
     assert ramped(np.fromfile(log, "<f8"))
 

@@ -1,5 +1,6 @@
 """Emulators as processes: reached by ordinary benches, safe when the host dies."""
 
+import itertools
 import json
 import os
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,6 @@ import pytest
 
 from rig.bench import Bench, DriverChoice, load_bench
 from rig.cli_emulate import _bench_text, _block, _write_bench
-from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.drivers.can import CanOptions
 from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqEmergencyStop, DaqTimeout
@@ -27,9 +28,10 @@ from rig.wire.device.process import Ready
 from rig.wire.device.settings import EmulatorSettings
 from tests.rig.drivers.test_wire import answers, virtual, voltages
 from tests.rig.rigs import bench_with
-from tests.rig.wire.device.host_process import RAMP_S, WATCHDOG_S
+from tests.rig.wire.device.host_process import BLOCK, RAMP_S
+from tests.waiting import LONG_S, wait_until
 
-MARGIN_S = 1.0  # of a machine that runs other tests besides
+WATCHDOG_S = 2.0  # a host on a busy machine still feeds it
 
 
 def rig_command(*arguments: str) -> list[str]:
@@ -80,7 +82,7 @@ def test_its_emergency_stop_reaches_the_host_and_its_end_is_an_unplugged_cable()
             daq.exchange(np.zeros(5))
             emulator.press_emergency_stop()
             with pytest.raises(DaqEmergencyStop):
-                exchange_for(daq, 10.0)
+                all(daq.exchange(np.zeros(5)) is not None for _ in itertools.count())
         with make_daq(emulator.bench) as daq:
             assert daq.latched == "the device's emergency stop had latched"
             daq.clear()
@@ -91,10 +93,17 @@ def test_its_emergency_stop_reaches_the_host_and_its_end_is_an_unplugged_cable()
                 daq.exchange(np.zeros(5))
 
 
-def exchange_for(daq: DAQ, seconds: float) -> None:
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        daq.exchange(np.zeros(5))
+@contextmanager
+def driving(port: str, watchdog_s: float) -> Iterator[subprocess.Popen[str]]:
+    """A host in a process of its own that drives a device, and is killed at the latest when the block ends."""
+    command = [sys.executable, "-m", "tests.rig.wire.device.host_process", port, str(watchdog_s)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as host:
+        try:
+            assert host.stdout is not None
+            assert host.stdout.readline() == "driving\n"
+            yield host
+        finally:
+            host.kill()
 
 
 def test_a_device_that_sends_other_channels_than_it_says_is_not_believed() -> None:
@@ -106,25 +115,32 @@ def test_a_device_that_sends_other_channels_than_it_says_is_not_believed() -> No
         assert daq.counters["malformed"] > 0
 
 
-def test_a_host_that_is_killed_leaves_the_output_at_0_v_within_watchdog_and_ramp(tmp_path: Path) -> None:
+def test_a_host_that_is_killed_leaves_the_output_at_0_v_after_the_watchdog_s_ramp(tmp_path: Path) -> None:
+    # How long the watchdog waits, tests/rig/wire/device/test_device.py asks with a clock of its own.
     log = tmp_path / "output.txt"
     with Emulator(bench_with(), lockstep=False, log_output=str(log)) as emulator:
         port = str(emulator.bench.driver.options["port"])
-        with subprocess.Popen(
-            [sys.executable, "-m", "tests.rig.wire.device.host_process", port], stdout=subprocess.PIPE, text=True
-        ) as host:
-            assert host.stdout is not None
-            assert host.stdout.readline() == "driving\n"
+        with driving(port, WATCHDOG_S):
             killed_s = time.monotonic()
-            host.kill()
-        time.sleep(WATCHDOG_S + RAMP_S + MARGIN_S)
-    at_s, _, volts = np.loadtxt(log, unpack=True)
-    driven = np.flatnonzero(volts)
+
+        def is_down() -> bool:
+            """It has brought the output to 0 V, and goes on sampling."""
+            at_s, _, volts = logged(log)
+            return bool((at_s[-6:] > killed_s).all() and not volts[-6:].any())
+
+        wait_until(is_down, "0 V after the host was killed")
+    at_s, first, volts = logged(log)
+    driven, full = np.flatnonzero(volts), np.flatnonzero(volts > 0.199)
     assert volts[at_s < killed_s][-1] == pytest.approx(0.2, abs=1e-3)
-    assert at_s[driven[-1]] < killed_s + WATCHDOG_S + RAMP_S + MARGIN_S
-    assert not volts[driven[-1] + 1 :].any()
-    assert volts.size - driven[-1] > 5  # it went on sampling
+    assert first[driven[-1]] - first[full[-1]] <= RAMP_S * 5000.0 + BLOCK  # in samples, which are the device's clock
+    assert (np.diff(volts[full[-1] :]) <= 0.0).all()
     assert emulator.counted["watchdog_trips"] == 1
+
+
+def logged(path: Path) -> np.ndarray:
+    """float64[3, n_blocks]: time, first sample, largest output; of whole lines."""
+    text = path.read_text()
+    return np.loadtxt(text[: text.rfind("\n")].splitlines(), unpack=True, ndmin=2)
 
 
 def test_the_command_says_where_it_is_and_writes_a_bench_that_reaches_it(tmp_path: Path) -> None:
@@ -143,7 +159,7 @@ def test_the_command_says_where_it_is_and_writes_a_bench_that_reaches_it(tmp_pat
             assert daq.identity["port"] == str(link)
         os.kill(process.pid, signal.SIGINT)
         assert json.loads(process.stdout.readline()) == {}
-        assert process.wait(10.0) == 0
+        assert process.wait(LONG_S) == 0
     assert not link.exists()
 
 
@@ -193,20 +209,16 @@ def test_a_host_may_come_back_as_often_as_it_likes(serial_bench: Bench) -> None:
 
 
 def test_a_device_that_streams_to_a_dead_host_is_taken_over_by_the_next() -> None:
-    with Emulator(bench_with(), lockstep=False, options={"watchdog_s": 2.0, "timeout_s": 5.0}) as emulator:
-        port = str(emulator.bench.driver.options["port"])
-        with subprocess.Popen(
-            [sys.executable, "-m", "tests.rig.wire.device.host_process", port], stdout=subprocess.PIPE, text=True
-        ) as host:
-            assert host.stdout is not None
-            assert host.stdout.readline() == "driving\n"
-            host.kill()
+    watchdog_s = 600.0  # it is still streaming when the next host comes, however late that is
+    with Emulator(bench_with(), lockstep=False, options={"watchdog_s": watchdog_s, "timeout_s": 60.0}) as emulator:
+        with driving(str(emulator.bench.driver.options["port"]), watchdog_s):
+            pass
         for found in ("still running", ""):
             with make_daq(emulator.bench) as daq:
                 daq.start(250)
                 inputs = np.vstack([daq.exchange(np.zeros(250)) for _ in range(8)])
-                assert np.isfinite(inputs).all()
-                assert daq.counters["lost_samples"] == 0
+                lost = np.isnan(inputs).any(axis=1)
+                assert lost.sum() == daq.counters["lost_samples"] < lost.size  # a busy machine may lose some
                 assert found in "".join(daq.remarks)
 
 

@@ -34,8 +34,9 @@ def device():
             process.kill()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def port():
+    """A device of the test's own: a latched one would be the next test's trouble."""
     with device() as (_, path):
         yield path
 
@@ -85,6 +86,7 @@ def test_outputs_are_read_back_at_the_index_they_were_meant_for(port, block):
     driven, clean = np.vstack(inputs)[QUEUE * block :], np.concatenate(flags)[QUEUE * block :] == 0
     expected = volts.ravel()[: len(driven)]
     assert not np.vstack(inputs)[: QUEUE * block].any()
+    clean[: np.flatnonzero(driven[:, 0])[0]] = False  # until the first output has come, nothing is held and flagged
     assert clean.any()  # a machine that is busy may be late with some
     np.testing.assert_allclose(driven[clean, 0], expected[clean], atol=1e-9)
     np.testing.assert_allclose(driven[clean, 1], expected[clean] / 2, atol=1.1e-3)
@@ -97,10 +99,10 @@ def test_it_says_who_it_is(port):
 
 
 def test_its_watchdog_is_told_with_its_error_and_cleared_when_it_is_asked_to(port):
-    with make_daq(bench_at(port, watchdog_s=0.3)) as daq:
+    with make_daq(bench_at(port, watchdog_s=1.0)) as daq:
         daq.start(10)
         daq.exchange(np.full(10, 1.0))
-        time.sleep(0.5)  # a host that does nothing is the subject
+        time.sleep(1.5)  # a host that does nothing is the subject
         with pytest.raises(DaqWatchdog):
             any(daq.exchange(np.full(10, 1.0)) is None for _ in range(400))
     with daq:
