@@ -2,13 +2,25 @@
 
 import numpy as np
 
-from rig.drivers.virtual.loopback import Loopback, read_output
+from rig.drivers.virtual.loopback import Loopback
 from rig.safety.kernels import is_over
 from rig.tick.kernels import tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from simulators.kernels import sample
 from simulators.layout import RigArrays, RigState
 from vibrolock.compiled import kernel
+
+
+@kernel
+def read_output(loop: Loopback, index: int, voltage: float, row: np.ndarray) -> None:
+    """Note the ``voltage`` that is on the converter at sample ``index``, and fill the loopback columns of its row, V."""
+    size, n = loop.past.size, loop.v_per_v.size
+    loop.past[index % size] = voltage
+    if n > 0:
+        seen = (1.0 - loop.part) * loop.past[(index - loop.whole) % size]
+        seen += loop.part * loop.past[(index - loop.whole - 1) % size]
+        for c in range(n):
+            row[row.size - n + c] = seen * loop.v_per_v[c]
 
 
 @kernel

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.daq import Channel
-from vibrolock.compiled import kernel
 
-__all__ = ["Loopback", "loopback_of", "read_output"]
+__all__ = ["Loopback", "loopback_of"]
 
 
 class Loopback(NamedTuple):
@@ -30,15 +29,3 @@ def loopback_of(channels: Sequence[Channel], delay_samples: float) -> Loopback:
     whole = math.floor(delay_samples)
     v_per_v = np.array([channel.sensitivity_v_per_unit for channel in channels if channel.loopback])
     return Loopback(np.zeros(whole + 2), v_per_v, whole, delay_samples - whole)
-
-
-@kernel
-def read_output(loop: Loopback, index: int, voltage: float, row: np.ndarray) -> None:
-    """Note the ``voltage`` that is on the converter at sample ``index``, and fill the loopback columns of its row, V."""
-    size, n = loop.past.size, loop.v_per_v.size
-    loop.past[index % size] = voltage
-    if n > 0:
-        seen = (1.0 - loop.part) * loop.past[(index - loop.whole) % size]
-        seen += loop.part * loop.past[(index - loop.whole - 1) % size]
-        for c in range(n):
-            row[row.size - n + c] = seen * loop.v_per_v[c]
