@@ -73,7 +73,7 @@ def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
     """Check and convert every input channel; returns the telemetry flags of the inputs."""
     law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
     armed = guard.mode == ARMED
-    driven = armed and loop.held == 1
+    driven = armed and (loop.held == 1 or t.progress[0].start_level > 0.0)  # in a ramp from a level, too
     # At first the mean of all samples seen so far: noise or ambient vibration in a single one would be integrated as travel.
     mean_gain = max(law.mean_gain, 1.0 / (loop.seen + 1.0))
     loop.seen += 1
