@@ -24,6 +24,10 @@ BESIDE_THE_LEVEL = {
     ),
     EndReason.DRIVER_FAILED: ("device, wire or driver, not the level", "see that `rig doctor --daq BENCH` answers"),
     EndReason.SAMPLES_LOST: ("wire or computer were too slow, not the level", "see `rig doctor --daq BENCH`"),
+    EndReason.PLANT_CONTRADICTED: (
+        "amplifier or a sensor of force or drive has another gain or polarity than when [plant] was measured",
+        "look at the amplifier's gain and at both sensors, then `rig check`; after a change of the rig, `rig tune` anew",
+    ),
     EndReason.EMERGENCY_STOP: ("somebody pressed the stop, or its cable is broken", "ask who, and release it"),
 }
 """Likely cause and what to do for what has nothing to do with levels and locks."""
@@ -68,6 +72,11 @@ def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before
         return Advice(
             f"sensor, cable or supply of channel {_name(bench, trip)} is dead, or the level is below one bit of its converter",
             "look at the channel, then `rig check`; raise the level if it is alive",
+        )
+    if trip.reason is EndReason.LEVEL_NOT_FOLLOWED:
+        return Advice(
+            f"sensor or cable of channel {_name(bench, trip)} has failed, or the amplifier does not put out what it is told",
+            "look at both, then `rig check`",
         )
     if isinstance(plan, LockedPlan) and not (before.locked or before.points):
         return Advice(

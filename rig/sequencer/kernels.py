@@ -123,6 +123,12 @@ def forget_periods(settling: Record) -> None:
 
 
 @kernel
+def is_slipping(lock: Record) -> bool:
+    """Whether a lock is about to be lost: far off, but not for long enough. What fails meanwhile fails for that."""
+    return bool(lock.state == LOCKED and lock.far_periods > 0)
+
+
+@kernel
 def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed: float, periods: float) -> int:
     """Outcome code of a held segment that has failed, or RUNNING."""
     if lock.state == LOST:
@@ -131,11 +137,19 @@ def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed:
         return UNREACHABLE
     if settling.clamped_periods >= CLAMPED_PERIODS:
         return OUTSIDE_WINDOW
+    if is_slipping(lock):
+        return RUNNING
     if kind == RECORD and settling.bad_periods >= rule.average_periods:
         return DISTURBED
     if kind == SETTLE and elapsed >= periods:
         return NOT_SETTLED
     return RUNNING
+
+
+@kernel
+def was_always_far(lock: Record, elapsed: float) -> bool:
+    """Whether the phase was that of a lost lock in every period of a segment, and in 100 at the least."""
+    return bool(lock.far_periods >= max(FAR_PERIODS, math.floor(elapsed) - 1))
 
 
 @kernel
@@ -152,9 +166,9 @@ def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
         return NOT_SETTLED
     if settling.clamped_in_row >= CLAMPED_PERIODS:
         return OUTSIDE_WINDOW
-    always_far = lock.far_periods > 0 and lock.far_periods >= math.floor(elapsed) - 1
-    if always_far and lock.far_periods >= FAR_PERIODS:
+    if was_always_far(lock, elapsed):
         return NOT_LOCKED
+    always_far = lock.far_periods > 0 and lock.far_periods >= math.floor(elapsed) - 1
     return RUNNING if always_far or settling.clamped_in_row > 0 else DONE
 
 
@@ -208,8 +222,9 @@ def give_up(
     A loop that never had a lock and is as far off as one that feeds back the wrong way ends it, before the level rises.
     """
     segment = segments[progress.segment]
+    elapsed = cycle - progress.start_cycle
     close_segment(progress, outcomes, settling, failure, cycle, sample)
-    far_off = failure == OUTSIDE_WINDOW or lock.far_periods >= FAR_PERIODS
+    far_off = failure == OUTSIDE_WINDOW or was_always_far(lock, elapsed)
     if segment.kind == START or (progress.unlocked == 1 and segment.drive == LOOP_DRIVE and far_off):
         progress.finished = 1
         shut_down(guard, NO_LOCK_IN_WINDOW if failure == OUTSIDE_WINDOW else NO_LOCK, -1, 0.0, sample, False)
@@ -340,6 +355,6 @@ def advance(
         elif verdict != RUNNING:
             give_up(progress, segments, outcomes, settling, lock, guard, verdict, cycle, sample)
         return
-    if segment.kind != SETTLE and elapsed >= segment.periods:
+    if segment.kind != SETTLE and elapsed >= segment.periods and not (segment.kind == RECORD and is_slipping(lock)):
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
         close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE, cycle, sample)

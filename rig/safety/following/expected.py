@@ -6,11 +6,11 @@ import numpy as np
 
 from controller.tuning import PlantModel
 from rig.bench import Bench
+from rig.safety.following.kernels import VISIBLE
 from rig.safety.following.layout import EXPECTED
 
 __all__ = ["expected_record"]
 
-VISIBLE = 8.0  # times the smallest amplitude of which a phase can be read: about three bits of the converter
 JUDGED = 16.0  # times that smallest amplitude, and
 NOISES = 8.0  # times the noise that the bench states for a channel (RMS), from which on the exciter is judged
 TOLD_APART = 3.0

@@ -25,6 +25,8 @@ TOO_MUCH = 1.5  # times its level: a law that raises its output then holds somet
 GROWN = 1.1  # times what there was: it follows, although it is far from its level
 JUMPED = 1.3  # a force may fall where the vibration grows by so much more than the output: a jump past a turning point
 VANISHED = 0.15  # of its level: a force that low is not what such a jump leaves
+VISIBLE = 8.0  # times the smallest amplitude of which a phase can be read: about three bits of the converter
+SILENT_PERIODS = 40
 UNLIKE = 0.6  # of the largest of output sent and terms of the known exciter
 TOO_STRONG = 4.0  # times the output: what an amplifier of another gain makes of it, also while the vibration grows
 WIDE = 3.0  # times its band, in which the known exciter tells an amplifier of another gain
@@ -92,6 +94,18 @@ def contradicts_exciter(
     following.unlike_s = following.unlike_s + dt_s if unlike else 0.0
     following.most_unlike_s = max(following.most_unlike_s, following.unlike_s)
     return bool(following.unlike_s > UNLIKE_PERIODS * TWO_PI / expected.centre_rad_s)
+
+
+@kernel
+def silent_side(expected: Record, following: Record, force: float, response: float) -> int:
+    """Once a period without a lock: 1 if the force (N), 2 if the motion (m/s^2) has shown nothing for `SILENT_PERIODS`.
+
+    The other one must stand out clearly: a level may also be too low for both.
+    """
+    no_force = force < expected.visible_n / VISIBLE and response > VISIBLE * expected.visible_m_s2
+    no_motion = response < expected.visible_m_s2 / VISIBLE and force > VISIBLE * expected.visible_n
+    following.silent_periods = following.silent_periods + 1 if no_force or no_motion else 0
+    return 0 if following.silent_periods < SILENT_PERIODS else 1 if no_force else 2
 
 
 @kernel

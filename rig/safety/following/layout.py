@@ -40,6 +40,7 @@ FOLLOWING = np.dtype(
         ("told", "i8"),
         ("unlike_s", "f8"),
         ("most_unlike_s", "f8"),
+        ("silent_periods", "i8"),
         ("reference_v", "f8"),
         ("reference_level", "f8"),
         ("reference_other", "f8"),
@@ -51,6 +52,7 @@ FOLLOWING = np.dtype(
 """State of the watch (one record). ``alpha``, ``beta``: exciter at this period's frequency, ``_rate`` their derivatives by s,
 ``told``: whether they are known apart there. ``sent``: complex output as the detector's filter would show it, ``late_`` what
 has passed that filter once more, ``needed``: output that the known exciter needs for it. ``unlike_s``: time without a break in
-which the two contradict each other, ``most_unlike_s`` the longest. ``reference_``: output (V), held quantity and the other of
+which the two contradict each other, ``most_unlike_s`` the longest. ``silent_periods`` in which one of force and motion showed
+nothing and the other much. ``reference_``: output (V), held quantity and the other of
 force and motion when the held quantity last followed. ``astray_periods`` since in which it did not, ``most_periods`` of these
 there ever were, ``largest_rise`` of the output above its reference in them."""

@@ -87,6 +87,8 @@ def trip_s(fault: Fault, held: str, period_s: float) -> float | None:
     if fault.kind == "stuck":
         return STUCK_S if fault.onset == "middle" else STUCK_FROM_START_S
     in_the_loop = fault.part in ("force", "drive", "amplifier", "driver")
+    if fault.part == "amplifier" and fault.kind in (*BLIND, *RAISES_OUTPUT):
+        return period_s * VOLTAGE_PERIODS if held or fault.kind in BLIND else None
     if fault.kind in BLIND and in_the_loop:
         return period_s * (HELD_PERIODS if held and fault.onset == "middle" else VOLTAGE_PERIODS)
     if fault.kind in RAISES_OUTPUT and held and fault.part in (held, "amplifier"):

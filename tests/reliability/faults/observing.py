@@ -39,7 +39,7 @@ class Healthy:
     force_n: float
     displacement_m: float
     middle: int
-    """Sample halfway through the record of the first point."""
+    """Sample halfway through the record of the second point."""
     warnings: tuple[tuple[str, ...], ...]
     """Of each point."""
     finished: bool
@@ -125,13 +125,13 @@ def healthy(levels: str, device: str) -> Healthy:
     daq, kept, raised, closed = carried_out(levels, device, None, 0, 0.0)
     assert not raised
     assert closed
-    first = kept.points[0]
+    second = kept.points[1]
     motion = np.concatenate(daq.broken.motion)
     return Healthy(
         float(np.abs(np.concatenate(daq.handed)).max()),
         float(np.abs(motion[:, 0]).max()),
         float(np.abs(motion[:, 1]).max()),
-        (first["first_sample"] + first["end_sample"]) // 20 * 10,
+        (second["first_sample"] + second["end_sample"]) // 20 * 10,
         tuple(tuple(point["warnings"]) for point in kept.points),
         all(point["accepted"] for point in kept.points),
     )

@@ -1,4 +1,4 @@
-"""Short plans of every kind of level; two levels each, which without a fault are both accepted."""
+"""Short plans of every kind of level; three levels each, which without a fault are all accepted."""
 
 from typing import Any
 
@@ -30,29 +30,29 @@ def _quick(specimen: str, low_pass_rad_s: float, **changes: Any) -> dict[str, An
 
 MAGNET, FRICTION = ("magnet-beam", 30.62), ("friction-beam", 187.2)
 LEVELS: dict[str, dict[str, Any]] = {
-    "V": {"bench": "magnet-beam", "levels_v": [0.6, 0.8], "controller": _loops("magnet-beam/backbone")},
+    "V": {"bench": "magnet-beam", "levels_v": [0.6, 0.7, 0.8], "controller": _loops("magnet-beam/backbone")},
     "N logarithmic": {
         "bench": "magnet-beam",
-        "levels_n": [0.15, 0.17],
+        "levels_n": [0.15, 0.16, 0.17],
         "start_v": 0.92,
         "controller": _quick(*MAGNET, force_loop="logarithmic"),
     },
     "N linear": {
         "bench": "magnet-beam",
-        "levels_n": [0.15, 0.17],
+        "levels_n": [0.15, 0.16, 0.17],
         "start_v": 0.92,
         "controller": _quick(*MAGNET, force_loop="linear", k3=1.0, k4=10.0),
     },
     "m": {
         "bench": "magnet-beam",
-        "levels_m": [5e-4, 6e-4],
+        "levels_m": [5e-4, 5.5e-4, 6e-4],
         "start_v": 0.3,
         "controller": _loops("magnet-beam/response-controlled"),
     },
-    "V, friction": {"bench": "friction-beam", "levels_v": [0.3, 0.4], "controller": _quick(*FRICTION)},
+    "V, friction": {"bench": "friction-beam", "levels_v": [0.3, 0.35, 0.4], "controller": _quick(*FRICTION)},
     "N, friction": {
         "bench": "friction-beam",
-        "levels_n": [1.0, 1.1],
+        "levels_n": [1.0, 1.05, 1.1],
         "start_v": 0.28,
         "controller": _quick(*FRICTION, force_loop="logarithmic", force_integral_per_s=5.0),
     },

@@ -11,7 +11,7 @@ class Fault:
     """One fault.
 
     ``part``: a channel's role (force, drive, response), or amplifier, structure, driver. ``onset``: ``start``, before the
-    first sample, or ``middle``, halfway through the record of the first point of the run without the fault.
+    first sample, or ``middle``, halfway through the record of the second point of the run without the fault.
     ``devices``: where it can happen; a wire of counts carries no number that is none, a driver in memory has no cable.
     """
 

@@ -8,11 +8,11 @@ from controller.layout import (
     VOLTAGE,
 )
 from controller.lock.kernels import next_lock_state
-from rig.safety.following.kernels import follow_level, see_frequency
-from rig.safety.kernels import LEVEL_NOT_FOLLOWED, shut_down
+from rig.safety.following.kernels import follow_level, see_frequency, silent_side
+from rig.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
 from rig.safety.layout import ARMED
 from rig.sequencer.kernels import judge_period
-from rig.sequencer.layout import TONE, WAVEFORM
+from rig.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from rig.tick.laws.amplitude.kernels import controlled_size
 from rig.tick.layout import TickArrays
 from vibrolock.compiled import kernel
@@ -34,7 +34,14 @@ def judge_following(t: TickArrays, held: float, force: float, response: float) -
     """The means of a period: trip where a law that holds a level raises the output and what it holds stays away."""
     loop, law, guard, following = t.loop[0], t.loop[0].amplitude_law, t.guard[0], t.following[0]
     see_frequency(t.expected[0], following, loop.omega)
-    if law == VOLTAGE or guard.mode != ARMED:
+    if guard.mode != ARMED:
+        return
+    if loop.drive == LOOP_DRIVE and t.progress[0].unlocked == 1:
+        side = silent_side(t.expected[0], following, force, response)
+        if side > 0:
+            channel = loop.force_channel if side == 1 else loop.drive_channel
+            shut_down(guard, SENSOR_STUCK, channel, force if side == 1 else response, loop.sample, False)
+    if law == VOLTAGE:
         return
     wanted, volts = t.progress[0].level, guard.amplitude_v
     slipping, tone = t.lock[0].state == LOCKED and t.lock[0].far_periods > 0, loop.drive == TONE
