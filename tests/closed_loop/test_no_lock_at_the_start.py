@@ -28,7 +28,6 @@ def _reversed(specimen, role):
     [
         ("magnet-beam/stepped-phase-fast", "force"),
         ("magnet-beam/stepped-phase-fast", "drive"),
-        ("magnet-beam/continuous-backbone", "drive"),
         ("magnet-beam/response-controlled", "force"),
         ("friction-beam/stepped-phase-fast", "force"),
     ],
@@ -52,6 +51,17 @@ def test_with_a_reversed_sensor_the_run_ends_near_the_start_voltage_and_asks_for
         assert point["reason"].startswith("no lock at the start voltage: ")
         assert "polarity reversed" in point["reason"]
     assert end["skipped"].startswith(f"{len(points)} of {len(points)} points skipped: ")
+
+
+@pytest.mark.parametrize("role", ["force", "drive"])
+def test_a_reversed_sensor_contradicts_a_known_plant_before_the_start_voltage_is_reached(role):
+    plan = "magnet-beam/continuous-backbone"
+    with rig.run(plan, bench=_reversed("magnet-beam", role)) as run:
+        part = run.recording.parts[0]
+        highest_v, end = np.abs(part.rows("command_v")).max(), part.end
+    assert end["reason"] == "plant_contradicted"
+    assert highest_v < load_plan(plan).start_v
+    assert "polarity" in end["likely_cause"]
 
 
 @pytest.mark.parametrize("role", ["force", "drive"])

@@ -86,6 +86,8 @@ def trip_s(fault: Fault, held: str, period_s: float) -> float | None:
         return DRIVER_S
     if fault.kind == "stuck":
         return STUCK_S if fault.onset == "middle" else STUCK_FROM_START_S
+    if fault.kind == "reversed" and fault.onset == "middle":
+        return None  # a lock may swing instead of being lost; then its points are refused
     in_the_loop = fault.part in ("force", "drive", "amplifier", "driver")
     if fault.part == "amplifier" and fault.kind in (*BLIND, *RAISES_OUTPUT):
         return period_s * VOLTAGE_PERIODS if held or fault.kind in BLIND else None

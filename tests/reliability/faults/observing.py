@@ -167,7 +167,18 @@ def observe(fault: Fault, levels: str, device: str) -> Observation:
         reason=end.get("reason", ""),
         tripped=bool(end.get("tripped")),
         text=end.get("text", ""),
-        said=tuple(filter(None, [raised, end.get("text", ""), *reasons, *(line for lines in news for line in lines)])),
+        said=tuple(
+            filter(
+                None,
+                [
+                    raised,
+                    end.get("text", ""),
+                    end.get("likely_cause", ""),
+                    *reasons,
+                    *(line for lines in news for line in lines),
+                ],
+            )
+        ),
         accepted=len(after),
         spoilt=sum(error > SPOILT for error in silent),
         worst=max(errors, default=0.0),

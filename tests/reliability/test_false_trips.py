@@ -1,0 +1,21 @@
+"""No shipped plan that holds a level comes near a trip on a sound rig."""
+
+import pytest
+
+from rig.safety.following.kernels import ASTRAY_PERIODS
+from rig.safety.layout import EndReason
+from tests.reliability.false_trips import SoundRun, held_level_plans, sound_run, table_of
+
+
+@pytest.mark.parametrize("plan", held_level_plans())
+def test_a_sound_rig_with_ten_times_the_noise_never_comes_near_a_trip(plan):
+    run = sound_run(plan, 7, 10.0)
+    assert run.reason is EndReason.COMPLETED
+    assert run.astray_periods <= ASTRAY_PERIODS // 2
+    assert run.unlike_periods < 0.5
+
+
+def test_a_run_that_ended_early_is_counted():
+    sound = SoundRun("a/b", True, 1.0, EndReason.COMPLETED, 2, 0.0)
+    tripped = sound._replace(reason=EndReason.LEVEL_NOT_FOLLOWED, astray_periods=10)
+    assert table_of([sound, tripped])[-1] == "| a level is held | 1 × | 2 | 1 | 10 | 0.00 |"
