@@ -20,8 +20,8 @@ class Case(NamedTuple):
         return f"{self.fault.name}, {self.levels}, {self.device}"
 
     @property
-    def is_slow(self) -> bool:
-        """Whether it is left to the slow tests: of the emulated device, what a case of the other one nearly shows."""
+    def is_left_to_the_command(self) -> bool:
+        """Whether only the command that writes the page looks at it: of the wire, what the other device nearly shows."""
         if self.device == "virtual":
             return False
         return (
