@@ -103,7 +103,8 @@ class BackbonePlan(SettledPlan):
         number, level = target.number, target.level
         geometric = self.levels_key != "levels_v"
         ramp = Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, geometric=geometric)
-        out = [replace(ramp, point=-1), replace(ramp, kind=SegmentKind.START, point=-1, periods=self._hold_periods)]
+        waits = SegmentKind.START if self.levels_key == "levels_v" else SegmentKind.HOLD  # others have had their start
+        out = [replace(ramp, point=-1), replace(ramp, kind=waits, point=-1, periods=self._hold_periods)]
         # A ramp from a level to itself: judged by what it shows, not by the settle rule.
         held = replace(ramp, kind=SegmentKind.LEVEL_SWEEP, periods=self.record_periods)
         return [*(out if first else ()), ramp, held]

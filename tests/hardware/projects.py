@@ -24,7 +24,7 @@ def started(folder, *arguments):
     process = subprocess.Popen(
         command,
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), MARK: mark},
+        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTEST_ADDOPTS": "", MARK: mark},  # none that this run was given
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

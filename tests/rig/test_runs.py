@@ -349,12 +349,20 @@ def test_a_reversed_sensor_gives_no_point_and_a_hint(tmp_path):
         assert "polarity" in recording.points[0]["reason"]
 
 
-def test_a_plan_that_says_stop_ends_at_the_first_failed_point(tmp_path):
+def test_a_plan_whose_loop_never_locks_ends_at_the_first_level(tmp_path):
     settle = SettleRule(longest_periods=80).model_dump()
     plan = plan_with(controller=OFF_RESONANCE, settle=settle, on_failure="stop")
     with carry_out(plan, bench_with(MISTAKEN), tmp_path / "run.h5") as recording:
+        assert recording.parts[0].end["reason"] == "no_lock_in_window"
+        assert recording.points[0]["quality"] == "outside-window"
+
+
+def test_a_plan_that_says_stop_ends_at_the_first_level_that_is_out_of_reach(tmp_path):
+    law = preset("magnet-beam").model_dump() | {"k3": 0.0, "k4": 10.0}
+    plan = plan_with(levels_v=None, levels_n=(0.06, 0.56, 0.6), controller=law, on_failure="stop")
+    with carry_out(plan, bench_with({"limits": {"voltage_v": 1.0}}), tmp_path / "run.h5", seed=1) as recording:
         assert recording.parts[0].end["reason"] == "plan_stopped"
-        assert len(recording.points) == 1
+        assert len(recording.points) == 2
 
 
 def test_a_trip_ends_the_run_and_the_file_names_channel_value_and_sample(tmp_path):

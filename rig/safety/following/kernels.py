@@ -135,26 +135,27 @@ def follow_level(
     ``amplitude_v`` is the output, ``held`` what should be ``wanted`` (N or m), ``force`` (N) and ``response`` (m/s^2) the
     fundamentals; ``slipping``: a lock is about to be lost, so that nothing may be learned.
 
-    What is held follows where it has grown towards its level, or is near it while the output creeps. At a frequency that
-    the plan gives (``may_jump``) a force also does where the vibration has grown by more than the output has risen: so a
-    structure jumps past a turning point, at which its force drops. It is astray where the output has risen and it has stayed,
-    has fallen to a half, or is too much.
+    What is held follows where it has grown towards its level, or is near it while the output creeps. A force also does where
+    it is too large while the vibration builds up, and, at a frequency that the plan gives (``may_jump``), where the vibration
+    has grown by more than the output has risen: so a structure jumps past a turning point, at which its force drops. It is
+    astray where the output has risen and it has stayed, has fallen to a half without any such growth, or is too much.
     """
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
     visible = (response if law == RESPONSE else force) >= smallest
     rise = amplitude_v / following.reference_v
     too_much = held > TOO_MUCH * wanted
-    if visible and not too_much and not slipping:
-        jumped = may_jump and law != RESPONSE and held >= VANISHED * wanted
-        jumped = jumped and other > JUMPED * following.reference_other * max(rise, 1.0)
-        if jumped or GROWN * following.reference_level <= held <= GROWN * wanted:
-            begin_to_follow(expected, following, amplitude_v, held, other)
+    moves_more = law != RESPONSE and other > JUMPED * following.reference_other * max(rise, 1.0)
+    if visible and not slipping:
+        jumped = may_jump and moves_more and held >= VANISHED * wanted
+        building_up = law != RESPONSE and too_much and other >= GROWN * following.reference_other
+        if jumped or building_up or GROWN * following.reference_level <= held <= GROWN * wanted:
+            begin_to_follow(expected, following, amplitude_v, min(held, wanted), other)
             return False
-        if held >= IN_ORDER * wanted:
+        if IN_ORDER * wanted <= held and not too_much:
             begin_to_follow(expected, following, min(amplitude_v, CREEP * following.reference_v), held, other)
             return False
-    fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level
+    fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level and not moves_more
     if rise >= ASTRAY_RISE or (rise >= RISEN and (fallen or (visible and too_much))):
         following.astray_periods += 1
         following.largest_rise = max(following.largest_rise, rise)
