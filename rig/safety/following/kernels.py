@@ -136,9 +136,10 @@ def follow_level(
     fundamentals; ``slipping``: a lock is about to be lost, so that nothing may be learned.
 
     What is held follows where it has grown towards its level, or is near it while the output creeps. A force also does where
-    it is too large while the vibration builds up, and, at a frequency that the plan gives (``may_jump``), where the vibration
-    has grown by more than the output has risen: so a structure jumps past a turning point, at which its force drops. It is
-    astray where the output has risen and it has stayed, has fallen to a half without any such growth, or is too much.
+    it is too large while the vibration builds up, where it sags to not less than half its level because the vibration has
+    grown by more than the output has risen, and, at a frequency that the plan gives (``may_jump``), where it drops further:
+    so a structure jumps past a turning point. It is astray where the output has risen and it has stayed, has fallen to a half
+    without any such growth, or is too much.
     """
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
@@ -152,7 +153,8 @@ def follow_level(
         if jumped or building_up or GROWN * following.reference_level <= held <= GROWN * wanted:
             begin_to_follow(expected, following, amplitude_v, min(held, wanted), other)
             return False
-        if IN_ORDER * wanted <= held and not too_much:
+        sags = moves_more and held >= ASTRAY_PART * wanted
+        if (held >= IN_ORDER * wanted or sags) and not too_much:
             begin_to_follow(expected, following, min(amplitude_v, CREEP * following.reference_v), held, other)
             return False
     fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level and not moves_more
