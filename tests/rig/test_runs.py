@@ -357,14 +357,6 @@ def test_a_plan_whose_loop_never_locks_ends_at_the_first_level(tmp_path):
         assert recording.points[0]["quality"] == "outside-window"
 
 
-def test_a_plan_that_says_stop_ends_at_the_first_level_that_is_out_of_reach(tmp_path):
-    law = preset("magnet-beam").model_dump() | {"k3": 0.0, "k4": 10.0}
-    plan = plan_with(levels_v=None, levels_n=(0.06, 0.56, 0.6), controller=law, on_failure="stop")
-    with carry_out(plan, bench_with({"limits": {"voltage_v": 1.0}}), tmp_path / "run.h5", seed=1) as recording:
-        assert recording.parts[0].end["reason"] == "plan_stopped"
-        assert len(recording.points) == 2
-
-
 def test_a_trip_ends_the_run_and_the_file_names_channel_value_and_sample(tmp_path):
     bench = bench_with({"limits": {"displacement_m": 1.0e-3}})
     with carry_out(plan_with(), bench, tmp_path / "run.h5") as recording:

@@ -21,6 +21,7 @@ ASTRAY_PART = 0.5
 ASTRAY_PERIODS = 10
 RISEN = 1.2  # from here on an output has risen; a force that sags while a vibration builds up needs no more output
 IN_ORDER = 0.9  # of its level: a held quantity that has so much follows
+SAGGED = 0.75  # of its level: a force may be so far behind while the vibration builds up
 TOO_MUCH = 1.5  # times its level: a law that raises its output then holds something else than it reads
 GROWN = 1.1  # times what there was: it follows, although it is far from its level
 JUMPED = 1.3  # a force may fall where the vibration grows by so much more than the output: a jump past a turning point
@@ -135,10 +136,10 @@ def follow_level(
     ``amplitude_v`` is the output, ``held`` what should be ``wanted`` (N or m), ``force`` (N) and ``response`` (m/s^2) the
     fundamentals; ``slipping``: a lock is about to be lost, so that nothing may be learned.
 
-    What is held follows where it has grown towards its level, or is near it while the output creeps. A force also does where
-    it is too large while the vibration builds up, where it sags to not less than half its level because the vibration has
-    grown by more than the output has risen, and, at a frequency that the plan gives (``may_jump``), where it drops further:
-    so a structure jumps past a turning point. It is astray where the output has risen and it has stayed, has fallen to a half
+    What is held follows where it has grown towards its level, or is near it while the output creeps. A force may also be too
+    large while the vibration builds up, and sag by less than a quarter, with an output that creeps, where the vibration has
+    grown by more than the output has risen. At a frequency that the plan gives (``may_jump``) it may then drop further: so a
+    structure jumps past a turning point. It is astray where the output has risen and it has stayed, has fallen to a half
     without any such growth, or is too much.
     """
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
@@ -153,8 +154,11 @@ def follow_level(
         if jumped or building_up or GROWN * following.reference_level <= held <= GROWN * wanted:
             begin_to_follow(expected, following, amplitude_v, min(held, wanted), other)
             return False
-        sags = moves_more and held >= ASTRAY_PART * wanted
-        if (held >= IN_ORDER * wanted or sags) and not too_much:
+        if moves_more and SAGGED * wanted <= held < IN_ORDER * wanted:
+            following.reference_v = min(amplitude_v, CREEP * following.reference_v)
+            following.astray_periods = 0
+            return False
+        if held >= IN_ORDER * wanted and not too_much:
             begin_to_follow(expected, following, min(amplitude_v, CREEP * following.reference_v), held, other)
             return False
     fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level and not moves_more
