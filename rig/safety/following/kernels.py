@@ -23,6 +23,7 @@ RISEN = 1.2  # from here on an output has risen; a force that sags while a vibra
 IN_ORDER = 0.9  # of its level: a held quantity that has so much follows
 SAGGED = 0.75  # of its level: a force may be so far behind while the vibration builds up
 TOO_MUCH = 1.5  # times its level: a law that raises its output then holds something else than it reads
+FAR_TOO_MUCH = 3.0  # and so much of a force is not what a vibration takes that builds up
 GROWN = 1.1  # times what there was: it follows, although it is far from its level
 JUMPED = 1.3  # a force may fall where the vibration grows by so much more than the output: a jump past a turning point
 VANISHED = 0.15  # of its level: a force that low is not what such a jump leaves
@@ -150,7 +151,8 @@ def follow_level(
     moves_more = law != RESPONSE and other > JUMPED * following.reference_other * max(rise, 1.0)
     if visible and not slipping:
         jumped = may_jump and moves_more and held >= VANISHED * wanted
-        building_up = law != RESPONSE and too_much and other >= GROWN * following.reference_other
+        building_up = law != RESPONSE and too_much and held < FAR_TOO_MUCH * wanted
+        building_up = building_up and other >= GROWN * following.reference_other
         if jumped or building_up or GROWN * following.reference_level <= held <= GROWN * wanted:
             begin_to_follow(expected, following, amplitude_v, min(held, wanted), other)
             return False
