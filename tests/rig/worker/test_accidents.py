@@ -112,18 +112,27 @@ rig.run("magnet-beam/backbone", bench=slow_bench(log=sys.argv[1]), output=sys.ar
 """
 
 
-def test_a_stop_by_a_signal_is_recorded_with_its_name(tmp_path, noting):
-    log, output = tmp_path / "outputs", tmp_path / "run.h5"
+def _text_of_a_run_that_got_sigterm(folder, noting):
+    log, output = folder / "outputs", folder / "run.h5"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(noting), str(ROOT), *filter(None, sys.path)])}
     command = [sys.executable, "-c", CAMPAIGN, str(log), str(output)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as campaign:
-        while not log.exists() or log.stat().st_size < 8 * 1000:
-            assert campaign.poll() is None
+        while campaign.poll() is None and (not log.exists() or log.stat().st_size < 8 * 1000):
             time.sleep(0.02)
         campaign.send_signal(signal.SIGTERM)
         assert campaign.wait(LONG_S) == 0
     with rig.Recording(output) as recording:
-        assert recording.parts[-1].end["text"] == "stopped by request (SIGTERM)"
+        return recording.parts[-1].end["text"]
+
+
+def test_a_stop_by_a_signal_is_recorded_with_its_name(tmp_path, noting):
+    for attempt in range(20):  # a busy machine may hold the loop up for so long that it ends by itself
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        text = _text_of_a_run_that_got_sigterm(folder, noting)
+        if "stood still" not in text:
+            break
+    assert text == "stopped by request (SIGTERM)"
 
 
 def test_after_a_drop_the_device_is_told_before_the_campaign(noting, monkeypatch):
