@@ -80,11 +80,12 @@ def fused(
     ``queue`` (float64[d]) holds the outputs under way: what the tick computes at a sample is on the converter d later.
     """
     delay = queue.size
-    sensed = volts.size - loop.v_per_v.size
+    looped, sensed = loop.v_per_v.size > 0, volts[: volts.size - loop.v_per_v.size]
     for index in range(rows.size):
         slot = t.loop[0].sample % delay
-        read_output(loop, t.loop[0].sample, queue[slot], volts)
-        flags = sample(rig, state, queue[slot], volts[:sensed])
+        if looped:
+            read_output(loop, t.loop[0].sample, queue[slot], volts)
+        flags = sample(rig, state, queue[slot], sensed)
         count_flags(flags, counts)
         queue[slot] = tick(t, volts, False, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
