@@ -49,6 +49,8 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
     parts = [
         {
             "rows": part.n_rows,
+            "bytes_lost": part.dropped_bytes,
+            "lost": part.dropped_reason or None,
             "ended": None if part.end is None else part.end["text"],
             "tripped": part.end is not None and part.end["tripped"],
             **{key: (part.end or {}).get(key) for key in ("tripped_at", "likely_cause", "what_to_do")},

@@ -68,6 +68,8 @@ def print_summary(summary: dict[str, Any]) -> None:
     for index, part in enumerate(summary["parts"]):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
         print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
+        if part["lost"]:
+            print(f"  not readable: {part['lost']}")
         _print_advice(part)
         _print_about(part["about"] or {})
         print_loop(part["loop"] or {}, part["counters"] or {})

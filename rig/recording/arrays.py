@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rig.errors import RecordingError
-from rig.recording.journal import journal_path, read_journal
+from rig.recording.journal import journal_path
 from rig.recording.layout import identify, kind_in, new_file, one_line, open_file, reading
+from rig.recording.sequence import read_journal
 from rig.recording.tables import read_object, write_object
 
 __all__ = ["kind_of", "read_arrays", "write_arrays"]

@@ -20,13 +20,15 @@ from rig.recording.stored import read_recording, write_recording
 __all__ = ["check_continuation", "continue_recording", "finalise"]
 
 
-def finalise(journal: str | Path, output: str | Path) -> None:
+def finalise(journal: str | Path, output: str | Path) -> Path | None:
     """Turn a journal into the HDF5 file ``output`` and remove the journal.
 
     Where ``output`` holds the earlier parts of the same recording, the new file holds them and the journal's. It is
     written beside ``output`` and renamed when it is whole and on the disk: until then ``output`` and journal stay as
-    they are, and doing it again after an interruption does no harm. A journal with damage amid whole blocks is not
-    removed but renamed to ``JOURNAL.damaged``.
+    they are, and doing it again after an interruption does no harm.
+
+    Returns:
+        ``JOURNAL.damaged``, to which a journal with damage amid whole blocks is renamed; ``None`` where it was removed.
 
     Raises:
         RecordingError: the journal is unreadable, empty or being written, ``output`` is another recording or not ours,
@@ -49,10 +51,10 @@ def finalise(journal: str | Path, output: str | Path) -> None:
                 raise RecordingError(f"{journal}: nothing was recorded; remove it")
             with new_file(output, kept=f"the journal {journal} is kept") as (file, check):
                 write_recording(file, header, parts, check)
-        if contents.tail.torn:
-            journal.unlink()
-        else:
-            journal.rename(set_aside(journal))
+        if contents.damaged:
+            return journal.rename(set_aside(journal))
+        journal.unlink()
+        return None
 
 
 def continue_recording(
