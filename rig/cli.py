@@ -134,16 +134,24 @@ def resume(
 
 
 def _carry(json: bool, kind: str, start: Any) -> None:
+    from rig.api import Run
     from rig.campaigns.kinds import KINDS
     from rig.console import RunProgress, print_json
+    from rig.recording.reader import Recording
+    from rig.stop_signals import Interrupted, Terminated, ignore_from_now_on
     from rig.summary import summarise_recording
     from rig.tables import say_how_it_ended
 
     progress = RunProgress(KINDS[kind].columns)
     try:
         result = start(progress)
+    except (Interrupted, Terminated) as signal:  # one that came when all was done
+        if signal.recorded is None:
+            raise
+        result = Run(Recording(signal.recorded))
     finally:
         progress.close()
+    ignore_from_now_on()
     with result:
         summary = summarise_recording(result.recording)
         complete, path = result.complete, result.recording.path
@@ -209,6 +217,10 @@ def main() -> None:
             _complain("interrupted", STOPPED)
     except (KeyboardInterrupt, typer.Abort):
         status = _complain("interrupted", STOPPED)
+    except SystemExit as error:
+        if (name := getattr(error, "signal", None)) is None:
+            raise
+        status = _complain(f"ended by {name}", int(error.code or 0))
     except BrokenPipeError:  # whoever read our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
@@ -238,4 +250,6 @@ def _one_line(error: Exception) -> str:
     text = " ".join(str(error).split())
     if isinstance(error, RigError | IdentificationError):
         return text
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{os.fsdecode(error.filename)}: cannot be used ({error.strerror})"
     return f"unexpected {type(error).__name__}: {text} (run again with --debug for the details)"

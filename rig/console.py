@@ -3,7 +3,7 @@
 import contextlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -107,11 +107,15 @@ class RunProgress:
 
 
 class FitLines:
-    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration, or after ten seconds without one."""
+    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration, or after ten seconds without one.
+
+    ``check`` is called at every iteration and may raise, to end the fit.
+    """
 
     _EVERY, _LONGEST_S = 10, 10.0
 
-    def __init__(self) -> None:
+    def __init__(self, check: "Callable[[], None]" = lambda: None) -> None:
+        self._check = check
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._best = (float("inf"), 0)
         self._stage = ""
@@ -119,6 +123,7 @@ class FitLines:
 
     def __call__(self, at: "FitProgress") -> None:
         """Say where the fit is, and which iteration is the best so far."""
+        self._check()
         judged = at.training_error if at.validation_error != at.validation_error else at.validation_error
         if at.stage != self._stage:
             self._stage, self._best = at.stage, (float("inf"), 0)

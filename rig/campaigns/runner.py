@@ -13,7 +13,7 @@ from rig.campaigns.arming import Arm, armed
 from rig.campaigns.bench_memory import RememberedTrip, now, remember
 from rig.campaigns.continuation import what_is_left
 from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
-from rig.campaigns.output import make_way, set_aside
+from rig.campaigns.output import forget_before, make_way, put_back, set_aside
 from rig.campaigns.plan import Plan
 from rig.campaigns.trips import refuse_tripped
 from rig.errors import RigError
@@ -26,11 +26,13 @@ from rig.safety.layout import EndReason
 from rig.safety.limits import describe_end
 from rig.sequencer.segments import Segment
 from rig.session import Session, TickSettings, open_session
+from rig.stop_signals import ended_in_order, held
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 
 __all__ = ["carry_out", "take_up"]
 
 
+@ended_in_order()
 def carry_out(
     plan: Plan,
     bench: Bench,
@@ -51,6 +53,8 @@ def carry_out(
     (`rig.campaigns.arming`), else `rig.errors.NotArmed`; ``about`` is recorded with the part.
     """
     plan.check(bench)
+    progress = progress or Silent()
+    _put_back(output, progress)
     make_way(output, overwrite)
     with open_session(bench, seed, realtime=realtime) as session:
         facts = _facts(plan, bench, session, arm, about, progress)
@@ -70,12 +74,12 @@ def carry_out(
             _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
             _started(session, settings, output) as loop,
         ):
-            execution = Execution(plan, bench, loop, journal, progress or Silent())
+            execution = Execution(plan, bench, loop, journal, progress)
             execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
-    finalise(journal_path(output), output)
-    return Recording(output)
+    return _whole(output, progress)
 
 
+@ended_in_order()
 def take_up(
     output: Path,
     *,
@@ -97,7 +101,14 @@ def take_up(
     Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before, or that asks for a level
     that tripped or a higher one, unless ``retry_tripped``.
     """
+    progress = progress or Silent()
+    _put_back(output, progress)
     with Recording(output) as recording:
+        for number, part in enumerate(recording.parts):
+            if part.dropped_reason:
+                progress.remark(
+                    f"part {number}: {part.dropped_reason}; points whose results are missing are measured again"
+                )
         left = what_is_left(recording, change, source)
         # A further part draws its own noise: the same seed again would repeat the first part's.
         drawn = (recording.seed or 0) + len(recording.parts) if seed is None else seed
@@ -117,19 +128,35 @@ def take_up(
                 _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
                 _started(session, _settings(plan, bench, segments), output) as loop,
             ):
-                execution = Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers, before)
+                execution = Execution(plan, bench, loop, journal, progress, left.done, left.numbers, before)
                 execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
     elif not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
             journal.end(nothing_left(bench))
-    if journal_path(output).exists():
-        finalise(journal_path(output), output)
+    return _whole(output, progress) if journal_path(output).exists() else Recording(output)
+
+
+def _put_back(output: Path, progress: Progress) -> None:
+    if told := put_back(output):
+        progress.remark(told)
+
+
+def _whole(output: Path, progress: Progress) -> Recording:
+    """The recording, its journal turned into its file; a signal meanwhile ends the program as soon as nothing can be lost."""
+    with held() as signals:
+        damaged = finalise(journal_path(output), output, signals.check)
+        forget_before(output)
+        if damaged is not None:
+            progress.remark(
+                f"the journal was damaged and is kept as {damaged.name}; `rig show {output}` says what was lost"
+            )
+        signals.check(recorded=output)
     return Recording(output)
 
 
 def _facts(
-    plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress | None
+    plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress
 ) -> dict[str, Any]:
     """Arm the bench; who did, who runs the test on what, and what stands behind the driver."""
     about = about or About()
@@ -140,7 +167,7 @@ def _facts(
         "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
     }
     for remark in facts["remarks"]:
-        (progress or Silent()).remark(remark)
+        progress.remark(remark)
     return facts
 
 

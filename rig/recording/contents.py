@@ -126,7 +126,9 @@ class JournalContents:
                 self._begin(block)
             return
         if not here:  # no part of that number has begun
-            self._note(Gap(block.stop - block.start, 1, f"the beginning of part {block.part} is lost"), "all of that part")
+            self._note(
+                Gap(block.stop - block.start, 1, f"the beginning of part {block.part} is lost"), "all of that part"
+            )
             return
         self._add_to_part(block, self.parts[-1])
 

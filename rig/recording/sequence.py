@@ -112,7 +112,9 @@ class JournalBlocks:
         if block.version == 1:
             return replace(block, part=part, row=row)
         if (block.part, block.row) != (part, row):
-            raise BadBlockError(f"a block of part {block.part}, row {block.row}, where row {row} of part {part} belongs")
+            raise BadBlockError(
+                f"a block of part {block.part}, row {block.row}, where row {row} of part {part} belongs"
+            )
         return block
 
 

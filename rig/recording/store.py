@@ -1,6 +1,6 @@
 """From journal to HDF5 file, whole or not at all, and back to a journal that continues a finished file."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -20,12 +20,13 @@ from rig.recording.stored import read_recording, write_recording
 __all__ = ["check_continuation", "continue_recording", "finalise"]
 
 
-def finalise(journal: str | Path, output: str | Path) -> Path | None:
+def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] | None = None) -> Path | None:
     """Turn a journal into the HDF5 file ``output`` and remove the journal.
 
     Where ``output`` holds the earlier parts of the same recording, the new file holds them and the journal's. It is
     written beside ``output`` and renamed when it is whole and on the disk: until then ``output`` and journal stay as
-    they are, and doing it again after an interruption does no harm.
+    they are, and doing it again after an interruption does no harm. ``check`` is called between chunks of rows; what it raises
+    ends the conversion.
 
     Returns:
         ``JOURNAL.damaged``, to which a journal with damage amid whole blocks is renamed; ``None`` where it was removed.
@@ -49,12 +50,18 @@ def finalise(journal: str | Path, output: str | Path) -> Path | None:
                 check_continuation(header, None, output)
             if not parts:
                 raise RecordingError(f"{journal}: nothing was recorded; remove it")
-            with new_file(output, kept=f"the journal {journal} is kept") as (file, check):
-                write_recording(file, header, parts, check)
+            with new_file(output, kept=f"the journal {journal} is kept") as (file, fits):
+                write_recording(file, header, parts, lambda: _each((fits, check)))
         if contents.damaged:
             return journal.rename(set_aside(journal))
         journal.unlink()
         return None
+
+
+def _each(checks: Sequence[Callable[[], None] | None]) -> None:
+    for check in checks:
+        if check is not None:
+            check()
 
 
 def continue_recording(

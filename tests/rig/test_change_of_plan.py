@@ -20,9 +20,9 @@ from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.models.points_left_out import points_left_out
 from rig.recording.blocks import Kind
-from rig.recording.sequence import read_journal
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
+from rig.recording.sequence import read_journal
 from rig.sequencer.segments import SettleRule
 from rig.summary import summarise
 from tests.rig.test_runs import plan_with, running

@@ -18,7 +18,6 @@ from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path, read_journal
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
 
-
 HEAD = 36
 
 
@@ -413,7 +412,9 @@ def mutated(data, mutations):
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mutations=MUTATIONS)
-def test_of_a_damaged_journal_whole_blocks_are_recovered_in_their_places_and_nothing_else(tmp_path, original, mutations):
+def test_of_a_damaged_journal_whole_blocks_are_recovered_in_their_places_and_nothing_else(
+    tmp_path, original, mutations
+):
     data = mutated(original, mutations)
     same = [a == b for a, b in zip(original, data, strict=False)]
     intact = same.index(False) if False in same else len(same)
@@ -460,8 +461,8 @@ def test_blocks_with_a_right_checksum_and_wrong_content_are_passed_over_without_
         with JournalContents(path) as contents:
             assert contents.n_blocks <= len(blocks)
             assert contents.size + contents.tail.n_bytes == path.stat().st_size
-    except RecordingError as error:
-        assert "\n" not in str(error)
+    except RecordingError:
+        assert at < 4 or kind == 1  # what stands before the first rows, or another header
 
 
 def test_deeply_nested_json_is_a_bad_block_and_no_crash(tmp_path, original):
