@@ -226,7 +226,9 @@ def main() -> None:
 
 
 def _complain(line: str, status: int) -> int:
-    print(f"rig: {' '.join(line.split())}", file=sys.stderr)
+    from rig.printable import one_line
+
+    print(f"rig: {one_line(line)}", file=sys.stderr)
     return status
 
 
@@ -235,7 +237,7 @@ def _one_line(error: Exception) -> str:
     from identification.errors import IdentificationError
     from rig.errors import RigError
 
-    text = " ".join(str(error).split())
+    text = str(error)
     if isinstance(error, RigError | IdentificationError):
         return text
     return f"unexpected {type(error).__name__}: {text} (run again with --debug for the details)"

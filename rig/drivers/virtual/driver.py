@@ -4,10 +4,10 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from rig.bench import Bench
-from rig.configuration import Configured, validated
+from rig.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.kernels import exchange_block, fused
 from rig.drivers.virtual.loopback import loopback_of
@@ -63,12 +63,30 @@ class VirtualDAQ(DAQ):
         options["converter"] = {**converter, **given}
         self.rig = validated(VirtualRig, options, "driver.options")
         self._compare_channels()
+        self._check_arrays(seed)
         self._seed = seed
         self._specimen = bench.specimen
         self._queue = np.zeros(0)
         self._loopback = loopback_of(self.channels, 0.0)
         self._counts = np.zeros(len(Flag), np.int64)
         self._first = 0
+
+    def _check_arrays(self, seed: int) -> None:
+        """Refuse, before a run has begun, parts whose arrays cannot be computed or hold numbers that are none."""
+        try:
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                arrays, _ = self.rig.build(seed)
+                delays = self.rig.channel_delays_samples
+        except ValidationError as error:  # of the specimen that scatters
+            raise ConfigurationError(f"driver.options: {explain(error, VirtualRig)}") from None
+        except (ArithmeticError, ValueError, MemoryError) as error:
+            raise ConfigurationError(
+                f"driver.options: this rig cannot be computed, a number of it is far too large or small ({error})"
+            ) from None
+        if not all(np.all(np.isfinite(array)) for array in (arrays.step, arrays.correct, arrays.sense, delays)):
+            raise ConfigurationError(
+                "driver.options: this rig cannot be computed, its integration step has numbers that are none"
+            )
 
     def _compare_channels(self) -> None:
         ours = [channel.name for channel in self.channels]
