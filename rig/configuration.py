@@ -117,7 +117,8 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
     for part in detail["loc"]:
         if isinstance(part, int):
             path += f"[{part}]"
-        elif part in keys or part == detail["loc"][-1]:  # else it is the kind of a part, which stands in no path
+        elif part in keys or (part == detail["loc"][-1] and detail["type"] != "value_error"):
+            # Else it is the kind of a part, which stands in no path.
             path += f".{part}" if path else str(part)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if detail["type"] == "extra_forbidden":

@@ -46,7 +46,7 @@ def _without_middle(text: str, longest: int) -> str:
 def shown(value: Any) -> str:
     """A value as it stands in a message: its ``repr``, shortened, with its size where it is long."""
     if isinstance(value, str) and len(value) > LONGEST_VALUE:
-        return f"{printable(value[: LONGEST_VALUE // 2])!r}... ({len(value)} characters)"
+        return f"{value[: LONGEST_VALUE // 2]!r}... ({len(value)} characters)"
     if isinstance(value, Mapping | list | tuple) and len(value) > LONGEST_VALUE:
         return f"{'a table' if isinstance(value, Mapping) else 'a list'} ({len(value)} items)"
     try:

@@ -22,6 +22,7 @@ __all__ = ["VirtualDAQ"]
 FACT_TOLERANCE = 1e-3
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
 FLAG_NAMES = tuple(str(flag.name).lower() for flag in Flag)
+GROWTH = 1e-3  # a step; of a plant that does not grow there is rounding alone, far below
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 
 
@@ -83,9 +84,13 @@ class VirtualDAQ(DAQ):
             raise ConfigurationError(
                 f"driver.options: this rig cannot be computed, a number of it is far too large or small ({error})"
             ) from None
-        if not all(np.all(np.isfinite(array)) for array in (arrays.step, arrays.correct, arrays.sense, delays)):
+        finite = all(np.all(np.isfinite(array)) for array in (arrays.step, arrays.correct, arrays.sense, delays))
+        size, first = self.rig.plant.dynamics.shape[0], self.rig.plant.site_rows.shape[0]
+        transition = arrays.step[:size, first : first + size].T  # behind the rows of the sites
+        if not finite or np.max(np.abs(np.linalg.eigvals(transition))) > 1.0 + GROWTH:
             raise ConfigurationError(
-                "driver.options: this rig cannot be computed, its integration step has numbers that are none"
+                "driver.options: this rig cannot be computed, its integration step grows: a mass, stiffness, resistance or "
+                "inductance is far too large or small beside the others"
             )
 
     def _compare_channels(self) -> None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
+import numpy as np
+
 from rig.bench import load_bench
 from rig.campaigns.lengths import check_length
 from rig.campaigns.plans import bench_of, load_plan
@@ -16,14 +18,15 @@ from rig.session import TickSettings
 from simulators.shipped import specimen_table
 from tests.reliability.mutations.byte_mutations import BYTE_MUTATIONS
 from tests.reliability.mutations.judging import Verdict, judged
-from tests.reliability.mutations.table_mutations import TABLE_MUTATIONS
+from tests.reliability.mutations.table_mutations import TABLE_MUTATIONS, Table
 from tests.reliability.mutations.toml_text import toml_of
 
-__all__ = ["Spoilt", "judge", "spoilt_configurations"]
+__all__ = ["Spoilt", "judge", "shipped_as_they_are", "spoilt_configurations"]
 
 RIG = Path(__file__).parents[3] / "rig"
-MOST_MUTATIONS = 3
-PART_IN_BYTES = 0.2
+MUTATIONS = (1, 1, 1, 2, 3)
+PART_IN_BYTES = 0.15
+SAMPLES = 500  # that a rig is run for
 
 
 @dataclass(frozen=True)
@@ -40,11 +43,16 @@ class Spoilt:
 
 def spoilt_configurations(count: int, seed: int) -> Iterator[Spoilt]:
     """So many spoilt benches and plans; the same for the same seed, and those of a longer run begin as a shorter one's."""
-    sources = [(name, path) for name, path in _shipped()]
+    sources = _shipped()
     for number in range(count):
         random = Random(f"{seed}/{number}")
         name, path = random.choice(sources)
         yield _in_bytes(name, path, random) if random.random() < PART_IN_BYTES else _in_tables(name, path, random)
+
+
+def shipped_as_they_are() -> list[Spoilt]:
+    """What is spoilt here, before it is: by way of tables, every bench with its specimen written out."""
+    return [Spoilt(name, (), _written(_table(name, path)[0])) for name, path in sorted(set(_shipped()))]
 
 
 def judge(spoilt: Spoilt, folder: Path) -> Verdict:
@@ -71,8 +79,14 @@ def _use_plan(path: Path) -> None:
 
 
 def _use_bench(path: Path) -> None:
-    daq = make_daq(load_bench(path))
+    bench = load_bench(path)
+    daq = make_daq(bench)
     assert all(isinstance(remark, str) for remark in daq.remarks)
+    with daq:
+        daq.start(bench.block)
+        for _ in range(max(1, SAMPLES // bench.block)):
+            inputs = daq.exchange(np.full(bench.block, min(0.01, bench.limits.voltage_v)))
+    assert np.all(np.isfinite(inputs)), "the rig reads numbers that are none"
 
 
 def _shipped() -> list[tuple[str, Path]]:
@@ -88,7 +102,7 @@ def _shipped() -> list[tuple[str, Path]]:
 
 def _in_bytes(name: str, path: Path, random: Random) -> Spoilt:
     data, done = path.read_bytes(), []
-    for _ in range(random.randint(1, MOST_MUTATIONS)):
+    for _ in range(random.choice(MUTATIONS)):
         mutation = random.choice(BYTE_MUTATIONS)
         data = mutation(data, random) or b"\n"
         done.append(mutation.__name__)
@@ -96,16 +110,26 @@ def _in_bytes(name: str, path: Path, random: Random) -> Spoilt:
 
 
 def _in_tables(name: str, path: Path, random: Random) -> Spoilt:
-    table, done = tomllib.loads(path.read_text(encoding="utf-8")), []
-    spoilt = table
-    if name.startswith("specimen "):
-        options = table["driver"]["options"]
-        spoilt = table["driver"]["options"] = specimen_table(options.pop("specimen")) | options
-    for _ in range(random.randint(1, MOST_MUTATIONS)):
+    (table, spoilt), done = _table(name, path), []
+    for _ in range(random.choice(MUTATIONS)):
         mutation = random.choice(TABLE_MUTATIONS)
         try:
             mutation(spoilt, random)
         except (IndexError, KeyError, RecursionError):  # nothing is left to spoil
             continue
         done.append(mutation.__name__)
-    return Spoilt(name, tuple(done), toml_of(table).encode("utf-8", "surrogatepass"))
+    return Spoilt(name, tuple(done), _written(table))
+
+
+def _table(name: str, path: Path) -> tuple[Table, Table]:
+    """A file's table, and the part of it that is to be spoilt: of a specimen all that the bench's driver is told."""
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    if not name.startswith("specimen "):
+        return table, table
+    options = table["driver"]["options"]
+    table["driver"]["options"] = specimen_table(options.pop("specimen")) | options
+    return table, table["driver"]["options"]
+
+
+def _written(table: Table) -> bytes:
+    return toml_of(table).encode("utf-8", "surrogatepass")

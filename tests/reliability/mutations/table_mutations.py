@@ -36,6 +36,11 @@ def number_scaled(table: Table, random: Random) -> None:
     _set(random, _places(table, int | float), scaled)
 
 
+def number_of_another_size(table: Table, random: Random) -> None:
+    """A number is larger or smaller by up to twelve decades: what bounds let through has to be computed with."""
+    _set(random, _places(table, float), lambda old: float(f"{old * 10.0 ** random.uniform(-12.0, 12.0):.3g}"))
+
+
 def text_replaced(table: Table, random: Random) -> None:
     """A text is another, with control characters, very long, or empty."""
     _set(random, _places(table, str), lambda old: random.choice(TEXTS))
@@ -96,6 +101,8 @@ def list_huge(table: Table, random: Random) -> None:
 TABLE_MUTATIONS: tuple[Callable[[Table, Random], None], ...] = (
     number_replaced,
     number_scaled,
+    number_of_another_size,
+    number_of_another_size,
     text_replaced,
     type_swapped,
     key_deleted,
