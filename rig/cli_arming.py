@@ -38,5 +38,10 @@ def ask(request: "ArmingRequest") -> bool:
 
     for line in request.lines():
         print(printable(line), file=sys.stderr)
-    print(f"{printable(request.what)} will move this rig. Type the bench's name to arm it: ", end="", file=sys.stderr, flush=True)
+    print(
+        f"{printable(request.what)} will move this rig. Type the bench's name to arm it: ",
+        end="",
+        file=sys.stderr,
+        flush=True,
+    )
     return sys.stdin.readline().strip() == request.bench.name

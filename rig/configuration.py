@@ -93,7 +93,9 @@ def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
         raise ConfigurationError(f"{source}: {explain(error, model)}") from None
     except (ArithmeticError, MemoryError) as error:
         why = f"{type(error).__name__}: {error}"
-        raise ConfigurationError(f"{source}: cannot be computed with, a number is far too large or small ({why})") from None
+        raise ConfigurationError(
+            f"{source}: cannot be computed with, a number is far too large or small ({why})"
+        ) from None
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:

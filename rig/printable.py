@@ -16,7 +16,10 @@ def printable(text: str) -> str:
     """The text with control, escape and other characters that cannot be printed shown by their escape, as Python writes it."""
     if text.isprintable():
         return text
-    return "".join(one if one.isprintable() or category(one) == "Zs" else one.encode("unicode_escape").decode("ascii") for one in text)
+    return "".join(
+        one if one.isprintable() or category(one) == "Zs" else one.encode("unicode_escape").decode("ascii")
+        for one in text
+    )
 
 
 def printable_strings(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""How long a plan may take at the most, and how much of it is held in memory: absurd lengths are refused before anything moves."""
+"""How long a plan may take, and how much of it is held in memory: absurd lengths are refused before anything moves."""
 
 from collections import defaultdict
 

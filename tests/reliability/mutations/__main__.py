@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rig.printable import one_line
-from tests.reliability.mutations.configurations import judge, spoilt_configurations
+from tests.reliability.mutations.configurations import compiled, judge, spoilt_configurations
 
 OUTCOMES = ("refused", "accepted", "misbehaved")
 
@@ -25,6 +25,7 @@ def main() -> int:
     counts: Counter[tuple[str, str]] = Counter()
     slowest = 0.0
     with TemporaryDirectory() as folder:
+        compiled(Path(folder))
         for number, spoilt in enumerate(spoilt_configurations(wanted.configurations, wanted.seed)):
             verdict = judge(spoilt, Path(folder))
             slowest = max(slowest, verdict.cpu_s)

@@ -5,7 +5,19 @@ from random import Random
 
 __all__ = ["BYTE_MUTATIONS"]
 
-PUT_BETWEEN = (b"\0", b"\xff\xfe", b"\x1b[2J\x1b[31m", b"\x80", b"\r", b"\xe2\x80\xae", b"]" * 3, b"[" * 3, b'"', b"'''", b"\n=")
+PUT_BETWEEN = (
+    b"\0",
+    b"\xff\xfe",
+    b"\x1b[2J\x1b[31m",
+    b"\x80",
+    b"\r",
+    b"\xe2\x80\xae",
+    b"]" * 3,
+    b"[" * 3,
+    b'"',
+    b"'''",
+    b"\n=",
+)
 
 
 def cut_short(data: bytes, random: Random) -> bytes:
@@ -39,5 +51,11 @@ def piece_lost(data: bytes, random: Random) -> bytes:
     return data[:first] + data[first + random.randint(1, 200) :]
 
 
-BYTE_MUTATIONS: tuple[Callable[[bytes, Random], bytes], ...] = (cut_short, flipped, put_between, piece_doubled, piece_lost)
+BYTE_MUTATIONS: tuple[Callable[[bytes, Random], bytes], ...] = (
+    cut_short,
+    flipped,
+    put_between,
+    piece_doubled,
+    piece_lost,
+)
 """Each takes the bytes of a file and a source of chance, and returns other bytes."""

@@ -5,8 +5,19 @@ import time
 import pytest
 
 from rig.errors import ConfigurationError
-from tests.reliability.mutations.configurations import Spoilt, judge, shipped_as_they_are, spoilt_configurations
+from tests.reliability.mutations.configurations import (
+    Spoilt,
+    compiled,
+    judge,
+    shipped_as_they_are,
+    spoilt_configurations,
+)
 from tests.reliability.mutations.judging import judged
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled(tmp_path_factory):
+    compiled(tmp_path_factory.mktemp("compiled"))
 
 
 def test_spoilt_configurations_are_refused_in_one_clear_line_or_work(tmp_path):

@@ -27,7 +27,11 @@ def _value(value: Any) -> str:
 
 def _text(text: str) -> str:
     r"""A quoted text; control characters stand as ``\uXXXX``, as TOML has it."""
-    return json.dumps(text, ensure_ascii=True).replace("\x7f", "\\u007f") if _plain(text) else json.dumps(text, ensure_ascii=False)
+    return (
+        json.dumps(text, ensure_ascii=True).replace("\x7f", "\\u007f")
+        if _plain(text)
+        else json.dumps(text, ensure_ascii=False)
+    )
 
 
 def _plain(text: str) -> bool:

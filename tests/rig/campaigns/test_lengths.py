@@ -21,11 +21,19 @@ def changed(name, **changes):
     [
         ("magnet-beam/backbone", {"levels_v": np.linspace(0.1, 1.0, 10_001).tolist()}, "levels_v: 10001 (levels_v)"),
         ("magnet-beam/backbone", {"repeats": 1000, "levels_v": [0.1 * n for n in range(1, 12)]}, "repeats: "),
-        ("magnet-beam/backbone", {"levels_v": np.linspace(0.1, 1.0, 5_001).tolist(), "direction": "up-down"}, "levels_v"),
+        (
+            "magnet-beam/backbone",
+            {"levels_v": np.linspace(0.1, 1.0, 5_001).tolist(), "direction": "up-down"},
+            "levels_v",
+        ),
         ("magnet-beam/stepped-sine-up", {"steps": 100_000}, "steps: "),
         ("magnet-beam/sweep-1", {"levels_v": np.linspace(0.1, 1.0, 10_001).tolist()}, "levels_v: "),
         ("magnet-beam/multisine-1", {"realisations": 1000, "levels_rms_v": [0.01 * n for n in range(1, 12)]}, "realis"),
-        ("magnet-beam/response-controlled", {"phase_lags_deg": np.linspace(-170, -10, 9_999).tolist()}, "phase_lags_deg"),
+        (
+            "magnet-beam/response-controlled",
+            {"phase_lags_deg": np.linspace(-170, -10, 9_999).tolist()},
+            "phase_lags_deg",
+        ),
         ("friction-beam/continuous-backbone", {"levels_m": np.linspace(1e-6, 1e-4, 10_001).tolist()}, "levels_m: "),
     ],
 )
@@ -52,7 +60,10 @@ def test_steps_of_a_lag_are_counted_before_they_are_made(step_deg):
             {"levels_rms_n": [0.1], "start_deg": -170.0, "stop_deg": -10.0, "step_deg": 0.04, "direction": "up-down"},
         ),
         ("magnet-beam/multisine-1", {"levels_rms_v": np.linspace(0.01, 0.1, 2_000).tolist(), "realisations": 5}),
-        ("friction-beam/continuous-backbone", {"levels_m": np.linspace(2e-5, 3e-5, MOST_POINTS).tolist(), "repeats": 1}),
+        (
+            "friction-beam/continuous-backbone",
+            {"levels_m": np.linspace(2e-5, 3e-5, MOST_POINTS).tolist(), "repeats": 1},
+        ),
         (
             "magnet-beam/response-controlled",
             {
@@ -82,7 +93,11 @@ def test_a_shipped_plan_is_not_too_long(name):
     ("name", "changes", "said"),
     [
         ("magnet-beam/backbone", {"record_periods": 1_000_000}, "record_periods: up to 2.2.e.08 samples of one record"),
-        ("magnet-beam/backbone", {"settle": {"longest_periods": 1e6}, "repeats": 700}, "settle.longest_periods: the plan may"),
+        (
+            "magnet-beam/backbone",
+            {"settle": {"longest_periods": 1e6}, "repeats": 700},
+            "settle.longest_periods: the plan may",
+        ),
         ("magnet-beam/backbone", {"ramp_periods": 1e5, "repeats": 700}, "ramp_periods: the plan may take .* days"),
         ("magnet-beam/multisine-1", {"periods": 100_000}, "^periods: up to .* samples of one record"),
     ],
