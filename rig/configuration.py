@@ -18,6 +18,7 @@ __all__ = ["Configured", "explain", "find_toml", "merged", "read_toml", "shipped
 LARGEST_TOML_BYTES = 1_000_000
 MOST_DOTS = 100  # between two commas of a line: keys with many parts take the parser a time that goes with their square
 MOST_FAULTS = 5  # that one line names
+FEW_NAMES = 10  # that one line lists
 
 
 class Configured(BaseModel):
@@ -47,8 +48,12 @@ def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:
         return path
     names = shipped_names(folder)
     if str(name_or_path) not in names:
+        allowed = ", ".join(names)
+        if len(names) > FEW_NAMES:
+            nearest = get_close_matches(str(name_or_path)[:100], names, n=3, cutoff=0.0)
+            allowed = f"one of those that `rig list` shows, such as {', '.join(nearest)},"
         raise ConfigurationError(
-            f"{what} = {shown(str(name_or_path))}: there is no such {what}; allowed is {', '.join(names)} or a .toml file"
+            f"{what} = {shown(str(name_or_path))}: there is no such {what}; allowed is {allowed} or a .toml file"
         )
     return folder / f"{name_or_path}.toml"
 
