@@ -31,6 +31,7 @@ OTHER_TYPES: tuple[Any, ...] = (
     [1, "a", {}],
     [1.0, 2.0, 3.0],
 )
+MOST_CHARACTERS = 1_500_000
 HUGE_LENGTHS = (101, 9_000, 20_000, 60_000)
 
 
@@ -101,10 +102,9 @@ def list_huge(table: Table, random: Random) -> None:
 
     def huge(old: Any) -> Any:
         item = old[0] if isinstance(old, list) and old else old
-        if isinstance(item, dict):
-            return [deepcopy(item) for _ in range(min(length, 2_000))]
         if isinstance(item, bool) or not isinstance(item, int | float):
-            return [item] * min(length, 9_000)
+            few = min(length, 9_000, max(2, MOST_CHARACTERS // len(repr(item))))  # it may be huge already
+            return [deepcopy(item) for _ in range(few)]
         return [item if same else item * (1.0 + n / length) for n in range(length)]
 
     lists = list(_places(table, list))
