@@ -193,13 +193,14 @@ def doctor(
     """What this machine can promise: clock, privileges, disk, drivers; with --daq, what a bench's device answers."""
     from rig.bench import load_bench
     from rig.console import print_json
+    from rig.printable import printable_strings
     from rig.realtime import examine, examine_bench
 
     facts = examine(Path.cwd()) if daq is None else examine_bench(load_bench(daq))
     if json:
         print_json(facts)
     else:
-        for name, value in facts.items():
+        for name, value in printable_strings(facts).items():
             text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
             text = "; ".join(value) or "none" if isinstance(value, list) else text
             print(f"{name.replace('_', ' '):22} {text}")
@@ -238,7 +239,9 @@ def main() -> None:
 
 
 def _complain(line: str, status: int) -> int:
-    print(f"rig: {' '.join(line.split())}", file=sys.stderr)
+    from rig.printable import one_line
+
+    print(f"rig: {one_line(line)}", file=sys.stderr)
     return status
 
 
@@ -247,7 +250,7 @@ def _one_line(error: Exception) -> str:
     from identification.errors import IdentificationError
     from rig.errors import RigError
 
-    text = " ".join(str(error).split())
+    text = str(error)
     if isinstance(error, RigError | IdentificationError):
         return text
     if isinstance(error, OSError) and error.filename is not None:

@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rig.printable import printable
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -40,8 +42,9 @@ def number(value: float | None, pattern: str, scale: float = 1.0) -> str:
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table of right-aligned columns."""
-    widths = [max(len(row[column]) for row in [headings, *rows]) for column in range(len(headings))]
-    for row in [headings, *rows]:
+    lines = [[printable(cell) for cell in row] for row in [headings, *rows]]
+    widths = [max(len(row[column]) for row in lines) for column in range(len(headings))]
+    for row in lines:
         print("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
 
@@ -103,7 +106,7 @@ class RunProgress:
     def _print(self, line: str) -> None:
         self.close()
         with contextlib.suppress(OSError):
-            print(line, file=sys.stderr, flush=True)
+            print(printable(line), file=sys.stderr, flush=True)
 
 
 class FitLines:

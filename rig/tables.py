@@ -10,12 +10,15 @@ from rig.check.report import say
 from rig.console import number, print_table
 from rig.loop_table import print_loop
 from rig.models.files import KINDS
+from rig.printable import printable, printable_strings
 
 __all__ = ["print_summary", "say_how_it_ended"]
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     """How a run ended, what it made, how fast it was, and what was counted on the way."""
+    summary = printable_strings(summary)
+    path = Path(printable(str(path)))
     loop = summary["loop"]
     accepted = sum(point["accepted"] for point in summary["points"])
     factor = loop["realtime_factor"]
@@ -41,7 +44,8 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 
 
 def print_summary(summary: dict[str, Any]) -> None:
-    """What `rig.summary.summarise` found in a file."""
+    """What `rig.summary.summarise` found in a file, whoever has written it."""
+    summary = printable_strings(summary)
     if summary["kind"] == "check":
         say(summary)
         return

@@ -13,6 +13,7 @@ from rig.campaigns.arming import Arm, armed
 from rig.campaigns.bench_memory import RememberedTrip, now, remember
 from rig.campaigns.continuation import what_is_left
 from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
+from rig.campaigns.lengths import check_length
 from rig.campaigns.output import forget_before, make_way, put_back, set_aside
 from rig.campaigns.plan import Plan
 from rig.campaigns.trips import refuse_tripped
@@ -53,6 +54,7 @@ def carry_out(
     (`rig.campaigns.arming`), else `rig.errors.NotArmed`; ``about`` is recorded with the part.
     """
     plan.check(bench)
+    check_length(plan, bench)
     progress = progress or Silent()
     _put_back(output, progress)
     make_way(output, overwrite)
