@@ -12,7 +12,7 @@ import pytest
 
 import rig.worker.loop
 import rig.worker.session
-from rig.errors import DaqError
+from rig.errors import DaqError, RecordingError
 from rig.safety.layout import GuardMode
 from rig.worker.loop import WallClockLoop
 from rig.worker.memory import PUBLISHED, Layout, SharedMemory, anonymous_file, packed
@@ -22,7 +22,7 @@ from rig.worker.spawn import Worker
 from tests.rig.worker.drivers import NotingDAQ
 from tests.rig.worker.rigs import slow_bench, tone
 from tests.rig.worker.test_worker import ROOT, is_there, ramped, ran
-from tests.waiting import LONG_S
+from tests.waiting import LONG_S, wait_until
 
 
 def loop_here(bench, settings, asked=lambda: ""):
@@ -110,6 +110,15 @@ from tests.rig.worker.rigs import slow_bench
 print("imported", flush=True)
 rig.run("magnet-beam/backbone", bench=slow_bench(log=sys.argv[1]), output=sys.argv[2])
 """
+
+
+def _rows_in(output):
+    """Rows that the campaign has taken from the loop and written."""
+    try:
+        with rig.Recording(output) as recording:
+            return recording.n_rows
+    except RecordingError:
+        return 0
 
 
 def _text_of_a_run_that_got_sigterm(folder, noting):

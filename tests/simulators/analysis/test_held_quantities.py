@@ -57,8 +57,9 @@ def test_holding_the_rms_takes_the_unstable_branch_of_a_quarter_newton_away() ->
 @pytest.mark.parametrize("specimen", [MAGNET, FRICTION])
 def test_what_holds_one_quantity_meets_the_others(specimen: str) -> None:
     rig = VirtualRig.shipped(specimen)
-    truth = constant_force_response(rig, {MAGNET: 0.55, FRICTION: 5.0}[specimen], LAGS_DEG)
-    for k, lag in enumerate(LAGS_DEG):
+    lags_deg = LAGS_DEG[::2]
+    truth = constant_force_response(rig, {MAGNET: 0.55, FRICTION: 5.0}[specimen], lags_deg)
+    for k, lag in enumerate(lags_deg):
         amplitude, frequency = truth.amplitude_m[k], truth.frequency_hz[k]
         for found in (
             constant_displacement_response(rig, amplitude, [lag]),
