@@ -168,10 +168,10 @@ def test_what_is_no_journal_is_refused_and_left_alone(tmp_path, content, message
 
 
 def test_a_journal_of_a_later_schema_asks_for_an_update(tmp_path, monkeypatch):
-    monkeypatch.setattr("rig.recording.header.SCHEMA", 3)
+    monkeypatch.setattr("rig.recording.header.SCHEMA", 4)
     path = journal(tmp_path / "a.journal", 10)
     monkeypatch.undo()
-    with pytest.raises(RecordingError, match="written by schema 3, this version reads up to 2; update"):
+    with pytest.raises(RecordingError, match="written by schema 4, this version reads up to 3; update"):
         read_journal(path)
 
 

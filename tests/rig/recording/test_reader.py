@@ -77,7 +77,7 @@ def test_an_hdf5_file_of_another_program_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("schema", "message"),
-    [(3, "written by schema 3, this version reads up to 2; update"), ("x", "damaged: schema 'x'")],
+    [(4, "written by schema 4, this version reads up to 3; update"), ("x", "damaged: schema 'x'")],
 )
 def test_a_later_or_impossible_schema_is_refused(output, schema, message):
     with h5py.File(output, "r+") as file:
@@ -182,7 +182,7 @@ def test_arrays_and_attributes_come_back_as_they_were(tmp_path):
         np.testing.assert_array_equal(found[name], values)
         assert found[name].shape == values.shape
     with h5py.File(path) as file:
-        assert (file.attrs["format"], file.attrs["schema"]) == ("vibrolock", 2)
+        assert (file.attrs["format"], file.attrs["schema"]) == ("vibrolock", 3)
         assert file["arrays/force_n"][-1] == 0.56
 
 
