@@ -31,6 +31,7 @@ def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> Non
 def show_file(path: Path, json: bool) -> None:
     """Print what is in a file."""
     from rig.console import print_json
+    from rig.models.files import understood
     from rig.summary import summarise
     from rig.tables import print_summary
 
@@ -38,4 +39,5 @@ def show_file(path: Path, json: bool) -> None:
     if json:
         print_json(summary)
     else:
-        print_summary(summary)
+        with understood(path, summary["kind"]):
+            print_summary(summary)

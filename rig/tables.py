@@ -10,6 +10,7 @@ from rig.check.report import say
 from rig.console import number, print_table
 from rig.loop_table import print_loop
 from rig.models.files import KINDS
+from rig.recording.integrity import VERIFIED
 
 __all__ = ["print_summary", "say_how_it_ended"]
 
@@ -42,6 +43,8 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 
 def print_summary(summary: dict[str, Any]) -> None:
     """What `rig.summary.summarise` found in a file."""
+    if summary["integrity"] != VERIFIED:
+        print(summary["integrity"])
     if summary["kind"] == "check":
         say(summary)
         return
