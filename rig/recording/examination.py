@@ -81,9 +81,7 @@ def check_attributes(item: Any) -> None:
     for name in item.attrs:
         stored = item.attrs.get_id(name)
         if prod(stored.shape) * stored.dtype.itemsize > _LARGEST_ATTRIBUTE_BYTES:
-            raise RecordingError(
-                f"{item.name}: its attribute {name!r} is longer than {_LARGEST_ATTRIBUTE_BYTES} bytes"
-            )
+            raise RecordingError(f"{item.name}: its attribute {name!r} is longer than {_LARGEST_ATTRIBUTE_BYTES} bytes")
 
 
 def _check_storage(dataset: Any) -> None:

@@ -119,8 +119,8 @@ def kind_in(file: Any) -> str:
 def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]]]:
     """Write an HDF5 file that appears under ``path`` whole or not at all, in place of what was there before.
 
-    It is written as ``PATH.part`` in the same folder, given its digest, forced to the disk and renamed. ``kept`` ends the error's line.
-    Yields the open ``h5py.File`` and a function to call after each large write: it raises once the disk is full.
+    It is written as ``PATH.part`` in the same folder, given its digest, forced to the disk and renamed. ``kept`` ends the
+    error's line. Yields the open ``h5py.File`` and a function to call after each large write: it raises once the disk is full.
 
     Raises:
         RecordingError: it cannot be written; ``path`` is then as it was.

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, Self
 from rig.errors import RecordingError
 from rig.recording.contents import JournalContents
 from rig.recording.header import Header
-from rig.recording.journal import journal_path
 from rig.recording.integrity import VERIFIED
+from rig.recording.journal import journal_path
 from rig.recording.layout import file_integrity, open_unchecked
 from rig.recording.parts import Part
 from rig.recording.store import check_continuation

@@ -42,7 +42,9 @@ def digest_matches(path: Path) -> bool:
             return False
         stream.seek(start)
         magic, version, digest, covered = _TRAILER.unpack(stream.read(_TRAILER.size))
-        if magic != _MAGIC and covered != start:  # either is enough, so that a changed byte in one does not hide the other
+        if (
+            magic != _MAGIC and covered != start
+        ):  # either is enough, so that a changed byte in one does not hide the other
             return False
         if (magic, version, covered) == (_MAGIC, _VERSION, start) and _digest(stream, covered) == digest:
             return True

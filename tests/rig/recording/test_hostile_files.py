@@ -144,7 +144,7 @@ def test_more_rows_than_are_stored_are_refused(tmp_path):
             shape, dtype = (20_000_000_000, *values.shape[1:]), values.dtype
             del part["rows"][name]
             part["rows"].create_dataset(name, shape, dtype, chunks=(1000, *shape[1:]))
-    with pytest.raises(RecordingError, match="/parts/0/rows/.* declares 20000000 chunks and stores 0"):
+    with pytest.raises(RecordingError, match=r"/parts/0/rows/.* declares 20000000 chunks and stores 0"):
         Recording(sealed(path))
 
 
