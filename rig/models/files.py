@@ -1,9 +1,12 @@
 """Models, predictions and imported measurements in files: written whole, read back as what they were."""
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from numpy.exceptions import ComplexWarning
 
 from identification import LinearModes, ModalAnalysis, PnlssFit, PnlssModel
 from rig.errors import RecordingError
@@ -36,6 +39,8 @@ _ALL = (
 KINDS = {kind.name: kind for kind in _ALL}
 """Every kind of file that is no recording, by its name in the file."""
 
+_MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
+
 
 def save(thing: Any, path: Path) -> None:
     """Write a model, a prediction or an imported measurement, whole or not at all.
@@ -67,8 +72,10 @@ def load(path: Path) -> Any:
 def understood(path: Path, kind: str) -> Iterator[None]:
     """Turn what missing arrays, wrong shapes and wrong types in a file lead to into one `RecordingError` that names it."""
     try:
-        yield
-    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ComplexWarning)  # an imaginary part must not get lost
+            yield
+    except (*_MISFITS, ComplexWarning) as error:
         raise RecordingError(f"{path}: does not hold what makes a {kind} ({one_line(error)})") from error
 
 
