@@ -80,5 +80,7 @@ def test_text_in_the_place_of_numbers_is_refused_wherever_a_model_is_used(modes,
     save(modes, path)
     kind, arrays, attributes = read_arrays(path)
     write_arrays(path, kind, {**arrays, "modes/shapes": np.full((3, 3), "x")}, attributes)
-    with pytest.raises(RecordingError, match=r"wrong\.h5: does not hold what makes a linear-modes \(.*could not convert"):
+    with pytest.raises(
+        RecordingError, match=r"wrong\.h5: does not hold what makes a linear-modes \(.*could not convert"
+    ):
         use(path)
