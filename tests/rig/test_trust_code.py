@@ -10,7 +10,6 @@ import rig
 from rig.bench import load_bench
 from rig.bench_code import named_code
 from rig.campaigns.continuation import what_is_left
-
 from rig.cli import main
 from rig.errors import ConfigurationError
 from rig.recording.reader import Recording

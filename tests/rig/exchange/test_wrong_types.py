@@ -30,7 +30,7 @@ def stored(request, tmp_path):
 
 
 def variants(stored):
-    kind, arrays, attributes = stored
+    _kind, arrays, attributes = stored
     for name in arrays:
         yield {key: values for key, values in arrays.items() if key != name}, attributes
         for wrong in WRONG_ARRAYS.values():
@@ -69,7 +69,7 @@ def test_whatever_is_wrong_in_a_model_showing_it_works_or_says_so_in_one_line(st
             except RecordingError as error:
                 refused += 1
                 line = str(error)
-                assert line.startswith(f"{path}: does not hold what makes a {stored[0]} (")  # noqa: PT017
+                assert line.startswith(f"{path}: does not hold what makes a {stored[0]} (")
                 assert "\n" not in line
     assert refused > 10
 
