@@ -11,10 +11,10 @@ from rig.recording.contents import JournalContents
 from rig.recording.header import Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.journal import journal_path
-from rig.recording.layout import file_integrity, open_unchecked
+from rig.recording.layout import open_file
 from rig.recording.parts import Part
 from rig.recording.store import check_continuation
-from rig.recording.stored import read_recording
+from rig.recording.stored import read_recording, recording_integrity
 
 __all__ = ["Part", "RecordedPlan", "Recording"]
 
@@ -50,8 +50,8 @@ class Recording:
 
     def _open(self, stack: ExitStack, journal: Path | None) -> tuple[Header, Sequence[Part]]:
         if journal is None or self.path.exists():
-            self.integrity = file_integrity(self.path)
-            file = stack.enter_context(open_unchecked(self.path))
+            file = stack.enter_context(open_file(self.path))
+            self.integrity = recording_integrity(file, self.path)
             header, stored = read_recording(file, self.path)
             if journal is None:
                 return header, stored

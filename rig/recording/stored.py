@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording.header import Column, Header
-from rig.recording.layout import identify, kind_in, reading
+from rig.recording.integrity import VERIFIED
+from rig.recording.layout import file_integrity, identify, kind_in, reading
 from rig.recording.parts import Part, rows_at_once
 from rig.recording.tables import StoredTexts, write_object, write_table
 
-__all__ = ["StoredPart", "read_recording", "write_recording"]
+__all__ = ["StoredPart", "read_recording", "recording_integrity", "taken_over", "write_recording"]
+
+_TAKEN_OVER = "taken over from an unverified file"
 
 
 class StoredPart(Part):
@@ -50,9 +53,27 @@ class StoredPart(Part):
             return values
 
 
-def write_recording(file: Any, header: Header, parts: Iterable[Part], check: Callable[[], None]) -> None:
+def recording_integrity(file: Any, path: Path) -> str:
+    """Integrity of an open recording; one that took parts over from an unverified file is unverified for good."""
+    found = file_integrity(path)
+    return f"unverified: {file.attrs['unverified']}" if found == VERIFIED and "unverified" in file.attrs else found
+
+
+def taken_over(integrity: str, n_parts: int) -> str:
+    """What a file says of its integrity that takes over the first parts of a file of that ``integrity``; empty if verified."""
+    if integrity == VERIFIED or n_parts == 0:
+        return ""
+    told = integrity.removeprefix("unverified: ")
+    return told if told.startswith(_TAKEN_OVER) else f"{_TAKEN_OVER}: parts 0 to {n_parts - 1}: {told}"
+
+
+def write_recording(
+    file: Any, header: Header, parts: Iterable[Part], check: Callable[[], None], unverified: str = ""
+) -> None:
     """Write a whole recording into an open new file; ``check`` raises once the disk is full."""
     identify(file, header.kind)
+    if unverified:
+        file.attrs["unverified"] = unverified
     for name in ("software_version", "started", "identity"):
         file.attrs[name] = getattr(header, name)
     if header.seed is not None:

@@ -15,10 +15,10 @@ from rig.recording.arrays import read_arrays, write_arrays
 from rig.recording.journal import journal_path
 from rig.recording.layout import file_integrity
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
+from rig.recording.store import continue_recording, finalise
 from rig.summary import summarise
 from rig.tables import print_summary
-from tests.rig.recording.samples import journal, without_digest
+from tests.rig.recording.samples import fill, journal, without_digest
 
 GONE = "unverified: its digest is gone; another program has changed or rewritten it, or cut off its end"
 
@@ -141,6 +141,18 @@ def test_show_says_of_an_unverified_model_that_it_is(tmp_path, capsys, shown_mod
     assert summary["integrity"] == GONE
     print_summary(summary)
     assert GONE in capsys.readouterr().out.splitlines()
+
+
+def test_parts_taken_over_from_an_unverified_file_stay_unverified(output):
+    without_digest(output)
+    for _ in range(2):
+        with continue_recording(output) as writer:
+            fill(writer, 3000, 100)
+        finalise(journal_path(output), output)
+        assert file_integrity(output) == "verified"
+        told = f"unverified: taken over from an unverified file: parts 0 to 0: {GONE.removeprefix('unverified: ')}"
+        with Recording(output) as recording:
+            assert recording.integrity == told
 
 
 @pytest.fixture
