@@ -40,7 +40,7 @@ def summarise(path: Path) -> dict[str, Any]:
         found = load(path)
         with understood(path, kind):
             return {"kind": kind, "integrity": file_integrity(path), **KINDS[kind].summarise(found)}
-    with Recording(path) as recording:
+    with Recording(path) as recording, understood(path, f"recording of kind {kind}"):
         if is_check(recording):
             return {**summary(assess(recording)), "integrity": recording.integrity}
         return summarise_recording(recording)

@@ -155,6 +155,13 @@ def test_parts_taken_over_from_an_unverified_file_stay_unverified(output):
             assert recording.integrity == told
 
 
+def test_a_recording_whose_json_lacks_what_is_shown_is_refused_in_one_line(tmp_path):
+    output = tmp_path / "OUT.h5"
+    journal(journal_path(output), 100, configuration={"plan": {}})
+    with pytest.raises(RecordingError, match=r"OUT\.h5: does not hold what makes a recording of kind backbone \("):
+        summarise(output)
+
+
 @pytest.fixture
 def shown_model(tmp_path):
     from identification import FrequencyResponse
