@@ -15,7 +15,7 @@ from rig.cli_emulate import emulate
 from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
-from rig.cli_options import Json, Output, Overwrite, Realtime, show_file
+from rig.cli_options import Json, Output, Overwrite, Realtime, say_what_is_imported, show_file
 from rig.cli_reproduce import reproduce_
 from rig.cli_tune import tune_
 
@@ -102,6 +102,9 @@ def resume(
     retry_tripped: Annotated[
         bool, typer.Option("--retry-tripped", help="Try a level at which the run tripped again.")
     ] = False,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Import the functions that the recording's bench names.")
+    ] = False,
     realtime: Realtime = False,
     arm: ArmNow = False,
     operator: Operator = None,
@@ -129,6 +132,7 @@ def resume(
             specimen_serial=specimen_serial,
             notes=note or (),
             retry_tripped=retry_tripped,
+            trust_code=trust_code,
         ),
     )
 
@@ -212,6 +216,7 @@ def main() -> None:
     """Entry point of the command: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if stopped elsewhere."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
+    say_what_is_imported()
     try:
         status = app(arguments, prog_name="rig", standalone_mode=False)
         if status == STOPPED:  # typer makes a status of Ctrl-C without a word

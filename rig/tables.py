@@ -11,6 +11,7 @@ from rig.console import number, print_table
 from rig.loop_table import print_loop
 from rig.models.files import KINDS
 from rig.printable import printable, printable_strings
+from rig.recording.integrity import VERIFIED
 
 __all__ = ["print_summary", "say_how_it_ended"]
 
@@ -46,6 +47,8 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 def print_summary(summary: dict[str, Any]) -> None:
     """What `rig.summary.summarise` found in a file, whoever has written it."""
     summary = printable_strings(summary)
+    if summary["integrity"] != VERIFIED:
+        print(summary["integrity"])
     if summary["kind"] == "check":
         say(summary)
         return

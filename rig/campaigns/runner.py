@@ -8,6 +8,7 @@ from typing import Any
 
 import vibrolock
 from rig.bench import Bench
+from rig.bench_code import imported_code, refuse_code
 from rig.campaigns.about import About, calibration_remarks
 from rig.campaigns.arming import Arm, armed
 from rig.campaigns.bench_memory import RememberedTrip, now, remember
@@ -93,6 +94,7 @@ def take_up(
     arm: Arm = None,
     about: About | None = None,
     retry_tripped: bool = False,
+    trust_code: bool = False,
 ) -> Recording:
     """Finish a run that was interrupted: finished points stay, the others are measured in a further part of the file.
 
@@ -101,7 +103,8 @@ def take_up(
     part. A recording that is complete and asked for nothing new is returned as it is.
 
     Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before, or that asks for a level
-    that tripped or a higher one, unless ``retry_tripped``.
+    that tripped or a higher one, unless ``retry_tripped``, or for a bench with functions of the user's own, unless
+    ``trust_code``: whoever wrote the recording has named the module that is imported.
     """
     progress = progress or Silent()
     _put_back(output, progress)
@@ -121,6 +124,8 @@ def take_up(
             refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench
     segments = plan.segments(bench.sample_rate_hz, left.done)
+    if segments and not trust_code:
+        refuse_code(bench, output.name)
     if segments:
         with open_session(bench, drawn, realtime=realtime) as session:
             facts = _facts(plan, bench, session, arm, about, progress)
@@ -167,6 +172,7 @@ def _facts(
         "armed": armed(bench, session, about.purpose or plan.kind, arm),
         "device": session.identity,
         "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
+        "code": imported_code(bench),
     }
     for remark in facts["remarks"]:
         progress.remark(remark)

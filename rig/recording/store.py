@@ -15,7 +15,7 @@ from rig.recording.journal import JournalWriter, journal_path, set_aside
 from rig.recording.layout import new_file, open_file
 from rig.recording.locking import exclusive
 from rig.recording.parts import Part
-from rig.recording.stored import read_recording, write_recording
+from rig.recording.stored import read_recording, recording_integrity, taken_over, write_recording
 
 __all__ = ["check_continuation", "continue_recording", "finalise"]
 
@@ -39,19 +39,21 @@ def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] 
     with exclusive(journal):
         with ExitStack() as stack:
             contents = stack.enter_context(JournalContents(journal))
-            header, parts = contents.header, list[Part](contents.parts)
+            header, parts, unverified = contents.header, list[Part](contents.parts), ""
             if output.exists():
                 old = stack.enter_context(open_file(output))
                 earlier, stored = read_recording(old, output)
                 check_continuation(header, earlier, output)
+                unverified = taken_over(recording_integrity(old, output), header.first_part)
                 parts = [*stored[: header.first_part], *parts]
-                header = replace(earlier, row_dtype=header.row_dtype, columns=header.columns)
+                if header.first_part:
+                    header = replace(earlier, row_dtype=header.row_dtype, columns=header.columns)
             else:
                 check_continuation(header, None, output)
             if not parts:
                 raise RecordingError(f"{journal}: nothing was recorded; remove it")
             with new_file(output, kept=f"the journal {journal} is kept") as (file, fits):
-                write_recording(file, header, parts, lambda: _each((fits, check)))
+                write_recording(file, header, parts, lambda: _each((fits, check)), unverified)
         if contents.damaged:
             return journal.rename(set_aside(journal))
         journal.unlink()

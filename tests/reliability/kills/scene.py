@@ -89,8 +89,8 @@ def set_up(killer: Killer) -> None:
     KINDS["backbone"] = replace(kind, measure=killer.before(kind.measure, "evaluation"))
     real = store.write_recording
 
-    def write_recording(file: Any, header: Any, parts: Any, check: Callable[[], None]) -> None:
-        real(file, header, parts, killer.after(check, "conversion"))
+    def write_recording(file: Any, header: Any, parts: Any, check: Callable[[], None], *rest: Any) -> None:
+        real(file, header, parts, killer.after(check, "conversion"), *rest)
 
     store.write_recording = write_recording
     runner.forget_before = killer.before(forget_before, "file in place")

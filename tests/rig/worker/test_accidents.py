@@ -22,7 +22,7 @@ from rig.worker.spawn import Worker
 from tests.rig.worker.drivers import NotingDAQ
 from tests.rig.worker.rigs import slow_bench, tone
 from tests.rig.worker.test_worker import ROOT, is_there, ramped, ran
-from tests.waiting import LONG_S, wait_until
+from tests.waiting import LONG_S
 
 
 def loop_here(bench, settings, asked=lambda: ""):
