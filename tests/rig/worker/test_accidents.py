@@ -22,7 +22,7 @@ from rig.worker.spawn import Worker
 from tests.rig.worker.drivers import NotingDAQ
 from tests.rig.worker.rigs import slow_bench, tone
 from tests.rig.worker.test_worker import ROOT, is_there, ramped, ran
-from tests.waiting import LONG_S
+from tests.waiting import LONG_S, wait_until
 
 
 def loop_here(bench, settings, asked=lambda: ""):
@@ -126,8 +126,7 @@ def _text_of_a_run_that_got_sigterm(folder, noting):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(noting), str(ROOT), *filter(None, sys.path)])}
     command = [sys.executable, "-c", CAMPAIGN, str(log), str(output)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as campaign:
-        while campaign.poll() is None and (not log.exists() or log.stat().st_size < 8 * 1000):
-            time.sleep(0.02)
+        wait_until(lambda: campaign.poll() is not None or _rows_in(output) > 1000, "rows of a run")
         campaign.send_signal(signal.SIGTERM)
         assert campaign.wait(LONG_S) == 0
     with rig.Recording(output) as recording:
