@@ -20,7 +20,7 @@ Cell = tuple[str, str, str]
 def table(found: dict[Cell, Counts]) -> list[str]:
     """Bytes, frames and runs by wire, end and mode, and what was wrong."""
     lines = [
-        "| wire | at the end of the | frames | bytes | number | runs | carried out | ended by an error | rows wrong | else wrong | memory, MB |",
+        "| wire | end | frames | bytes | number | runs | carried out | by an error | rows wrong | else wrong | memory, MB |",
         "|" + "---|" * 11,
     ]
     for (wire, end, mode), one in found.items():
