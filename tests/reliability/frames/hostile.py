@@ -111,7 +111,7 @@ class HostileDAQ(MemoryDAQ):
 
     def __init__(self, wire: str, end: str, mode: str, chance: random.Random, counts: Counts) -> None:
         bench = bench_with()
-        # A device that waits for its outputs does the same whatever is lost: so rows can be compared with those of a sound line.
+        # A device that waits for its outputs does the same whatever is lost: its rows are those of a sound line.
         super().__init__(bench, SEED, WireOptions(queue_blocks=QUEUE), lockstep=mode == "damaged")
         self._link_of = lambda: _Link(self.wire, end, _Hostile(wire, end, mode, chance, counts, len(bench.channels)))
 
