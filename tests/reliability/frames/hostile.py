@@ -62,7 +62,7 @@ class _Hostile:
             if self.mode == "damaged":
                 out.append(self._told(self.line.damaged(data, self.chance), len(data)) if self._hit() else data)
                 continue
-            for _ in range(self.chance.choice((0, 0, 1, 5, 20))):
+            for _ in range(self.chance.choice((0, 0, 1, 10, 100))):
                 out.append(self._told(self.line.forged(self.chance.choice(self._seen), self.chance)))
             out.append(data)
         return out

@@ -84,7 +84,7 @@ class SerialLine:
         if kind == 2:
             return data[chance.randrange(len(data)) :]
         if kind == 3:
-            return chance.randbytes(chance.choice((3, 40, 40, 40, 4000))) + b"\0" + data
+            return chance.randbytes(chance.choice((3, 40, 400, 4000, 20_000))) + b"\0" + data
         return b""
 
     def forged(self, data: bytes, chance: random.Random) -> bytes:
