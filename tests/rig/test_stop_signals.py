@@ -20,7 +20,7 @@ PLAN = plan_with(levels_v=(0.4,))
 
 @pytest.fixture(autouse=True)
 def handlers_as_they_were():
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGABRT)}
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
