@@ -1,7 +1,7 @@
 """Points are worked out beside the loop, so that no length of record keeps its rows waiting."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
@@ -25,15 +25,17 @@ class Evaluations:
         """Put in a point that needs no evaluation, behind those asked for before."""
         self.ask(lambda: [point])
 
-    def ready(self) -> Iterator[dict[str, Any]]:
-        """The points that are worked out by now, each once; raises what an evaluation raised."""
-        while self._asked and self._asked[0].done():
-            yield from self._asked.popleft().result()
+    def __bool__(self) -> bool:
+        """Whether points are still to come."""
+        return bool(self._asked)
 
-    def rest(self) -> Iterator[dict[str, Any]]:
-        """All points that are left, waited for; raises what an evaluation raised."""
-        while self._asked:
-            yield from self._asked.popleft().result()
+    def ready(self) -> bool:
+        """Whether the next points are worked out."""
+        return bool(self._asked) and self._asked[0].done()
+
+    def take(self) -> Points:
+        """The next points, waited for; raises what their evaluation raised."""
+        return self._asked.popleft().result()
 
     def close(self) -> None:
         """End the thread once it has done what it is at."""

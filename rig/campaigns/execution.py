@@ -142,13 +142,17 @@ class Execution:
 
     def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
         """Do what is not the loop; where it fails, the rig is ramped down first and the failure raised at the end."""
-        if self.failure is not None:
-            return
+        if self.failure is None:
+            self._anyway(step, *arguments)
+
+    def _anyway(self, step: Callable[..., Any], *arguments: Any) -> Any:
+        """The same after a failure; returns what the step does, or None where it fails."""
         try:
-            step(*arguments)
+            return step(*arguments)
         except BaseException as error:  # whatever it is: a driven rig is brought down before anything is said
-            self.failure = error
+            self.failure = self.failure or error
             self.loop.request_stop()
+            return None
 
     def _write(self, method: Any, what: Any) -> None:
         """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""
@@ -198,8 +202,9 @@ class Execution:
                     self.evaluations.ask(self._measured, first, rows, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
-        for point in self.evaluations.ready():
-            self._report(point)
+        while self.evaluations.ready():
+            for point in self.evaluations.take():
+                self._report(point)
 
     def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[dict[str, Any]]:
         """The points that come out of rows which begin with sample ``first``."""
@@ -210,12 +215,10 @@ class Execution:
         return [{**point, "first_sample": first, "end_sample": first + rows.size} for point in points]
 
     def _report_rest(self) -> None:
-        """Wait for the points that are still being worked out, also after a failure elsewhere."""
-        try:
-            for point in self.evaluations.rest():
-                self._report(point)
-        except BaseException as error:
-            self.failure = self.failure or error
+        """Wait for the points that are still being worked out, also after a failure elsewhere or in one of them."""
+        while self.evaluations:
+            for point in self._anyway(self.evaluations.take) or ():
+                self._anyway(self._report, point)
 
     def _begin(self, segment: int) -> int:
         """First sample of the rows that a segment is evaluated with."""

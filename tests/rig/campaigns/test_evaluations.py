@@ -17,9 +17,10 @@ def test_points_come_in_the_order_in_which_they_were_asked_for_also_those_that_n
     evaluations = Evaluations()
     evaluations.ask(lambda: [{"number": 0}] if free.wait(30) else [])
     evaluations.known({"number": 1})
-    assert list(evaluations.ready()) == []
+    assert not evaluations.ready()
     free.set()
-    assert [point["number"] for point in evaluations.rest()] == [0, 1]
+    assert [evaluations.take(), evaluations.take()] == [[{"number": 0}], [{"number": 1}]]
+    assert not evaluations
     evaluations.close()
 
 
@@ -27,7 +28,7 @@ def test_what_an_evaluation_raises_is_raised_where_its_points_are_taken():
     evaluations = Evaluations()
     evaluations.ask(lambda: [][0])
     with pytest.raises(IndexError):
-        list(evaluations.rest())
+        evaluations.take()
     evaluations.close()
 
 
