@@ -170,13 +170,15 @@ def resume(
     specimen_serial: str = "",
     notes: Sequence[str] = (),
     retry_tripped: bool = False,
+    trust_code: bool = False,
 ) -> Run:
     """Go on with a recording: points that were accepted stay, the others are measured in a further part.
 
     A changed ``plan`` of the same kind and bench takes the place of the one in force. Points that it asks for and that were
     accepted by any plan before are not measured again; those that it does not ask for stay in the file and count no more.
     ``seed`` draws the noise of the further part; without it, one that no part had. ``arm`` to ``notes``: as for `run`.
-    A level that tripped, and any higher one, is not tried again unless ``retry_tripped``.
+    A level that tripped, and any higher one, is not tried again unless ``retry_tripped``. Functions of the user's own that
+    the bench in the recording names are code that whoever wrote it has chosen: they are imported with ``trust_code`` only.
 
     Raises `rig.errors.ConfigurationError` for a plan that cannot follow or asks for a level that tripped,
     `rig.errors.RecordingError` for a file that cannot be read or written.
@@ -196,5 +198,6 @@ def resume(
             arm=arm,
             about=About(operator, specimen_serial, tuple(notes)),
             retry_tripped=retry_tripped,
+            trust_code=trust_code,
         )
     )

@@ -10,6 +10,7 @@ from rig.bench_limits import refuse
 from rig.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
 from rig.daq import Channel
 from rig.errors import ConfigurationError
+from rig.printable import shown
 
 __all__ = [
     "Arming",
@@ -233,7 +234,7 @@ def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, An
     if base not in shipped_benches():
         allowed = ", ".join(shipped_benches())
         raise ConfigurationError(
-            f"{name_or_path}: base = {base!r}: allowed is {allowed}, or a .toml file beside this one"
+            f"{name_or_path}: base = {shown(base)}: allowed is {allowed}, or a .toml file beside this one"
         )
     return _changed(_with_base(base, over), table)
 

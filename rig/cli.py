@@ -15,7 +15,7 @@ from rig.cli_emulate import emulate
 from rig.cli_exchange import export_, import_
 from rig.cli_identify import identify, predict
 from rig.cli_list import list_
-from rig.cli_options import Json, Output, Overwrite, Realtime, show_file
+from rig.cli_options import Json, Output, Overwrite, Realtime, say_what_is_imported, show_file
 from rig.cli_reproduce import reproduce_
 from rig.cli_tune import tune_
 
@@ -102,6 +102,9 @@ def resume(
     retry_tripped: Annotated[
         bool, typer.Option("--retry-tripped", help="Try a level at which the run tripped again.")
     ] = False,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Import the functions that the recording's bench names.")
+    ] = False,
     realtime: Realtime = False,
     arm: ArmNow = False,
     operator: Operator = None,
@@ -129,21 +132,30 @@ def resume(
             specimen_serial=specimen_serial,
             notes=note or (),
             retry_tripped=retry_tripped,
+            trust_code=trust_code,
         ),
     )
 
 
 def _carry(json: bool, kind: str, start: Any) -> None:
+    from rig.api import Run
     from rig.campaigns.kinds import KINDS
     from rig.console import RunProgress, print_json
+    from rig.recording.reader import Recording
+    from rig.stop_signals import Interrupted, Terminated, ignore_from_now_on
     from rig.summary import summarise_recording
     from rig.tables import say_how_it_ended
 
     progress = RunProgress(KINDS[kind].columns)
     try:
         result = start(progress)
+    except (Interrupted, Terminated) as signal:  # one that came when all was done
+        if signal.recorded is None:
+            raise
+        result = Run(Recording(signal.recorded))
     finally:
         progress.close()
+    ignore_from_now_on()
     with result:
         summary = summarise_recording(result.recording)
         complete, path = result.complete, result.recording.path
@@ -185,13 +197,14 @@ def doctor(
     """What this machine can promise: clock, privileges, disk, drivers; with --daq, what a bench's device answers."""
     from rig.bench import load_bench
     from rig.console import print_json
+    from rig.printable import printable_strings
     from rig.realtime import examine, examine_bench
 
     facts = examine(Path.cwd()) if daq is None else examine_bench(load_bench(daq))
     if json:
         print_json(facts)
     else:
-        for name, value in facts.items():
+        for name, value in printable_strings(facts).items():
             text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
             text = "; ".join(value) or "none" if isinstance(value, list) else text
             print(f"{name.replace('_', ' '):22} {text}")
@@ -203,12 +216,17 @@ def main() -> None:
     """Entry point of the command: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if stopped elsewhere."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
+    say_what_is_imported()
     try:
         status = app(arguments, prog_name="rig", standalone_mode=False)
         if status == STOPPED:  # typer makes a status of Ctrl-C without a word
             _complain("interrupted", STOPPED)
     except (KeyboardInterrupt, typer.Abort):
         status = _complain("interrupted", STOPPED)
+    except SystemExit as error:
+        if (name := getattr(error, "signal", None)) is None:
+            raise
+        status = _complain(f"ended by {name}", int(error.code or 0))
     except BrokenPipeError:  # whoever read our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
@@ -226,7 +244,9 @@ def main() -> None:
 
 
 def _complain(line: str, status: int) -> int:
-    print(f"rig: {' '.join(line.split())}", file=sys.stderr)
+    from rig.printable import one_line
+
+    print(f"rig: {one_line(line)}", file=sys.stderr)
     return status
 
 
@@ -235,7 +255,9 @@ def _one_line(error: Exception) -> str:
     from identification.errors import IdentificationError
     from rig.errors import RigError
 
-    text = " ".join(str(error).split())
+    text = str(error)
     if isinstance(error, RigError | IdentificationError):
         return text
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{os.fsdecode(error.filename)}: cannot be used ({error.strerror})"
     return f"unexpected {type(error).__name__}: {text} (run again with --debug for the details)"

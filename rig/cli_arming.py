@@ -34,7 +34,14 @@ def arm_from(arm: bool) -> "Arm":
 
 def ask(request: "ArmingRequest") -> bool:
     """Show what is to move, and whether the bench's name was typed."""
+    from rig.printable import printable
+
     for line in request.lines():
-        print(line, file=sys.stderr)
-    print(f"{request.what} will move this rig. Type the bench's name to arm it: ", end="", file=sys.stderr, flush=True)
+        print(printable(line), file=sys.stderr)
+    print(
+        f"{printable(request.what)} will move this rig. Type the bench's name to arm it: ",
+        end="",
+        file=sys.stderr,
+        flush=True,
+    )
     return sys.stdin.readline().strip() == request.bench.name

@@ -45,6 +45,7 @@ def export_(
     from rig.console import print_json
     from rig.exchange.export import export_file
     from rig.exchange.reading import format_of
+    from rig.printable import printable_strings
 
     format_ = format_of(output, to, "--to")
     keep_existing([file], output, overwrite)
@@ -53,6 +54,6 @@ def export_(
         print_json({"file": str(output), "format": format_, "written": [one.summary() for one in written]})
         return
     for one in written:
-        told = one.summary()
+        told = printable_strings(one.summary())
         rows = f"{told['rows']} rows of " if told["rows"] else ""
         print(f"{told['kind']}: {told['title']}, {rows}{', '.join(told['arrays'])}")

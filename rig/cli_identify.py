@@ -102,6 +102,7 @@ def identify(
     from rig.models.identify import Request, identify_model
     from rig.models.pnlss import IdentifiedPnlss
     from rig.models.pnlss_request import PnlssOptions
+    from rig.stop_signals import insisting
 
     keep_existing([*files, *(validation or ())], output, overwrite or resume)
     request = Request(
@@ -128,11 +129,12 @@ def identify(
             resume=output if resume else None,
         ),
     )
-    lines = FitLines()
-    try:
-        found = identify_model(files, request, progress=lines)
-    finally:
-        lines.close()
+    with insisting() as signals:
+        lines = FitLines(signals.check)
+        try:
+            found = identify_model(files, request, progress=lines)
+        finally:
+            lines.close()
     save(found, output)
     show_file(output, json)
     if isinstance(found, IdentifiedPnlss) and found.fit is not None and found.fit.interrupted:

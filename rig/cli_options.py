@@ -1,17 +1,35 @@
 """Options that several commands share."""
 
+import contextlib
+import logging
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-__all__ = ["Json", "Output", "Overwrite", "Realtime", "keep_existing", "show_file"]
+__all__ = ["Json", "Output", "Overwrite", "Realtime", "keep_existing", "say_what_is_imported", "show_file"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
+
+
+class _Notes(logging.Handler):
+    """Prints a line of the log as a note."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(OSError):  # whoever read this has gone
+            print(f"note: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
+def say_what_is_imported() -> None:
+    """Print a note for each function of the user's own that a bench names, with the file that it comes from."""
+    log = logging.getLogger("simulators.sites.functions")
+    log.setLevel(logging.INFO)
+    log.handlers = [_Notes()]
 
 
 def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> None:
@@ -31,6 +49,7 @@ def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> Non
 def show_file(path: Path, json: bool) -> None:
     """Print what is in a file."""
     from rig.console import print_json
+    from rig.models.files import understood
     from rig.summary import summarise
     from rig.tables import print_summary
 
@@ -38,4 +57,5 @@ def show_file(path: Path, json: bool) -> None:
     if json:
         print_json(summary)
     else:
-        print_summary(summary)
+        with understood(path, summary["kind"]):
+            print_summary(summary)

@@ -44,6 +44,7 @@ def tune_(
     from rig.errors import ConfigurationError
     from rig.exchange.whole_file import whole_file
     from rig.figures.tuning import check_figure, draw_tuning
+    from rig.printable import printable_strings
     from rig.tuning.report import lines, summary
     from rig.tuning.tuning import tune
 
@@ -84,7 +85,7 @@ def tune_(
     if json:
         print_json(facts)
         return
-    for line in lines(facts):
+    for line in lines(printable_strings(facts)):
         print(line)
     print(f"plan written to {output}, multisine recorded in {recorded}" + (f", figure in {figure}" if figure else ""))
 

@@ -9,8 +9,16 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from rig.errors import ConfigurationError
+from rig.printable import shown
+from rig.text_files import read_text
+from rig.vetting import objection_to
 
 __all__ = ["Configured", "explain", "find_toml", "merged", "read_toml", "shipped_names", "validated"]
+
+LARGEST_TOML_BYTES = 1_000_000
+MOST_DOTS = 100  # between two commas of a line: keys with many parts take the parser a time that goes with their square
+MOST_FAULTS = 5  # that one line names
+FEW_NAMES = 10  # that one line lists
 
 
 class Configured(BaseModel):
@@ -40,8 +48,12 @@ def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:
         return path
     names = shipped_names(folder)
     if str(name_or_path) not in names:
+        allowed = ", ".join(names)
+        if len(names) > FEW_NAMES:
+            nearest = get_close_matches(str(name_or_path)[:100], names, n=3, cutoff=0.0)
+            allowed = f"one of those that `rig list` shows, such as {', '.join(nearest)},"
         raise ConfigurationError(
-            f"{what} = {str(name_or_path)!r}: there is no such {what}; allowed is {', '.join(names)} or a .toml file"
+            f"{what} = {shown(str(name_or_path))}: there is no such {what}; allowed is {allowed} or a .toml file"
         )
     return folder / f"{name_or_path}.toml"
 
@@ -50,21 +62,33 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The table in a TOML file; `ConfigurationError` names the file and the line where it cannot be read."""
+    """The table in a TOML file of up to 1 MB.
+
+    Raises `ConfigurationError`, which names the file and the line or key, where it cannot be read or holds what no table may
+    hold (`rig.vetting`).
+    """
+    text = read_text(path, LARGEST_TOML_BYTES)
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > MOST_DOTS and any(part.count(".") > MOST_DOTS for part in line.split(",")):
+            raise ConfigurationError(f"{path}: line {number}: a key has more than {MOST_DOTS} parts, allowed are fewer")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise ConfigurationError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise ConfigurationError(f"{path}: is a folder, a TOML file is wanted") from None
-    except PermissionError:
-        raise ConfigurationError(f"{path}: may not be read (permission denied)") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise ConfigurationError(f"{path}: is nested too deeply for a TOML file of ours") from None
+    except ValueError as error:  # also a number of more digits than Python reads
         raise ConfigurationError(f"{path}: is not TOML: {error}") from None
+    _refuse_absurd(table, str(path))
+    return table
+
+
+def _refuse_absurd(table: Any, source: str) -> None:
+    if (fault := objection_to(table)) is not None:
+        raise ConfigurationError(f"{source}: {fault}")
 
 
 def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
     """A model from a table; every bad value is named with its path, itself and what is allowed."""
+    _refuse_absurd(table, source)
     try:
         if model.model_config.get("strict"):
             return model.model_validate(table)
@@ -72,13 +96,21 @@ def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
         return model.model_validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
         raise ConfigurationError(f"{source}: {explain(error, model)}") from None
+    except (ArithmeticError, MemoryError) as error:
+        why = f"{type(error).__name__}: {error}"
+        raise ConfigurationError(
+            f"{source}: cannot be computed with, a number is far too large or small ({why})"
+        ) from None
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """All faults of a validation error in one line."""
-    details = [dict(detail) for detail in error.errors(include_url=False)]
+    """The faults of a validation error in one line, a few of them where there are many."""
+    count = error.error_count()
+    details = [dict(detail) for detail in error.errors(include_url=False)[: 4 * MOST_FAULTS]]
     keys = _keys(model)
-    return "; ".join(_fault(detail, keys) for detail in details if not _follows(detail, details))
+    faults = [_fault(detail, keys) for detail in details if not _follows(detail, details)][:MOST_FAULTS]
+    more = [f"and {count - len(faults)} more"] if count > len(details) or len(faults) == MOST_FAULTS < count else []
+    return "; ".join(faults + more)
 
 
 def _follows(detail: dict[str, Any], details: list[dict[str, Any]]) -> bool:
@@ -92,11 +124,12 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
     for part in detail["loc"]:
         if isinstance(part, int):
             path += f"[{part}]"
-        elif part in keys or part == detail["loc"][-1]:  # else it is the kind of a part, which stands in no path
+        elif part in keys or (part == detail["loc"][-1] and detail["type"] != "value_error"):
+            # Else it is the kind of a part, which stands in no path.
             path += f".{part}" if path else str(part)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if detail["type"] == "extra_forbidden":
-        close = get_close_matches(str(detail["loc"][-1]), sorted(keys), n=1)
+        close = get_close_matches(str(detail["loc"][-1])[:100], sorted(keys), n=1)
         return f"{path}: unknown key" + (f", did you mean {close[0]}?" if close else "")
     if detail["type"] == "missing":
         return f"{path}: is missing"
@@ -108,11 +141,11 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
             detail["ctx"].get("expected_tags", "one of those listed"),
         )
         tag = detail["ctx"].get("tag")
-        return f"{path}.{of} = {tag!r}: allowed is {allowed}" if tag is not None else f"{path}.{of}: is missing"
+        return f"{path}.{of} = {shown(tag)}: allowed is {allowed}" if tag is not None else f"{path}.{of}: is missing"
     if detail["type"] in ("too_short", "too_long"):
         bound, count = ("least", "min_length") if detail["type"] == "too_short" else ("most", "max_length")
         message = f"at {bound} {detail['ctx'][count]} of them"
-    return f"{path} = {detail['input']!r}: allowed is {message}".replace("a valid tuple", "a list")
+    return f"{path} = {shown(detail['input'])}: allowed is {message}".replace("a valid tuple", "a list")
 
 
 def _keys(model: Any) -> set[str]:

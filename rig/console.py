@@ -3,8 +3,10 @@
 import contextlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+
+from rig.printable import printable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,8 +42,9 @@ def number(value: float | None, pattern: str, scale: float = 1.0) -> str:
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table of right-aligned columns."""
-    widths = [max(len(row[column]) for row in [headings, *rows]) for column in range(len(headings))]
-    for row in [headings, *rows]:
+    lines = [[printable(cell) for cell in row] for row in [headings, *rows]]
+    widths = [max(len(row[column]) for row in lines) for column in range(len(headings))]
+    for row in lines:
         print("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
 
@@ -103,15 +106,19 @@ class RunProgress:
     def _print(self, line: str) -> None:
         self.close()
         with contextlib.suppress(OSError):
-            print(line, file=sys.stderr, flush=True)
+            print(printable(line), file=sys.stderr, flush=True)
 
 
 class FitLines:
-    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration, or after ten seconds without one."""
+    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration, or after ten seconds without one.
+
+    ``check`` is called at every iteration and may raise, to end the fit.
+    """
 
     _EVERY, _LONGEST_S = 10, 10.0
 
-    def __init__(self) -> None:
+    def __init__(self, check: "Callable[[], None]" = lambda: None) -> None:
+        self._check = check
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._best = (float("inf"), 0)
         self._stage = ""
@@ -119,6 +126,7 @@ class FitLines:
 
     def __call__(self, at: "FitProgress") -> None:
         """Say where the fit is, and which iteration is the best so far."""
+        self._check()
         judged = at.training_error if at.validation_error != at.validation_error else at.validation_error
         if at.stage != self._stage:
             self._stage, self._best = at.stage, (float("inf"), 0)

@@ -1,5 +1,7 @@
 """The errors of the bench: a small tree, each with one clear line that says what happened, where, and what to do."""
 
+from rig.printable import one_line
+
 __all__ = [
     "ConfigurationError",
     "DaqBusy",
@@ -21,7 +23,13 @@ __all__ = [
 
 
 class RigError(Exception):
-    """Anything that the bench reports to its user; the command line prints it as one line."""
+    """Anything that the bench reports to its user; the command line prints it as one line.
+
+    Its text is that line: printable, and shortened in its middle where a file or a device has put much into it.
+    """
+
+    def __init__(self, *parts: object) -> None:
+        super().__init__(one_line(" ".join(str(part) for part in parts)))
 
 
 class ConfigurationError(RigError):

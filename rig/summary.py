@@ -10,8 +10,9 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.quality import what_was_skipped
 from rig.check.assessment import assess, is_check
 from rig.check.report import summary
-from rig.models.files import KINDS, load
+from rig.models.files import KINDS, load, understood
 from rig.recording.arrays import kind_of
+from rig.recording.layout import file_integrity
 from rig.recording.reader import Recording
 
 __all__ = ["summarise", "summarise_recording"]
@@ -36,9 +37,13 @@ def summarise(path: Path) -> dict[str, Any]:
     """What a recording, an imported measurement or a model holds; `RecordingError` where it is none of them."""
     kind = kind_of(path)
     if kind in KINDS:
-        return {"kind": kind, **KINDS[kind].summarise(load(path))}
-    with Recording(path) as recording:
-        return summary(assess(recording)) if is_check(recording) else summarise_recording(recording)
+        found = load(path)
+        with understood(path, kind):
+            return {"kind": kind, "integrity": file_integrity(path), **KINDS[kind].summarise(found)}
+    with Recording(path) as recording, understood(path, f"recording of kind {kind}"):
+        if is_check(recording):
+            return {**summary(assess(recording)), "integrity": recording.integrity}
+        return summarise_recording(recording)
 
 
 def summarise_recording(recording: Recording) -> dict[str, Any]:
@@ -49,6 +54,8 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
     parts = [
         {
             "rows": part.n_rows,
+            "bytes_lost": part.dropped_bytes,
+            "lost": part.dropped_reason or None,
             "ended": None if part.end is None else part.end["text"],
             "tripped": part.end is not None and part.end["tripped"],
             **{key: (part.end or {}).get(key) for key in ("tripped_at", "likely_cause", "what_to_do")},
@@ -62,6 +69,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
     ends = [part.end for part in recording.parts if part.end is not None]
     return {
         "kind": recording.kind,
+        "integrity": recording.integrity,
         "specimen": bench["specimen"]["name"],
         "bench": bench["name"],
         "started": recording.started,

@@ -10,12 +10,16 @@ from rig.check.report import say
 from rig.console import number, print_table
 from rig.loop_table import print_loop
 from rig.models.files import KINDS
+from rig.printable import printable, printable_strings
+from rig.recording.integrity import VERIFIED
 
 __all__ = ["print_summary", "say_how_it_ended"]
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     """How a run ended, what it made, how fast it was, and what was counted on the way."""
+    summary = printable_strings(summary)
+    path = Path(printable(str(path)))
     loop = summary["loop"]
     accepted = sum(point["accepted"] for point in summary["points"])
     factor = loop["realtime_factor"]
@@ -41,7 +45,10 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 
 
 def print_summary(summary: dict[str, Any]) -> None:
-    """What `rig.summary.summarise` found in a file."""
+    """What `rig.summary.summarise` found in a file, whoever has written it."""
+    summary = printable_strings(summary)
+    if summary["integrity"] != VERIFIED:
+        print(summary["integrity"])
     if summary["kind"] == "check":
         say(summary)
         return
@@ -68,6 +75,8 @@ def print_summary(summary: dict[str, Any]) -> None:
     for index, part in enumerate(summary["parts"]):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
         print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
+        if part["lost"]:
+            print(f"  not readable: {part['lost']}")
         _print_advice(part)
         _print_about(part["about"] or {})
         print_loop(part["loop"] or {}, part["counters"] or {})

@@ -38,15 +38,15 @@ class Exciter(Part):
     """Moving mass m_a."""
     suspension_stiffness_n_m: NotNegative
     """Suspension stiffness k_a."""
-    suspension_cubic_n_m3: NotNegative = 0.0
+    suspension_cubic_n_m3: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
     """Stiffening of the suspension k_a3."""
     suspension_damping_n_s_m: NotNegative
     """Suspension damping c_a."""
     force_factor_n_a: Positive
     """Force factor G at rest (N/A, the same as V s/m)."""
-    droop_per_m: float = 0.0
+    droop_per_m: Annotated[float, Field(ge=-1e4, le=1e4)] = 0.0
     """Slope b_1 of the force factor over the armature's position (1/m)."""
-    droop_per_m2: float = 0.0
+    droop_per_m2: Annotated[float, Field(ge=-1e8, le=1e8)] = 0.0
     """Curvature b_2 of it (1/m^2); negative where the coil leaves the gap on either side."""
     resistance_ohm: NotNegative
     """Resistance R of coil, cable and amplifier together."""

@@ -12,7 +12,7 @@ from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
 from simulators.plant.assembly import LinearPlant, assemble
-from simulators.plant.checks import check_elements, check_plant, check_step
+from simulators.plant.checks import check_elements, check_plant, check_step, computable
 from simulators.plant.compilation import at_rest, rig_arrays
 from simulators.scatter import Deviation, Scatter, deviated
 from simulators.sensing.filters import channel_delays, filter_delay
@@ -74,16 +74,20 @@ class VirtualRig(Part):
 
     @model_validator(mode="after")
     def _belongs_together(self) -> "VirtualRig":
-        self._check_points()
+        with computable("structure, friction"):
+            self._check_points()
         names = self.channel_names
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"sensors: two are named {twice[0]!r}, allowed is one of each name")
-        if not np.any(self.structure.shape(self.stinger.at)):
+        with computable("structure"):
+            moves = np.any(self.structure.shape(self.stinger.at))
+        if not moves:
             raise ValueError(f"stinger.at = {self.stinger.at!r}: allowed is a point that moves")
-        check_elements(self.elements, self.plant)
-        check_plant(self.plant)
-        self._check_joints()
-        check_step(self.elements, self.plant, self.converter.sample_rate_hz, self.converter.substeps)
+        with computable("structure, elements, friction, exciter, stinger"):
+            check_elements(self.elements, self.plant)
+            check_plant(self.plant)
+            self._check_joints()
+            check_step(self.elements, self.plant, self.converter.sample_rate_hz, self.converter.substeps)
         self._check_low_passes()
         return self
 

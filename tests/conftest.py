@@ -1,7 +1,9 @@
 """What all tests share."""
 
 import os
+import signal
 
+import pytest
 from hypothesis import settings
 
 # Shared machines and the first compilation of a kernel make any deadline a coin toss; speed is measured in benchmarks/.
@@ -10,3 +12,13 @@ settings.register_profile(
     "repeatable", deadline=None, print_blob=True, derandomize="HYPOTHESIS_SEARCH" not in os.environ
 )
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(autouse=True)
+def signals_as_they_were():
+    """A command that was run in this process ignores signals once it is done, as it does in its own."""
+    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)]
+    before = {number: signal.getsignal(number) for number in numbers}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)

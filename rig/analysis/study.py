@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.plain import plain
 from rig.analysis.subject import Subject
 from rig.errors import RecordingError
+from rig.printable import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,10 +75,10 @@ class Study(ABC):
     def say(self) -> None:
         """Print title, tables and notes."""
         bench = self.subject.bench
-        print(f"{bench.specimen.name} (bench {bench.name}): {self.title}")
+        print(printable(f"{bench.specimen.name} (bench {bench.name}): {self.title}"))
         self.print_tables()
         for note in (*self.subject.notes, *self.notes):
-            print(f"note: {note}")
+            print(printable(f"note: {note}"))
 
 
 def draw(study: Study, figure: Path) -> None:

@@ -42,6 +42,11 @@ class BackbonePlan(SettledPlan):
     """Largest standard error of the damping, relative, with which a point of the slow flow is accepted."""
 
     @property
+    def counts(self) -> dict[str, int]:
+        """Levels, ways and repeats."""
+        return {**super().counts, "direction": 2 if self.direction == "up-down" else 1}
+
+    @property
     def evaluates_approach(self) -> bool:
         """Whether the ramp is evaluated with the rest: by the slow flow."""
         return self.evaluation == "slow-flow"

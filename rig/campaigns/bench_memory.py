@@ -17,6 +17,7 @@ from typing import Any
 from rig.bench import Bench
 from rig.errors import RecordingError
 from rig.exchange.whole_file import whole_file
+from rig.text_files import read_text
 
 __all__ = [
     "BenchMemory",
@@ -28,6 +29,8 @@ __all__ = [
     "now",
     "remember",
 ]
+
+LARGEST_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,9 @@ def memory_of(bench: Bench) -> BenchMemory:
     """What is remembered; a file that cannot be read counts as a trip, for it may have held one."""
     path = memory_path(bench)
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        if not path.exists():
+            return BenchMemory()
+        table = json.loads(read_text(path, LARGEST_BYTES, RecordingError))
         check, trip = table["check"], table["trip"]
         for found in (check, trip):
             if found is not None:
@@ -102,9 +107,7 @@ def memory_of(bench: Bench) -> BenchMemory:
             None if check is None else RememberedCheck(**{**check, "failed": tuple(check["failed"])}),
             None if trip is None else RememberedTrip(**trip),
         )
-    except FileNotFoundError:
-        return BenchMemory()
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecordingError, RecursionError) as error:
         text = f"{path} cannot be read, it may have held a trip ({type(error).__name__}: {error})"
         return BenchMemory(trip=RememberedTrip(now(), text, ""))
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench import Bench
+from rig.campaigns.lengths import check_length
 from rig.campaigns.plan import Plan, Target
 from rig.campaigns.plans import bench_of, plan_from
 from rig.configuration import validated
@@ -142,6 +143,7 @@ def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: s
             )
     try:
         change.check(bench)
+        check_length(change, bench)
     except ConfigurationError as error:
         raise ConfigurationError(f"{head}{error}") from None
 

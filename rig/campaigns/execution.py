@@ -11,13 +11,13 @@ from rig.bench import Bench
 from rig.campaigns.advice import Before, Trip, advice_on
 from rig.campaigns.device_remarks import flag_names, with_device_remarks
 from rig.campaigns.evaluate import failed_point
+from rig.campaigns.evaluations import Evaluations
 from rig.campaigns.kept_rows import KeptRows
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
 from rig.campaigns.plausibility import with_plausibility
 from rig.campaigns.quality import what_was_skipped
 from rig.campaigns.rounds import round_at
-from rig.campaigns.stop_signals import stop_on_signals
 from rig.campaigns.trips import tripped_at
 from rig.errors import RecordingError
 from rig.loop import LoopStatistics, RunningLoop
@@ -25,6 +25,7 @@ from rig.recording.journal import JournalWriter
 from rig.safety.layout import TEXT, EndReason, GuardMode
 from rig.safety.limits import describe_end, end_reason_of
 from rig.sequencer.layout import Outcome, SegmentKind
+from rig.stop_signals import asking, held
 from rig.tick.tick import Tick
 
 __all__ = ["Execution", "Progress", "Silent", "nothing_left"]
@@ -99,6 +100,7 @@ class Execution:
         self.locked = any(point["accepted"] for point in before)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = KeptRows(loop.tick.row_dtype)
+        self.evaluations = Evaluations()
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
@@ -112,16 +114,20 @@ class Execution:
         for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
-        with stop_on_signals(self.loop.request_stop):
-            try:
-                for rows in self.loop.run():
-                    self._take(rows)
-            except BaseException as error:  # also what interrupted the loop: its end is recorded all the same
-                self.failure = self.failure or error
-                self.loop.bring_down()
-        self._attempt(self._mark_interrupted)
-        self._attempt(self._mark_unlocked)
-        self._write(self.journal.end, self._end())
+        with held():  # from the last sample to the end in the journal
+            with asking(self.loop.request_stop):
+                try:
+                    for rows in self.loop.run():
+                        self._take(rows)
+                except BaseException as error:  # also what interrupted the loop: its end is recorded all the same
+                    self.failure = self.failure or error
+                    self.loop.bring_down()
+            self._report_rest()
+            self._attempt(self._mark_interrupted)
+            self._report_rest()
+            self._attempt(self._mark_unlocked)
+            self.evaluations.close()
+            self._write(self.journal.end, self._end())
         if self.failure is not None:
             raise self.failure
         if self.write_error is not None:
@@ -136,13 +142,17 @@ class Execution:
 
     def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
         """Do what is not the loop; where it fails, the rig is ramped down first and the failure raised at the end."""
-        if self.failure is not None:
-            return
+        if self.failure is None:
+            self._anyway(step, *arguments)
+
+    def _anyway(self, step: Callable[..., Any], *arguments: Any) -> Any:
+        """The same after a failure; returns what the step does, or None where it fails."""
         try:
-            step(*arguments)
+            return step(*arguments)
         except BaseException as error:  # whatever it is: a driven rig is brought down before anything is said
-            self.failure = error
+            self.failure = self.failure or error
             self.loop.request_stop()
+            return None
 
     def _write(self, method: Any, what: Any) -> None:
         """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""
@@ -169,7 +179,7 @@ class Execution:
             self._write(self.journal.event, event)
 
     def _collect(self, rows: np.ndarray) -> None:
-        """Keep the rows of the point under way, and evaluate the points that are over."""
+        """Keep the rows of the point under way, and have the points evaluated that are over."""
         self.kept.add(self.tick.sample - rows.size, rows)
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
@@ -183,17 +193,32 @@ class Execution:
                 break
             number = int(segments[self.next_segment]["point"])
             if number >= 0 and code is not Outcome.SKIPPED:
+                target = self.targets[number]
                 if code is not Outcome.DONE:
-                    self._report(failed_point(self.plan, self.targets[number], entry, locked=self.locked))
+                    self.evaluations.known(failed_point(self.plan, target, entry, locked=self.locked))
                 elif kind in EVALUATED:
-                    first, end = self._begin(self.next_segment), int(entry["end_sample"])
-                    settling = outcomes[self.next_segment - 1]
-                    rows = self.kept.take(first, end)
-                    point = self.measure(self.bench, self.plan, self.targets[number], rows, settling)
-                    told = with_device_remarks(point, rows, self.loop.counters)
-                    self._report({**told, "first_sample": first, "end_sample": end})
+                    settling = outcomes[self.next_segment - 1].copy()
+                    rows = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
+                    self.evaluations.ask(self._measured, first, rows, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
+        while self.evaluations.ready():
+            for point in self.evaluations.take():
+                self._report(point)
+
+    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[dict[str, Any]]:
+        """The points that come out of rows which begin with sample ``first``."""
+        found = self.measure(self.bench, self.plan, target, rows, *told)
+        points = [
+            with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
+        ]
+        return [{**point, "first_sample": first, "end_sample": first + rows.size} for point in points]
+
+    def _report_rest(self) -> None:
+        """Wait for the points that are still being worked out, also after a failure elsewhere or in one of them."""
+        while self.evaluations:
+            for point in self._anyway(self.evaluations.take) or ():
+                self._anyway(self._report, point)
 
     def _begin(self, segment: int) -> int:
         """First sample of the rows that a segment is evaluated with."""
@@ -228,9 +253,7 @@ class Execution:
         rows = self.kept.take(first, first + passages[-1].end)
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
-        for point in self.measure(self.bench, self.plan, targets, rows, passages, ended):
-            told = with_device_remarks(point, rows, self.loop.counters)
-            self._report({**told, "first_sample": first, "end_sample": first + rows.size})
+        self.evaluations.ask(self._measured, first, rows, targets, passages, ended)
         self.next_segment = found.end_segment
         return True
 

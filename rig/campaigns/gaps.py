@@ -10,8 +10,8 @@ __all__ = ["bridged", "lost_rows", "lost_warnings", "rms_of"]
 
 
 def lost_rows(rows: np.ndarray) -> np.ndarray:
-    """bool[n]: rows whose inputs were lost and are NaN."""
-    return np.asarray((rows["flags"] & SAMPLE_LOST) != 0)
+    """bool[n]: rows whose inputs are NaN: lost on their way, or the whole row in a damaged journal."""
+    return np.asarray(((rows["flags"] & SAMPLE_LOST) != 0) | np.isnan(rows["theta_rad"]))
 
 
 def lost_warnings(rows: np.ndarray) -> list[str]:
@@ -26,6 +26,12 @@ def rms_of(rows: np.ndarray) -> list[float]:
     return [float(value) for value in inputs.std(axis=0)] if inputs.size else [math.nan] * rows["inputs"].shape[1]
 
 
+def _turns(theta_rad: np.ndarray) -> np.ndarray:
+    """Turns of the oscillator, straight over rows that a damaged journal has lost."""
+    known = np.flatnonzero(np.isfinite(theta_rad))
+    return np.asarray(np.interp(np.arange(theta_rad.size), known, np.unwrap(theta_rad[known]) / (2.0 * math.pi)))
+
+
 def bridged(rows: np.ndarray) -> np.ndarray:
     """float64[n, n_channels]: the inputs, gaps filled with the mean of the readings one period before and after.
 
@@ -37,7 +43,7 @@ def bridged(rows: np.ndarray) -> np.ndarray:
     lost = lost_rows(rows)
     if not lost.any() or lost.all():
         return inputs
-    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * math.pi)
+    turns = _turns(rows["theta_rad"].astype(float))
     there, at = turns[~lost], turns[lost]
     before, after = at - 1.0 >= there[0], at + 1.0 <= there[-1]
     for column in inputs.T:

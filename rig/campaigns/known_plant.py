@@ -30,6 +30,8 @@ from rig.errors import ConfigurationError
 
 __all__ = ["KnownPlant", "PlantFacts", "control_loop"]
 
+CLOSEST_DEG = 0.5  # lags that are checked on the plant: a few hundred at the most, each takes milliseconds
+
 
 class PlantFacts(Configured):
     """Exciter and structure near the mode, from voltage to force and acceleration, as ``rig tune`` has measured them.
@@ -103,7 +105,7 @@ class KnownPlant(Levels):
         """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels out of its reach."""
         if self.plant is None:
             return
-        plant = self.plant.model
+        plant, lags_deg = self.plant.model, _apart(lags_deg)
         try:
             # What a sign detector sees cannot be linearised.
             if law.detector != "sign":
@@ -127,6 +129,16 @@ class KnownPlant(Levels):
         return [
             control_loop(plant, law.model_copy(update={"phase_lag_deg": lag}), amplitude_law, shape) for lag in lags_deg
         ]
+
+
+def _apart(lags_deg: Sequence[float]) -> list[float]:
+    """The lags without those that lie so near to the one before that the loop is the same; the last is among them."""
+    *rising, last = sorted(lags_deg)
+    out: list[float] = []
+    for lag in rising:
+        if not out or lag - out[-1] >= CLOSEST_DEG:
+            out.append(lag)
+    return [*out, last]
 
 
 def _check_quickness(loops: Sequence[ControlLoop]) -> None:

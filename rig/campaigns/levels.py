@@ -58,6 +58,11 @@ class Levels(Configured):
         return self
 
     @property
+    def level_count(self) -> dict[str, int]:
+        """Number of levels by their key, of any key that is given."""
+        return {name: len(getattr(self, name)) for name in LEVELS if getattr(self, name) is not None}
+
+    @property
     def levels_key(self) -> str:
         """Name of the key that the levels were given by."""
         return next(name for name in LEVELS if getattr(self, name) is not None)

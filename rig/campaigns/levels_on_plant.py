@@ -16,8 +16,10 @@ MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known one: a joint's 
 def check_voltage(levels: Levels, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
     """Refuse levels that need more than the bench's voltage."""
     limit = bench.limits.voltage_v
+    # All is linear in the level: what a unit of it needs is found once, for there may be many levels and lags.
+    of_unit, lag = max((voltage_for(plant, 1.0, levels.level_unit, lag), lag) for lag in lags_deg)
     for index, level in enumerate(levels.levels):
-        volts, lag = max((voltage_for(plant, level, levels.level_unit, lag), lag) for lag in lags_deg)
+        volts = level * of_unit
         if volts > limit:
             raise ConfigurationError(
                 f"{levels.levels_key}[{index}] = {level:g} {levels.level_unit}: needs {volts:.3g} V{lags_text([lag])} on "
@@ -38,15 +40,18 @@ def check_motion(
     part = 1.0 if unit == "m" else most
     farthest = max(ratios, key=lambda name: ratios[name])
     where = f" at channel {farthest!r}"
+    found = []
+    for name, its_unit, ratio, at, times in (
+        ("force_n", "N", 1.0, "", 1.0),
+        ("displacement_m", "m", ratios[farthest], where, part),
+        ("acceleration_m_s2", "m/s^2", ratios[farthest], where, part),
+    ):
+        damped = plant.at(damping_ratio=min(times * plant.damping_ratio, 0.99))
+        of_unit, lag = max((ratio * motion_for(damped, 1.0, unit, lag)[name], lag) for lag in lags_deg)
+        found.append((name, its_unit, ratio, at, times, of_unit, lag))
     for index, level in enumerate(levels.levels):
-        for name, its_unit, ratio, at, times in (
-            ("force_n", "N", 1.0, "", 1.0),
-            ("displacement_m", "m", ratios[farthest], where, part),
-            ("acceleration_m_s2", "m/s^2", ratios[farthest], where, part),
-        ):
-            damped = plant.at(damping_ratio=min(times * plant.damping_ratio, 0.99))
-            least, lag = max((ratio * motion_for(damped, level, unit, lag)[name], lag) for lag in lags_deg)
-            limit = getattr(bench.limits, name)
+        for name, its_unit, ratio, at, times, of_unit, lag in found:
+            least, limit = level * of_unit, getattr(bench.limits, name)
             if least <= limit:
                 continue
             known = ratio * motion_for(plant, level, unit, lag)[name]

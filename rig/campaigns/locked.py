@@ -30,6 +30,11 @@ class LockedPlan(KnownPlant, Plan):
     """What follows when a point fails: what comes next, or a ramp-down and the end."""
 
     @property
+    def counts(self) -> dict[str, int]:
+        """Levels and repeats."""
+        return {**self.level_count, "repeats": self.repeats}
+
+    @property
     def law(self) -> PhaseLockedLoop:
         """The phase-locked loop."""
         return self.controller

@@ -56,10 +56,17 @@ class MultisinePlan(OpenLoopPlan):
 
     @model_validator(mode="after")
     def _each_level_once(self) -> Self:
+        before: set[float] = set()
         for index, level in enumerate(self.levels_rms_v):
-            if level in self.levels_rms_v[:index]:
+            if level in before:
                 raise ValueError(f"levels_rms_v[{index}] = {level:g}: allowed is each level once; see realisations")
+            before.add(level)
         return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels and realisations."""
+        return {"levels_rms_v": len(self.levels_rms_v), "realisations": self.realisations}
 
     def design(self, sample_rate_hz: float) -> MultisineDesign:
         """The multisine of unit RMS; `ConfigurationError` where it cannot be."""
@@ -104,11 +111,13 @@ class MultisinePlan(OpenLoopPlan):
         if self.silent_s and not done:  # a ramp from 0 V to 0 V: at a held level a quiet channel would count as stuck
             silent = Excitation(design.resolution_hz, waveform=0)
             out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.silent_s / design.period_s, excitation=silent))
+        # Of each realisation once: it takes a Fourier transform.
+        crest_factors = [design.crest_factor(self.phase_seed, index) for index in range(self.realisations)]
         for target in self.targets():
             if target.number in done:
                 continue
             index, number = target.realisation or 0, target.number
-            peak_v = target.level * design.crest_factor(self.phase_seed, index)
+            peak_v = target.level * crest_factors[index]
             played = Excitation(design.resolution_hz, waveform=index)
             out.append(Segment(SegmentKind.RAMP, number, peak_v, ramp, excitation=played))
             if self.transient_periods:

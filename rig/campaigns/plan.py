@@ -1,10 +1,11 @@
 """What every plan has: points to measure, the segments that measure them, and what it needs of bench and law."""
 
+import math
 from abc import abstractmethod
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import AliasChoices, Field
+from pydantic import AliasChoices, Field, model_validator
 
 from controller import AmplitudeLaw, Law, OpenLoop
 from controller.tuning import PlantModel
@@ -14,7 +15,10 @@ from rig.configuration import Configured
 from rig.errors import ConfigurationError
 from rig.sequencer.segments import Segment, SettleRule
 
-__all__ = ["Column", "OpenLoopPlan", "Plan", "Target", "TonePlan"]
+__all__ = ["MOST_POINTS", "Column", "OpenLoopPlan", "Plan", "Target", "TonePlan"]
+
+MOST_POINTS = 10_000
+"""Of a plan, repeats and both directions counted: at ten seconds a point more than a day. See `rig.campaigns.lengths`, too."""
 
 
 class Target(Configured):
@@ -64,6 +68,20 @@ class Plan(Configured):
     """What the plan is for."""
     bench: str = Field(min_length=1)
     """Name of a shipped bench or a TOML file."""
+
+    @property
+    @abstractmethod
+    def counts(self) -> dict[str, int]:
+        """How many of each the plan goes through, by its key, from nothing but the fields; their product is that of points."""
+
+    @model_validator(mode="after")
+    def _not_too_many_points(self) -> Self:
+        points = math.prod(self.counts.values())
+        if points > MOST_POINTS:
+            factors = " times ".join(f"{count} ({key})" for key, count in self.counts.items() if count > 1)
+            largest = max(self.counts, key=lambda key: self.counts[key])
+            raise ValueError(f"{largest}: {factors} are {points} points, allowed are up to {MOST_POINTS}")
+        return self
 
     @property
     def level_unit(self) -> str:
@@ -139,3 +157,8 @@ class OpenLoopPlan(Plan):
 
 class TonePlan(Levels, OpenLoopPlan):
     """Base of the plans that put out one frequency at a time; every level is gone through in turn."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels."""
+        return self.level_count

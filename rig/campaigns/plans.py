@@ -9,6 +9,7 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.plan import Plan
 from rig.configuration import find_toml, read_toml, shipped_names, validated
 from rig.errors import ConfigurationError
+from rig.printable import shown
 
 __all__ = ["bench_of", "load_plan", "plan_from", "shipped_plans"]
 
@@ -31,8 +32,8 @@ def load_plan(name_or_path: str | Path) -> Plan:
 def plan_from(table: dict[str, Any], source: str) -> Plan:
     """A plan of any kind from its table; `ConfigurationError` names what is wrong with it and the ``source``."""
     kind = table.get("kind")
-    if kind not in KINDS:
-        raise ConfigurationError(f"{source}: kind = {kind!r}: allowed is {', '.join(map(repr, KINDS))}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise ConfigurationError(f"{source}: kind = {shown(kind)}: allowed is {', '.join(map(repr, KINDS))}")
     return validated(KINDS[kind].plan, table, source)
 
 

@@ -57,6 +57,12 @@ class ResponseControlledPlan(SettledPlan):
         return self
 
     @property
+    def counts(self) -> dict[str, int]:
+        """Levels, lags, ways and repeats."""
+        ways = 2 if self.direction == "up-down" else 1
+        return {**super().counts, "phase_lags_deg": len(self.phase_lags_deg), "direction": ways}
+
+    @property
     def asked_lags_deg(self) -> tuple[float, ...]:
         """Every lag that is held, deg."""
         return tuple(sorted(self.phase_lags_deg))

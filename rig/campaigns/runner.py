@@ -8,12 +8,14 @@ from typing import Any
 
 import vibrolock
 from rig.bench import Bench
+from rig.bench_code import imported_code, refuse_code
 from rig.campaigns.about import About, calibration_remarks
 from rig.campaigns.arming import Arm, armed
 from rig.campaigns.bench_memory import RememberedTrip, now, remember
 from rig.campaigns.continuation import what_is_left
 from rig.campaigns.execution import Execution, Progress, Silent, nothing_left
-from rig.campaigns.output import make_way, set_aside
+from rig.campaigns.lengths import check_length
+from rig.campaigns.output import forget_before, make_way, put_back, set_aside
 from rig.campaigns.plan import Plan
 from rig.campaigns.trips import refuse_tripped
 from rig.errors import RigError
@@ -26,11 +28,13 @@ from rig.safety.layout import EndReason
 from rig.safety.limits import describe_end
 from rig.sequencer.segments import Segment
 from rig.session import Session, TickSettings, open_session
+from rig.stop_signals import ended_in_order, held
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 
 __all__ = ["carry_out", "take_up"]
 
 
+@ended_in_order()
 def carry_out(
     plan: Plan,
     bench: Bench,
@@ -51,6 +55,9 @@ def carry_out(
     (`rig.campaigns.arming`), else `rig.errors.NotArmed`; ``about`` is recorded with the part.
     """
     plan.check(bench)
+    check_length(plan, bench)
+    progress = progress or Silent()
+    _put_back(output, progress)
     make_way(output, overwrite)
     with open_session(bench, seed, realtime=realtime) as session:
         facts = _facts(plan, bench, session, arm, about, progress)
@@ -70,12 +77,12 @@ def carry_out(
             _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
             _started(session, settings, output) as loop,
         ):
-            execution = Execution(plan, bench, loop, journal, progress or Silent())
+            execution = Execution(plan, bench, loop, journal, progress)
             execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
-    finalise(journal_path(output), output)
-    return Recording(output)
+    return _whole(output, progress)
 
 
+@ended_in_order()
 def take_up(
     output: Path,
     *,
@@ -87,6 +94,7 @@ def take_up(
     arm: Arm = None,
     about: About | None = None,
     retry_tripped: bool = False,
+    trust_code: bool = False,
 ) -> Recording:
     """Finish a run that was interrupted: finished points stay, the others are measured in a further part of the file.
 
@@ -95,9 +103,17 @@ def take_up(
     part. A recording that is complete and asked for nothing new is returned as it is.
 
     Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before, or that asks for a level
-    that tripped or a higher one, unless ``retry_tripped``.
+    that tripped or a higher one, unless ``retry_tripped``, or for a bench with functions of the user's own, unless
+    ``trust_code``: whoever wrote the recording has named the module that is imported.
     """
+    progress = progress or Silent()
+    _put_back(output, progress)
     with Recording(output) as recording:
+        for number, part in enumerate(recording.parts):
+            if part.dropped_reason:
+                progress.remark(
+                    f"part {number}: {part.dropped_reason}; points whose results are missing are measured again"
+                )
         left = what_is_left(recording, change, source)
         # A further part draws its own noise: the same seed again would repeat the first part's.
         drawn = (recording.seed or 0) + len(recording.parts) if seed is None else seed
@@ -108,6 +124,8 @@ def take_up(
             refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench
     segments = plan.segments(bench.sample_rate_hz, left.done)
+    if segments and not trust_code:
+        refuse_code(bench, output.name)
     if segments:
         with open_session(bench, drawn, realtime=realtime) as session:
             facts = _facts(plan, bench, session, arm, about, progress)
@@ -117,19 +135,35 @@ def take_up(
                 _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
                 _started(session, _settings(plan, bench, segments), output) as loop,
             ):
-                execution = Execution(plan, bench, loop, journal, progress or Silent(), left.done, left.numbers, before)
+                execution = Execution(plan, bench, loop, journal, progress, left.done, left.numbers, before)
                 execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
     elif not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
             journal.end(nothing_left(bench))
-    if journal_path(output).exists():
-        finalise(journal_path(output), output)
+    return _whole(output, progress) if journal_path(output).exists() else Recording(output)
+
+
+def _put_back(output: Path, progress: Progress) -> None:
+    if told := put_back(output):
+        progress.remark(told)
+
+
+def _whole(output: Path, progress: Progress) -> Recording:
+    """The recording, its journal turned into its file; a signal meanwhile ends the program as soon as nothing can be lost."""
+    with held() as signals:
+        damaged = finalise(journal_path(output), output, signals.check)
+        forget_before(output)
+        if damaged is not None:
+            progress.remark(
+                f"the journal was damaged and is kept as {damaged.name}; `rig show {output}` says what was lost"
+            )
+        signals.check(recorded=output)
     return Recording(output)
 
 
 def _facts(
-    plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress | None
+    plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress
 ) -> dict[str, Any]:
     """Arm the bench; who did, who runs the test on what, and what stands behind the driver."""
     about = about or About()
@@ -138,9 +172,10 @@ def _facts(
         "armed": armed(bench, session, about.purpose or plan.kind, arm),
         "device": session.identity,
         "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
+        "code": imported_code(bench),
     }
     for remark in facts["remarks"]:
-        (progress or Silent()).remark(remark)
+        progress.remark(remark)
     return facts
 
 

@@ -1,5 +1,6 @@
 """The stepped-phase campaign: at a constant level through phase lags on both sides of resonance, unstable branches too."""
 
+import math
 from dataclasses import replace
 from typing import Literal, Self
 
@@ -15,7 +16,6 @@ from rig.sequencer.segments import Segment
 __all__ = ["SteppedPhasePlan"]
 
 LAGS_DEG = (-175.0, -5.0)  # between, the force feeds the vibration, and a lag tells frequencies apart
-MOST_LAGS = 10_000
 
 
 class SteppedPhasePlan(SettledPlan):
@@ -65,8 +65,6 @@ class SteppedPhasePlan(SettledPlan):
             raise ValueError(
                 f"stop_deg = {self.stop_deg:g}: allowed is above start_deg; direction says which way to go"
             )
-        if len(self.lags) > MOST_LAGS:
-            raise ValueError(f"step_deg = {self.step_deg:g}: allowed are up to {MOST_LAGS} lags")
         if len(set(self.lags)) != len(self.lags):
             raise ValueError("phase_lags_deg: a lag is given twice; use repeats to measure lags again")
         if self.controller.phase_lag_deg != -90.0:
@@ -78,6 +76,15 @@ class SteppedPhasePlan(SettledPlan):
                 'controller.detector = "sign": it knows phase resonance only, allowed is two-phase or adaptive'
             )
         return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels, lags, ways and repeats."""
+        if self.start_deg is None or self.stop_deg is None:
+            lags = {"phase_lags_deg": len(self.phase_lags_deg or ())}
+        else:
+            lags = {"step_deg": max(1, math.ceil(min(1e9, (self.stop_deg - self.start_deg) / self.step_deg)) + 1)}
+        return {**super().counts, **lags, "direction": 2 if self.direction == "up-down" else 1}
 
     @property
     def asked_lags_deg(self) -> tuple[float, ...]:

@@ -66,6 +66,13 @@ class SteppedSinePlan(TonePlan):
         return self
 
     @property
+    def counts(self) -> dict[str, int]:
+        """Levels and frequencies."""
+        if self.frequencies_hz is not None:
+            return {**super().counts, "frequencies_hz": len(self.frequencies_hz)}
+        return {**super().counts, "steps": self.steps}
+
+    @property
     def frequencies_at_each_level(self) -> tuple[float, ...]:
         """All frequencies in the order of measurement, Hz."""
         if self.start_hz is None or self.stop_hz is None:

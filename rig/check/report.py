@@ -6,6 +6,7 @@ from typing import Any
 
 from rig.check.assessment import Assessment
 from rig.console import number, print_table
+from rig.printable import printable_strings
 
 __all__ = ["say", "summary"]
 
@@ -28,6 +29,7 @@ def summary(found: Assessment) -> dict[str, Any]:
 
 def say(facts: dict[str, Any]) -> None:
     """A `summary` for people: the table, then what to do."""
+    facts = printable_strings(facts)
     level = facts["level_rms_v"]
     print(f"check of {facts['specimen']} (bench {facts['bench']})" + (f", {level:.3g} V RMS" if level else ""))
     print_table(

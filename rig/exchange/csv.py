@@ -15,9 +15,11 @@ import numpy as np
 from rig.errors import RecordingError
 from rig.exchange.contents import Contents
 from rig.exchange.mat import ImportFailed
+from rig.text_files import read_text
 
 __all__ = ["read_csv", "table_of_ours", "write_csv"]
 
+LARGEST_BYTES = 1_000_000_000
 _KIND, _OTHERS = "# vibrolock: ", "# others: "
 
 
@@ -88,12 +90,7 @@ def _loose(told: dict[str, Any]) -> Any:
 
 
 def _lines(path: Path) -> list[str]:
-    try:
-        return path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise ImportFailed(f"{path}: is no text, a CSV file in UTF-8 is wanted") from None
-    except OSError as error:
-        raise ImportFailed(f"{path}: cannot be read ({error.strerror})") from None
+    return read_text(path, LARGEST_BYTES, ImportFailed).splitlines()
 
 
 def read_csv(path: Path) -> dict[str, Any]:

@@ -118,6 +118,6 @@ def put_together(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, 
         if known.name == kind:
             try:
                 return known.together(arrays, attributes)
-            except (KeyError, TypeError, ValueError) as error:
+            except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
                 raise IdentificationError(f"{kind}: does not fit together ({error})") from None
     raise IdentificationError(f"kind: is '{kind}', known are {', '.join(kind.name for kind in KINDS)}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.configuration import read_toml, validated
 from rig.errors import ConfigurationError
 from rig.exchange.mat import ImportFailed, read_mat, structures_of_ours
+from rig.printable import shown
 
 if TYPE_CHECKING:
     from identification import FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra
@@ -104,8 +105,8 @@ def read_mapping(path: str | Path) -> Any:
     """Read a mapping from TOML; raises `ConfigurationError` that names each wrong key and its value."""
     table = read_toml(Path(path))
     kind, known = table.get("kind", _DEFAULT_KIND), _mappings()
-    if kind not in known:
-        raise ConfigurationError(f"{path}: kind = {kind!r}: allowed is {', '.join(known)}")
+    if not isinstance(kind, str) or kind not in known:
+        raise ConfigurationError(f"{path}: kind = {shown(kind)}: allowed is {', '.join(known)}")
     return validated(known[kind][0], table, str(path))
 
 

@@ -17,7 +17,7 @@ from rig.figures.stepped_phase import draw_stepped_phase
 from rig.figures.style import MAIN, SECOND, STYLE, TRACE_BINS, say_why_empty, title
 from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
 from rig.measurements import backbone, force_surface, frequency_responses, point_rows, spectra, sweeps
-from rig.models.files import KINDS, load
+from rig.models.files import KINDS, load, understood
 from rig.recording.arrays import kind_of
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -53,7 +53,9 @@ def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
                 draw_lateness(page, recording)
         elif kind in KINDS:
             page.set_size_inches(*KINDS[kind].figure_in)
-            KINDS[kind].draw(page, load(source))
+            found = load(source)
+            with understood(source, kind):
+                KINDS[kind].draw(page, found)
         else:
             with Recording(source) as recording:
                 draw = _draw_check if is_check(recording) else _DRAW[recording.kind]

@@ -1,7 +1,12 @@
 """Models, predictions and imported measurements in files: written whole, read back as what they were."""
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from numpy.exceptions import ComplexWarning
 
 from identification import LinearModes, ModalAnalysis, PnlssFit, PnlssModel
 from rig.errors import RecordingError
@@ -16,8 +21,9 @@ from rig.models.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.predictions import PREDICTIONS
 from rig.models.response_matrix import RESPONSE_MATRIX
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
+from rig.recording.layout import one_line
 
-__all__ = ["KINDS", "load", "load_as", "save"]
+__all__ = ["KINDS", "load", "load_as", "save", "understood"]
 
 _ALL = (
     NONLINEAR_MODE,
@@ -32,6 +38,8 @@ _ALL = (
 )
 KINDS = {kind.name: kind for kind in _ALL}
 """Every kind of file that is no recording, by its name in the file."""
+
+_MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
 
 
 def save(thing: Any, path: Path) -> None:
@@ -56,7 +64,19 @@ def load(path: Path) -> Any:
     name, arrays, attributes = read_arrays(path)
     if name not in KINDS:
         raise RecordingError(f"{path}: is a file of kind {name}; known are {', '.join(KINDS)}")
-    return KINDS[name].unpack(arrays, attributes)
+    with understood(path, name):
+        return KINDS[name].unpack(arrays, attributes)
+
+
+@contextmanager
+def understood(path: Path, kind: str) -> Iterator[None]:
+    """Turn what missing arrays, wrong shapes and wrong types in a file lead to into one `RecordingError` that names it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ComplexWarning)  # an imaginary part must not get lost
+            yield
+    except (*_MISFITS, ComplexWarning) as error:
+        raise RecordingError(f"{path}: does not hold what makes a {kind} ({one_line(error)})") from error
 
 
 def load_as(kind: Kind, path: Path) -> Any:

@@ -2,6 +2,8 @@
 
 import errno
 import os
+import shutil
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,13 +12,17 @@ from typing import Self
 from rig.recording.blocks import Kind, pack
 from rig.recording.locking import lock
 
-__all__ = ["SYNC_INTERVAL_S", "BlockFile"]
+__all__ = ["SYNC_INTERVAL_S", "BlockFile", "NameLost"]
 
 SYNC_INTERVAL_S = 0.5
 """The disk is synchronised at most this often while blocks are appended."""
 
 _WRITABLE = os.O_RDWR | os.O_APPEND | getattr(os, "O_BINARY", 0)
 _fdatasync: Callable[[int], None] = getattr(os, "fdatasync", os.fsync)  # macOS and Windows have none
+
+
+class NameLost(OSError):  # noqa: N818 (says what happened)
+    """The file that is being written was removed or renamed by somebody else."""
 
 
 class BlockFile:
@@ -26,8 +32,8 @@ class BlockFile:
     that fails, nothing more is written: a block behind half a block could not be read.
     """
 
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
+    def __init__(self, descriptor: int, path: Path) -> None:
+        self._descriptor, self._path = descriptor, path
         self._end = (0, 0)  # bytes and blocks as one value: a signal's exception never comes between the two
         self._unsound: OSError | None = None
         self._synced_s = time.monotonic()
@@ -46,7 +52,7 @@ class BlockFile:
         except BaseException:
             os.close(descriptor)
             raise
-        return cls(descriptor)
+        return cls(descriptor, path)
 
     @property
     def size(self) -> int:
@@ -58,19 +64,20 @@ class BlockFile:
         os.ftruncate(self._descriptor, n_bytes)
         self._end = (n_bytes, n_blocks)
 
-    def append(self, kind: Kind, payload: bytes) -> None:
-        """Append one block; it is in the hands of the operating system on return."""
+    def append(self, kind: Kind, part: int, row: int, payload: bytes, *, twice: bool = False) -> None:
+        """Append one block, or the same again behind it; it is in the hands of the operating system on return."""
         if self._descriptor < 0:
             raise OSError(errno.EBADF, "the journal is closed")
         if self._unsound:
             raise OSError(self._unsound.errno, f"no further writes after an earlier error: {self._unsound.strerror}")
         n_bytes, n_blocks = self._end
-        block = pack(kind, n_blocks, payload)
+        numbers = range(n_blocks, n_blocks + (2 if twice else 1))
+        blocks = b"".join(pack(kind, number, part, row, payload) for number in numbers)
         try:
-            rest = memoryview(block)
+            rest = memoryview(blocks)
             while rest:
                 rest = rest[os.write(self._descriptor, rest) :]
-            self._end = (n_bytes + len(block), n_blocks + 1)
+            self._end = (n_bytes + len(blocks), numbers.stop)
         except BaseException:
             self._take_back()
             raise
@@ -82,11 +89,40 @@ class BlockFile:
             self._unsound = error
 
     def synchronise(self, *, if_due: bool = False) -> None:
-        """Force what was written to the disk; ``if_due``: only if that was not done within ``SYNC_INTERVAL_S``."""
+        """Force what was written to the disk; ``if_due``: only if that was not done within ``SYNC_INTERVAL_S``.
+
+        Raises:
+            NameLost: the file no longer lies under its name.
+        """
         now_s = time.monotonic()
         if not if_due or now_s - self._synced_s >= SYNC_INTERVAL_S:
             _fdatasync(self._descriptor)
             self._synced_s = now_s
+            if not self._has_its_name():
+                raise NameLost(errno.ENOENT, "was removed or renamed while it was written")
+
+    def _has_its_name(self) -> bool:
+        try:
+            return os.path.samestat(self._path.stat(), os.fstat(self._descriptor))
+        except OSError:
+            return False
+
+    def rescue(self) -> str:
+        """Copy a removed file to where it was, or else to the folder for temporary files; says where its contents are.
+
+        Raises:
+            OSError: it can be written to neither.
+        """
+        if os.fstat(self._descriptor).st_nlink > 0:
+            return "kept under the name that the file was given"
+        folder = self._path.parent if self._path.parent.is_dir() else Path(tempfile.mkdtemp(prefix="vibrolock-"))
+        place = folder / self._path.name
+        with os.fdopen(os.dup(self._descriptor), "rb") as stream, place.open("xb") as copy:
+            stream.seek(0)
+            shutil.copyfileobj(stream, copy)
+            copy.flush()
+            os.fsync(copy.fileno())
+        return f"written again to {place}"
 
     @property
     def closed(self) -> bool:

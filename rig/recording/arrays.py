@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rig.errors import RecordingError
-from rig.recording.journal import journal_path, read_journal
+from rig.recording.journal import journal_path
 from rig.recording.layout import identify, kind_in, new_file, one_line, open_file, reading
-from rig.recording.tables import read_object, write_object
+from rig.recording.sequence import read_journal
+from rig.recording.tables import StoredTexts, write_object
 
 __all__ = ["kind_of", "read_arrays", "write_arrays"]
 
@@ -76,17 +77,17 @@ def read_arrays(path: str | Path) -> tuple[str, dict[str, NDArray[Any]], dict[st
         if "arrays" not in file:
             raise RecordingError(f"{path}: holds no arrays; it is a recording of kind {kind!r}")
         arrays: dict[str, NDArray[Any]] = {}
-        _collect(file["arrays"], "", arrays)
-        return kind, arrays, read_object(file, "attributes")
+        texts = StoredTexts(path.stat().st_size)
+        _collect(file["arrays"], "", arrays, texts)
+        return kind, arrays, texts.object(file, "attributes")
 
 
-def _collect(group: Any, prefix: str, arrays: dict[str, NDArray[Any]]) -> None:
+def _collect(group: Any, prefix: str, arrays: dict[str, NDArray[Any]], texts: StoredTexts) -> None:
     for name, item in group.items():
         if hasattr(item, "items"):
-            _collect(item, f"{prefix}{name}/", arrays)
+            _collect(item, f"{prefix}{name}/", arrays, texts)
         else:
-            text = item.dtype.kind == "O"
-            arrays[prefix + name] = np.asarray(item.asstr()[()], dtype=np.str_) if text else np.asarray(item[()])
+            arrays[prefix + name] = texts.array(item) if item.dtype.kind in "SO" else np.asarray(item[()])
 
 
 def kind_of(path: str | Path) -> str:

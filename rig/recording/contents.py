@@ -11,11 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import RecordingError
-from rig.recording.blocks import Kind, Tail, read_journal
+from rig.recording.blocks import Block, Gap, Kind
 from rig.recording.header import Header
-from rig.recording.parts import Part, rows_at_once
+from rig.recording.parts import Part, missing_rows, rows_at_once
+from rig.recording.sequence import Tail, read_journal
 
 __all__ = ["JournalContents", "JournalPart"]
+
+MISSING = -1
+"""Offset of rows that cannot be read."""
 
 
 class JournalPart(Part):
@@ -29,29 +33,38 @@ class JournalPart(Part):
         self._offsets, self._firsts = array("q"), array("q")
 
     def add_rows(self, offset: int, n_rows: int) -> None:
-        """Note ``n_rows`` further rows whose bytes begin at ``offset``."""
+        """Note ``n_rows`` further rows whose bytes begin at ``offset``, or which cannot be read (`MISSING`)."""
         self._offsets.append(offset)
         self._firsts.append(self.n_rows)
         self.n_rows += n_rows
 
+    def add_gap(self, n_bytes: int, text: str) -> None:
+        """Note bytes that cannot be read, and what was lost with them."""
+        self.dropped_bytes += n_bytes
+        self.dropped_reason += f"; {text}" if self.dropped_reason else text
+
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Read rows across blocks; see ``Part.read``."""
-        rows = np.empty(stop - start, self.row_dtype)
+        rows = missing_rows(stop - start, self.row_dtype)
         view, itemsize = rows.view(np.uint8).data, self.row_dtype.itemsize
         row, block = start, bisect_right(self._firsts, start) - 1
         while row < stop:
             block_stop = self._firsts[block + 1] if block + 1 < len(self._firsts) else self.n_rows
             taken = min(stop, block_stop) - row
             into = view[(row - start) * itemsize : (row - start + taken) * itemsize]
-            try:
-                self._stream.seek(self._offsets[block] + (row - self._firsts[block]) * itemsize)
-                complete = self._stream.readinto(into) == len(into)
-            except (OSError, ValueError) as error:
-                raise RecordingError(f"journal: its rows cannot be read ({error})") from error
-            if not complete:
-                raise RecordingError("journal: it has become shorter while it was read")
+            if self._offsets[block] != MISSING:
+                self._fill(into, self._offsets[block] + (row - self._firsts[block]) * itemsize)
             row, block = row + taken, block + 1
         return rows
+
+    def _fill(self, into: memoryview, offset: int) -> None:
+        try:
+            self._stream.seek(offset)
+            complete = self._stream.readinto(into) == len(into)
+        except (OSError, ValueError) as error:
+            raise RecordingError(f"journal: its rows cannot be read ({error})") from error
+        if not complete:
+            raise RecordingError("journal: it has become shorter while it was read")
 
     def _read_field(self, field: str, start: int, stop: int) -> NDArray[Any]:
         values = np.empty(stop - start, self.row_dtype[field])
@@ -65,10 +78,11 @@ class JournalPart(Part):
 class JournalContents:
     """Header, parts and tail of a journal; a context manager that holds the journal open for reading.
 
-    Rows stay in the file; points, events and eight bytes twice per block of rows are held.
+    Rows stay in the file; points, events and eight bytes twice per block of rows are held. Rows in a block that cannot be
+    read are not numbers, so that all behind them keep their place; the parts say what was lost.
 
     Raises:
-        RecordingError: on construction, as ``read_journal``.
+        RecordingError: on construction, as ``read_journal``; or none of its parts can be told apart.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -76,33 +90,81 @@ class JournalContents:
         self.path, self.header = Path(path), blocks.header
         self.parts: list[JournalPart] = []
         self.n_blocks, self.size = 1, blocks.header_stop
-        """Whole blocks with the header, and the bytes that they take."""
+        """Number of the block to come, and the bytes up to the last whole one."""
+        self.damaged = False
+        """Whether something is lost that is not the end of a write cut short."""
+        self.last_part = 0
+        """Number of the part of the last whole block, from 1."""
+        self._part_number = 0
+        self._before_parts: list[tuple[int, str]] = []
         self._stream: BufferedReader = self.path.open("rb")
         try:
+            if blocks.header_gap is not None:
+                self._note(blocks.header_gap, "the header is there a second time")
             for block in blocks:
-                self._add(block.kind, block.offset, block.payload, block.value)
-                self.n_blocks, self.size = self.n_blocks + 1, block.stop
+                self._add(block)
+                self.n_blocks, self.size, self.last_part = block.sequence + 1, block.stop, block.part
+            if self.damaged and not self.parts:
+                raise RecordingError(f"{path}: damaged: the beginnings of all its parts cannot be read")
         except BaseException:
             self.close()
             raise
         self.tail: Tail = blocks.tail
         """What follows the last good block."""
-        if self.parts:
-            self.parts[-1].dropped_bytes, self.parts[-1].dropped_reason = self.tail.n_bytes, self.tail.reason
+        self.damaged = self.damaged or not self.tail.torn
+        if self.parts and self.tail.n_bytes:
+            self.parts[-1].add_gap(self.tail.n_bytes, f"{self.tail.n_bytes} bytes lost at the end: {self.tail.reason}")
 
-    def _add(self, kind: Kind, offset: int, payload: bytes, value: dict[str, Any]) -> None:
-        if kind is Kind.PART:
-            self.parts.append(JournalPart(self._stream, self.header, value))
+    def _add(self, block: Block) -> None:
+        here = block.part == self._part_number
+        if block.gap is not None:
+            self._note(block.gap, self._lost_before(block) if here else "the end of a part")
+        if block.kind is Kind.HEADER:
             return
-        part = self.parts[-1]
-        if kind is Kind.ROWS:
-            part.add_rows(offset, len(payload) // self.header.row_dtype.itemsize)
-        elif kind is Kind.EVENT:
-            part.events.append(value)
-        elif kind is Kind.POINT:
-            part.points.append(value)
+        if block.kind is Kind.PART:
+            if not here:
+                self._begin(block)
+            return
+        if not here:  # no part of that number has begun
+            self._note(
+                Gap(block.stop - block.start, 1, f"the beginning of part {block.part} is lost"), "all of that part"
+            )
+            return
+        self._add_to_part(block, self.parts[-1])
+
+    def _begin(self, block: Block) -> None:
+        self._part_number = block.part
+        self.parts.append(JournalPart(self._stream, self.header, block.value))
+        for n_bytes, text in self._before_parts:
+            self.parts[-1].add_gap(n_bytes, text)
+        self._before_parts.clear()
+
+    def _lost_before(self, block: Block) -> str:
+        """Make up for the rows that are missing before a block of the same part; says which."""
+        first, n_rows = self.parts[-1].n_rows, block.row - self.parts[-1].n_rows
+        if n_rows == 0:
+            return "no rows"
+        self.parts[-1].add_rows(MISSING, n_rows)
+        return f"rows {first} to {block.row - 1}, which are not numbers now"
+
+    def _note(self, gap: Gap, lost: str) -> None:
+        self.damaged = True
+        blocks = "1 block" if gap.n_blocks == 1 else f"{gap.n_blocks} blocks"
+        told = (gap.n_bytes, f"{blocks} of {gap.n_bytes} bytes lost: {gap.reason}; {lost}")
+        if self.parts:
+            self.parts[-1].add_gap(*told)
         else:
-            part.end = value
+            self._before_parts.append(told)
+
+    def _add_to_part(self, block: Block, part: JournalPart) -> None:
+        if block.kind is Kind.ROWS:
+            part.add_rows(block.offset, len(block.payload) // self.header.row_dtype.itemsize)
+        elif block.kind is Kind.EVENT:
+            part.events.append(block.value)
+        elif block.kind is Kind.POINT:
+            part.points.append(block.value)
+        else:
+            part.end = block.value
 
     def close(self) -> None:
         """Let go of the file; may be called twice."""

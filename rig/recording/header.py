@@ -16,7 +16,7 @@ __all__ = ["FORMAT", "SCHEMA", "Column", "Header", "check_schema", "packed"]
 FORMAT = "vibrolock"
 """Value of the attribute ``format`` of every file."""
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the layout of journals and HDF5 files that this version writes; it reads all up to this one."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")

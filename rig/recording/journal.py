@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording import jsontext
-from rig.recording.appending import BlockFile
-from rig.recording.blocks import LARGEST_PAYLOAD, Kind, Tail, read_journal
+from rig.recording.appending import BlockFile, NameLost
+from rig.recording.blocks import LARGEST_PAYLOAD, TWICE, Kind
 from rig.recording.contents import JournalContents
 from rig.recording.header import Column, Header, packed
 from rig.recording.locking import synchronise_folder
+from rig.recording.sequence import Tail, read_journal
 
 __all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]
 
@@ -58,6 +59,7 @@ class JournalWriter:
         """What ``reopen`` cut off."""
         self._blocks = blocks
         self._in_part = False
+        self._part_number = self._rows_in_part = 0
 
     @classmethod
     def create(cls, path: str | Path, header: Header) -> Self:
@@ -78,7 +80,7 @@ class JournalWriter:
             )
         writer = cls(path, blocks, header)
         try:
-            writer._append(Kind.HEADER, header.encoded())
+            writer._append(Kind.HEADER, header.encoded(), 0)
             writer._synchronise()
             synchronise_folder(path)
         except BaseException:
@@ -91,8 +93,8 @@ class JournalWriter:
     def reopen(cls, path: str | Path) -> Self:
         """Go on with the journal of an interrupted run: cut off what is torn behind its last whole block, then append.
 
-        What was cut off is told in ``dropped``. Where whole blocks follow a damaged one, the journal is first copied to
-        ``PATH.damaged``.
+        What was cut off is told in ``dropped``; damage before it stays in the file. A journal of version 1, of which nothing
+        can be read behind a damaged block, is first copied to ``PATH.damaged``.
 
         Raises:
             RecordingError: missing, foreign, of a later schema, being written by another process, or not writable.
@@ -116,13 +118,16 @@ class JournalWriter:
         self.n_points = sum(len(part.points) for part in contents.parts)
         if not contents.tail.torn:
             shutil.copyfile(self.path, set_aside(self.path))
+        self._part_number = contents.last_part
         self._blocks.cut(contents.size, contents.n_blocks)
         self._synchronise()
 
     def part(self, information: Mapping[str, Any]) -> None:
         """Begin a part; ``information`` is the caller's (``first_sample``: number of its first row's sample)."""
-        self._append(Kind.PART, jsontext.encode(information, what="part"))
+        text = jsontext.encode(information, what="part")
+        self._append(Kind.PART, text, self._part_number + 1)
         self._in_part = True
+        self._part_number, self._rows_in_part = self._part_number + 1, 0
         self.n_parts += 1
 
     def rows(self, rows: NDArray[Any]) -> None:
@@ -139,6 +144,7 @@ class JournalWriter:
             block = stored[first : first + step]
             self._append_to_part(Kind.ROWS, block.tobytes())
             self.n_rows += len(block)
+            self._rows_in_part += len(block)
         self._synchronise(if_due=True)
 
     def event(self, event: Mapping[str, Any]) -> None:
@@ -177,15 +183,16 @@ class JournalWriter:
     def _append_to_part(self, kind: Kind, payload: bytes) -> None:
         if not self._in_part:
             raise RecordingError(f"{self.path}: {kind.name.lower()} outside any part; call part() first")
-        self._append(kind, payload)
+        self._append(kind, payload, self._part_number)
 
-    def _append(self, kind: Kind, payload: bytes) -> None:
+    def _append(self, kind: Kind, payload: bytes, part: int) -> None:
         if len(payload) > LARGEST_PAYLOAD:
             raise RecordingError(
                 f"{kind.name.lower()}: {len(payload)} bytes of JSON, at most {LARGEST_PAYLOAD} are allowed"
             )
+        row = 0 if kind is Kind.PART else self._rows_in_part
         with self._telling("written"):
-            self._blocks.append(kind, payload)
+            self._blocks.append(kind, part, row, payload, twice=kind in TWICE)
 
     def _synchronise(self, *, if_due: bool = False) -> None:
         with self._telling("forced to the disk"):
@@ -193,8 +200,21 @@ class JournalWriter:
 
     @contextmanager
     def _telling(self, done: str) -> Iterator[None]:
+        recorded = f"{self.n_rows} rows and {self.n_points} points"
         try:
             yield
+        except NameLost as error:
+            raise RecordingError(f"{self.path}: {error.strerror}; its {recorded} are {self._rescued()}") from error
         except OSError as error:
-            kept = f"the {self.n_rows} rows and {self.n_points} points before are kept"
-            raise RecordingError(f"{self.path}: cannot be {done} ({error.strerror}); {kept}") from error
+            raise RecordingError(
+                f"{self.path}: cannot be {done} ({error.strerror}); the {recorded} before are kept"
+            ) from error
+
+    def _rescued(self) -> str:
+        """Save what was recorded, and write no more."""
+        try:
+            return self._blocks.rescue()
+        except OSError as error:
+            return f"lost: they cannot be written again ({error.strerror})"
+        finally:
+            self._blocks.close()

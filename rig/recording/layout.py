@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
+from rig.recording.examination import check_attributes, examine
 from rig.recording.header import FORMAT, SCHEMA, check_schema
+from rig.recording.integrity import integrity_of
 from rig.recording.locking import synchronise_folder
 from rig.recording.sink import Sink
+from rig.recording.trailer import append_trailer
 
-__all__ = ["identify", "kind_in", "new_file", "one_line", "open_file", "reading"]
+__all__ = ["file_integrity", "identify", "kind_in", "new_file", "one_line", "open_file", "open_unchecked", "reading"]
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FOREIGN = {
@@ -55,23 +58,35 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def open_file(path: Path) -> Any:
-    """Open one of our HDF5 files for reading.
+    """Open one of our HDF5 files for reading, after its digest, or else a child process, has found it whole.
 
     Returns:
         The open ``h5py.File``, to be closed by the caller.
 
     Raises:
-        RecordingError: missing, not permitted, no HDF5 file, truncated, of another program, or of a later schema.
+        RecordingError: missing, not permitted, no HDF5 file, truncated, with a changed byte, of another program, of a
+            later schema, or holding what no file of ours holds (`rig.recording.examination`).
     """
-    import h5py
+    file_integrity(path)
+    return open_unchecked(path)
 
+
+def file_integrity(path: Path) -> str:
+    """``"verified"`` or ``"unverified: WHY"`` (`rig.recording.integrity`); raises as `open_file`."""
     try:
         with path.open("rb") as stream:
             ours = stream.read(len(_HDF5_SIGNATURE)) == _HDF5_SIGNATURE
+        if not ours:
+            raise RecordingError(f"{path}: not a file of vibrolock, but {_foreign(path)}")
+        return integrity_of(path)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
-    if not ours:
-        raise RecordingError(f"{path}: not a file of vibrolock, but {_foreign(path)}")
+
+
+def open_unchecked(path: Path) -> Any:
+    """Open one of our HDF5 files whatever its digest: a changed byte in it may crash the HDF5 library. As `open_file`."""
+    import h5py
+
     try:
         file = h5py.File(path, "r")
     except (OSError, RuntimeError, ValueError) as error:
@@ -79,9 +94,11 @@ def open_file(path: Path) -> Any:
         raise RecordingError(f"{path}: cannot be opened: {why}") from error
     try:
         with reading(path):
+            check_attributes(file)
             if file.attrs.get("format") != FORMAT:
                 raise RecordingError(f"{path}: not a file of vibrolock, but an HDF5 file of another program")
             check_schema(file.attrs.get("schema"), path)
+            examine(file, path.stat().st_size)
     except BaseException:
         file.close()
         raise
@@ -102,8 +119,8 @@ def kind_in(file: Any) -> str:
 def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]]]:
     """Write an HDF5 file that appears under ``path`` whole or not at all, in place of what was there before.
 
-    It is written as ``PATH.part`` in the same folder, forced to the disk and renamed. ``kept`` ends the error's line.
-    Yields the open ``h5py.File`` and a function to call after each large write: it raises once the disk is full.
+    It is written as ``PATH.part`` in the same folder, given its digest, forced to the disk and renamed. ``kept`` ends the
+    error's line. Yields the open ``h5py.File`` and a function to call after each large write: it raises once the disk is full.
 
     Raises:
         RecordingError: it cannot be written; ``path`` is then as it was.
@@ -115,6 +132,8 @@ def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]
         with Sink(part) as sink:
             with h5py.File(sink, "w") as file:
                 yield file, sink.check
+            sink.check()
+            append_trailer(sink)
             sink.check()
             os.fsync(sink.fileno())
         part.replace(path)

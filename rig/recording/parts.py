@@ -10,12 +10,21 @@ from numpy.typing import NDArray
 from rig.errors import RecordingError
 from rig.recording.header import Column
 
-__all__ = ["Part", "rows_at_once"]
+__all__ = ["Part", "missing_rows", "rows_at_once"]
 
 
 def rows_at_once(row_dtype: np.dtype[Any]) -> int:
     """Return how many rows are held in memory while reading or converting, and make one chunk of an HDF5 dataset."""
     return max(min(16384, 2**22 // row_dtype.itemsize), 1)
+
+
+def missing_rows(n_rows: int, row_dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return rows that take the place of lost ones: NaN where a field can hold it, else zero."""
+    rows = np.zeros(n_rows, row_dtype)
+    for name in row_dtype.names or ():
+        if rows[name].dtype.kind in "fc":
+            rows[name] = np.nan
+    return rows
 
 
 class Part(ABC):
@@ -36,9 +45,9 @@ class Part(ABC):
     columns: Sequence[Column]
     """Unit and meaning of each field of its rows."""
     dropped_bytes: int
-    """Bytes of its journal behind the last good block that could not be read; 0 but for a torn or damaged journal."""
+    """Bytes of its journal that could not be read; 0 but for a torn or damaged journal."""
     dropped_reason: str
-    """Why they could not be read."""
+    """Where they are, why they could not be read, and which rows were lost with them; empty where none were."""
 
     @property
     def first_sample(self) -> int | None:

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple, Self
 from rig.errors import RecordingError
 from rig.recording.contents import JournalContents
 from rig.recording.header import Header
+from rig.recording.integrity import VERIFIED
 from rig.recording.journal import journal_path
 from rig.recording.layout import open_file
 from rig.recording.parts import Part
 from rig.recording.store import check_continuation
-from rig.recording.stored import read_recording
+from rig.recording.stored import read_recording, recording_integrity
 
 __all__ = ["Part", "RecordedPlan", "Recording"]
 
@@ -42,6 +43,7 @@ class Recording:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         journal = journal_path(self.path)
+        self.integrity = VERIFIED
         with ExitStack() as stack:
             self._header, self.parts = self._open(stack, journal if _holds_anything(journal) else None)
             self._stack = stack.pop_all()
@@ -49,6 +51,7 @@ class Recording:
     def _open(self, stack: ExitStack, journal: Path | None) -> tuple[Header, Sequence[Part]]:
         if journal is None or self.path.exists():
             file = stack.enter_context(open_file(self.path))
+            self.integrity = recording_integrity(file, self.path)
             header, stored = read_recording(file, self.path)
             if journal is None:
                 return header, stored
@@ -59,6 +62,8 @@ class Recording:
         check_continuation(contents.header, None, self.path)
         return contents.header, contents.parts
 
+    integrity: str
+    """``"verified"``, or ``"unverified: WHY"`` where the HDF5 file has no digest; the blocks of a journal have check sums."""
     parts: Sequence[Part]
     """The parts in the order in which they were recorded."""
 

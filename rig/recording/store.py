@@ -1,6 +1,6 @@
 """From journal to HDF5 file, whole or not at all, and back to a journal that continues a finished file."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -15,18 +15,21 @@ from rig.recording.journal import JournalWriter, journal_path, set_aside
 from rig.recording.layout import new_file, open_file
 from rig.recording.locking import exclusive
 from rig.recording.parts import Part
-from rig.recording.stored import read_recording, write_recording
+from rig.recording.stored import read_recording, recording_integrity, taken_over, write_recording
 
 __all__ = ["check_continuation", "continue_recording", "finalise"]
 
 
-def finalise(journal: str | Path, output: str | Path) -> None:
+def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] | None = None) -> Path | None:
     """Turn a journal into the HDF5 file ``output`` and remove the journal.
 
     Where ``output`` holds the earlier parts of the same recording, the new file holds them and the journal's. It is
     written beside ``output`` and renamed when it is whole and on the disk: until then ``output`` and journal stay as
-    they are, and doing it again after an interruption does no harm. A journal with damage amid whole blocks is not
-    removed but renamed to ``JOURNAL.damaged``.
+    they are, and doing it again after an interruption does no harm. ``check`` is called between chunks of rows; what it raises
+    ends the conversion.
+
+    Returns:
+        ``JOURNAL.damaged``, to which a journal with damage amid whole blocks is renamed; ``None`` where it was removed.
 
     Raises:
         RecordingError: the journal is unreadable, empty or being written, ``output`` is another recording or not ours,
@@ -36,23 +39,31 @@ def finalise(journal: str | Path, output: str | Path) -> None:
     with exclusive(journal):
         with ExitStack() as stack:
             contents = stack.enter_context(JournalContents(journal))
-            header, parts = contents.header, list[Part](contents.parts)
+            header, parts, unverified = contents.header, list[Part](contents.parts), ""
             if output.exists():
                 old = stack.enter_context(open_file(output))
                 earlier, stored = read_recording(old, output)
                 check_continuation(header, earlier, output)
+                unverified = taken_over(recording_integrity(old, output), header.first_part)
                 parts = [*stored[: header.first_part], *parts]
-                header = replace(earlier, row_dtype=header.row_dtype, columns=header.columns)
+                if header.first_part:
+                    header = replace(earlier, row_dtype=header.row_dtype, columns=header.columns)
             else:
                 check_continuation(header, None, output)
             if not parts:
                 raise RecordingError(f"{journal}: nothing was recorded; remove it")
-            with new_file(output, kept=f"the journal {journal} is kept") as (file, check):
-                write_recording(file, header, parts, check)
-        if contents.tail.torn:
-            journal.unlink()
-        else:
-            journal.rename(set_aside(journal))
+            with new_file(output, kept=f"the journal {journal} is kept") as (file, fits):
+                write_recording(file, header, parts, lambda: _each((fits, check)), unverified)
+        if contents.damaged:
+            return journal.rename(set_aside(journal))
+        journal.unlink()
+        return None
+
+
+def _each(checks: Sequence[Callable[[], None] | None]) -> None:
+    for check in checks:
+        if check is not None:
+            check()
 
 
 def continue_recording(

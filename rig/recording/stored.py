@@ -9,22 +9,25 @@ from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording.header import Column, Header
-from rig.recording.layout import identify, kind_in, reading
+from rig.recording.integrity import VERIFIED
+from rig.recording.layout import file_integrity, identify, kind_in, reading
 from rig.recording.parts import Part, rows_at_once
-from rig.recording.tables import read_object, read_table, write_object, write_table
+from rig.recording.tables import StoredTexts, write_object, write_table
 
-__all__ = ["StoredPart", "read_recording", "write_recording"]
+__all__ = ["StoredPart", "read_recording", "recording_integrity", "taken_over", "write_recording"]
+
+_TAKEN_OVER = "taken over from an unverified file"
 
 
 class StoredPart(Part):
     """A part in an open HDF5 file, its group ``/parts/N``."""
 
-    def __init__(self, group: Any, path: Path) -> None:
+    def __init__(self, group: Any, texts: StoredTexts, path: Path) -> None:
         self._group, self._path = group, path
-        self.information = read_object(group, "information")
-        self.points, self.events = read_table(group, "points"), read_table(group, "events")
-        self.end = read_object(group, "end") if "end" in group else None
-        columns = read_table(group, "columns")
+        self.information = texts.object(group, "information")
+        self.points, self.events = texts.table(group, "points"), texts.table(group, "events")
+        self.end = texts.object(group, "end") if "end" in group else None
+        columns = texts.table(group, "columns")
         self.columns = tuple(Column(c["name"], c["unit"], c["description"]) for c in columns)
         self.row_dtype = np.dtype([(c["name"], c["dtype"], tuple(c["shape"])) for c in columns])
         self.n_rows = int(group.attrs["n_rows"])
@@ -50,9 +53,27 @@ class StoredPart(Part):
             return values
 
 
-def write_recording(file: Any, header: Header, parts: Iterable[Part], check: Callable[[], None]) -> None:
+def recording_integrity(file: Any, path: Path) -> str:
+    """Integrity of an open recording; one that took parts over from an unverified file is unverified for good."""
+    found = file_integrity(path)
+    return f"unverified: {file.attrs['unverified']}" if found == VERIFIED and "unverified" in file.attrs else found
+
+
+def taken_over(integrity: str, n_parts: int) -> str:
+    """What a file says of its integrity that takes over the first parts of a file of that ``integrity``; empty if verified."""
+    if integrity == VERIFIED or n_parts == 0:
+        return ""
+    told = integrity.removeprefix("unverified: ")
+    return told if told.startswith(_TAKEN_OVER) else f"{_TAKEN_OVER}: parts 0 to {n_parts - 1}: {told}"
+
+
+def write_recording(
+    file: Any, header: Header, parts: Iterable[Part], check: Callable[[], None], unverified: str = ""
+) -> None:
     """Write a whole recording into an open new file; ``check`` raises once the disk is full."""
     identify(file, header.kind)
+    if unverified:
+        file.attrs["unverified"] = unverified
     for name in ("software_version", "started", "identity"):
         file.attrs[name] = getattr(header, name)
     if header.seed is not None:
@@ -107,11 +128,12 @@ def read_recording(file: Any, path: Path) -> tuple[Header, list[StoredPart]]:
     with reading(path):
         if "parts" not in file:
             raise RecordingError(f"{path}: is no recording but a file of kind {kind_in(file)!r}")
-        parts = [StoredPart(file["parts"][str(number)], path) for number in range(len(file["parts"]))]
+        texts = StoredTexts(path.stat().st_size)
+        parts = [StoredPart(file["parts"][str(number)], texts, path) for number in range(len(file["parts"]))]
         header = Header(
             kind=kind_in(file),
-            configuration=read_object(file, "configuration"),
-            channels=read_table(file, "channels"),
+            configuration=texts.object(file, "configuration"),
+            channels=texts.table(file, "channels"),
             row_dtype=parts[-1].row_dtype,
             columns=parts[-1].columns,
             software_version=str(file.attrs["software_version"]),

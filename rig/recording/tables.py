@@ -1,15 +1,22 @@
 """JSON objects in HDF5: one as a text, many as a table of texts with a column beside it for every plain key."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.errors import RecordingError
 from rig.recording import jsontext
 
-__all__ = ["read_object", "read_table", "write_object", "write_table"]
+__all__ = ["LARGEST_TEXTS_BYTES", "LARGEST_TEXT_BYTES", "StoredTexts", "write_object", "write_table"]
+
+LARGEST_TEXT_BYTES = 16 * 2**20
+"""Length of one JSON text, as of a block of a journal."""
+LARGEST_TEXTS_BYTES = 128 * 2**20
+"""Length of all texts of a file together; in memory JSON takes 4 to 30 times that."""
 
 _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _INT64 = np.iinfo(np.int64)
@@ -20,12 +27,11 @@ def write_object(group: Any, name: str, value: Mapping[str, Any]) -> None:
     import h5py
 
     text = jsontext.encode(value, what=name, indent=2)
+    if len(text) > LARGEST_TEXT_BYTES:
+        text = jsontext.encode(value, what=name)
+    if len(text) > LARGEST_TEXT_BYTES:
+        raise RecordingError(f"{name}: {len(text)} bytes of JSON; allowed are {LARGEST_TEXT_BYTES}")
     group.create_dataset(name, data=text, dtype=h5py.string_dtype("utf-8"))
-
-
-def read_object(group: Any, name: str) -> dict[str, Any]:
-    """Read back what ``write_object`` wrote."""
-    return jsontext.decode(group[name][()])
 
 
 def write_table(parent: Any, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -46,9 +52,55 @@ def write_table(parent: Any, name: str, rows: Sequence[Mapping[str, Any]]) -> No
             group.create_dataset(key, data=column, dtype=h5py.string_dtype("utf-8") if column.dtype == object else None)
 
 
-def read_table(parent: Any, name: str) -> list[dict[str, Any]]:
-    """Read back what ``write_table`` wrote."""
-    return [jsontext.decode(text) for text in parent[name]["json"][()]]
+class StoredTexts:
+    """Reads the texts of one open file of ``size`` bytes, and no more of them than is allowed.
+
+    Raises:
+        RecordingError: on reading: a text, or all of them, too long, or no texts; without the file's name.
+    """
+
+    def __init__(self, size: int) -> None:
+        # HDF5 tells no length before it reads; a text is no longer than the file, but many rows may share one.
+        self._at_once = max(1, LARGEST_TEXTS_BYTES // max(size, 1))
+        self._left = LARGEST_TEXTS_BYTES
+
+    def object(self, group: Any, name: str) -> dict[str, Any]:
+        """Read back what ``write_object`` wrote."""
+        return jsontext.decode(self._allowed(group[name], self._texts(group[name])[()]))
+
+    def table(self, parent: Any, name: str) -> list[dict[str, Any]]:
+        """Read back what ``write_table`` wrote."""
+        return [jsontext.decode(text) for text in self._read(parent[name]["json"])]
+
+    def array(self, dataset: Any) -> NDArray[np.str_]:
+        """An array of texts of any shape."""
+        if dataset.shape == ():
+            return np.asarray(self._allowed(dataset, self._texts(dataset)[()]), dtype=np.str_)
+        texts = list(self._read(dataset))
+        if len(texts) * max(map(len, texts), default=0) > LARGEST_TEXTS_BYTES:
+            raise RecordingError(f"{dataset.name}: one of its {len(texts)} texts is too long for an array of them")
+        return np.asarray(texts, dtype=np.str_).reshape(dataset.shape)
+
+    def _texts(self, dataset: Any) -> Any:
+        if dataset.dtype.kind not in "SO":
+            raise RecordingError(f"{dataset.name} is {dataset.dtype}; texts are wanted")
+        return dataset.asstr()
+
+    def _read(self, dataset: Any) -> Iterator[str]:
+        texts, width = self._texts(dataset), prod(dataset.shape[1:])
+        step = max(1, self._at_once // max(width, 1))
+        for start in range(0, dataset.shape[0] if width else 0, step):
+            for text in texts[start : start + step].reshape(-1):
+                yield self._allowed(dataset, text)
+
+    def _allowed(self, dataset: Any, text: str) -> str:
+        self._left -= len(text)
+        if len(text) > LARGEST_TEXT_BYTES or self._left < 0:
+            raise RecordingError(
+                f"{dataset.name}: its texts are too long; allowed are {LARGEST_TEXT_BYTES / 2**20:g} MiB each and "
+                f"{LARGEST_TEXTS_BYTES / 2**20:g} MiB in a file"
+            )
+        return text
 
 
 def _column(values: list[Any]) -> NDArray[Any] | None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from rig.errors import RecordingError
 from rig.reproduce.options import Options
+from rig.text_files import read_text
 
 __all__ = ["prepare", "write_json"]
 
@@ -38,9 +39,9 @@ def _same(path: Path, settings: dict[str, Any]) -> None:
         write_json(path, settings)
         return
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        kept = json.loads(read_text(path, 10_000_000, RecordingError))
         differing = [name for name in settings if kept.get(name) != settings[name]]
-    except (OSError, ValueError, AttributeError) as error:
+    except (RecordingError, RecursionError, ValueError, AttributeError) as error:
         raise RecordingError(f"{path}: cannot be read: {error}; choose another folder") from None
     if differing:
         name = differing[0]

@@ -12,6 +12,7 @@ from rig.models.predictions import CUT
 from rig.reproduce.folder import write_json
 from rig.reproduce.options import Options
 from rig.reproduce.study import VARIANTS, Study
+from rig.text_files import read_text
 
 __all__ = ["say_study", "write_tables"]
 
@@ -149,8 +150,8 @@ def _say_others(options: Options) -> None:
     rows = []
     for path in sorted(options.folder.glob("*/table.json")):
         try:
-            found = json.loads(path.read_text(encoding="utf-8"))["errors"][main]
-        except (OSError, ValueError, KeyError):
+            found = json.loads(read_text(path, 10_000_000, RecordingError))["errors"][main]
+        except (RecordingError, RecursionError, ValueError, KeyError, TypeError):
             continue
         for row in found:
             if row["model"] is None:

@@ -154,6 +154,7 @@ class _Runs:
                 progress=self.progress,
                 arm=self.arm,
                 about=self.about,
+                trust_code=True,
             )
         else:
             done = carry_out(

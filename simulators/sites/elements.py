@@ -85,9 +85,9 @@ class Cubic(LocalElement):
 
     kind: Literal["cubic"]
     """This kind of element."""
-    stiffness_n_m3: float
+    stiffness_n_m3: Annotated[float, Field(ge=-1e15, le=1e15)]
     """Cubic stiffness k3 (N/m^3); negative softens."""
-    quadratic_n_m2: float = 0.0
+    quadratic_n_m2: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
     """Quadratic stiffness k2 (N/m^2)."""
     linear_n_m: float = 0.0
     """Linear stiffness k1 (N/m)."""

@@ -2,6 +2,7 @@
 
 import ctypes
 import importlib
+import logging
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,8 @@ _ARGUMENTS = (ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 _PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, *_ARGUMENTS)
 _FUNCTION_POINTER: Any = _PROTOTYPE.__base__ or object  # what every C function object derives from
 _ALLOWED = "allowed is a numba cfunc or C function float64(float64, CPointer(float64))"
+
+_LOG = logging.getLogger(__name__)
 
 _kept: dict[int, Any] = {}
 """Objects behind the addresses that were given out: machine code must not be freed while a rig may call it."""
@@ -71,8 +74,21 @@ def _imported(name: str) -> Any:
         raise ValueError(f"function = {name!r}: allowed is 'module:name'")
     if (here := str(Path.cwd())) not in sys.path:
         sys.path.append(here)  # an installed command does not look there by itself
+    known = module in sys.modules
     try:
-        return getattr(importlib.import_module(module), attribute)
+        imported = importlib.import_module(module)
+        function = getattr(imported, attribute)
     except (Exception, SystemExit) as error:  # the user's module may fail in any way, and may end itself
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise ValueError(f"function = {name!r}: {reason}; allowed is a function that can be imported") from None
+    if not known:
+        _LOG.info("function %s imported from %s", name, _shown(getattr(imported, "__file__", None)))
+    return function
+
+
+def _shown(file: str | None) -> str:
+    """The file of a module, from the working directory where it is in there."""
+    if file is None:
+        return "no file"
+    path, here = Path(file).absolute(), Path.cwd()
+    return f"./{path.relative_to(here).as_posix()}" if path.is_relative_to(here) else str(path)

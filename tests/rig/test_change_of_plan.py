@@ -19,9 +19,10 @@ from rig.campaigns.multisine import MultisinePlan
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.models.points_left_out import points_left_out
-from rig.recording.blocks import Kind, read_journal
+from rig.recording.blocks import Kind
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
+from rig.recording.sequence import read_journal
 from rig.sequencer.segments import SettleRule
 from rig.summary import summarise
 from tests.rig.test_runs import plan_with, running
@@ -280,7 +281,7 @@ def test_a_recording_of_schema_1_goes_on_with_and_without_a_change(tmp_path, mon
         assert run.complete
         assert [point["part"] for point in run.recording.latest.values()][1] == 0
     with h5py.File(output) as file:
-        assert file.attrs["schema"] == 2
+        assert file.attrs["schema"] == 3
 
 
 def test_the_journal_of_schema_1_takes_no_change_of_plan(tmp_path, monkeypatch):
@@ -292,7 +293,7 @@ def test_the_journal_of_schema_1_takes_no_change_of_plan(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr("rig.campaigns.runner.finalise", lambda *_: None)
         rig.resume(output, plan=SECOND).close()
-    assert read_journal(journal_path(output)).header.schema == 2
+    assert read_journal(journal_path(output)).header.schema == 3
     with Recording(output) as recording:
         assert len(recording.parts) == 2
         assert recording.complete

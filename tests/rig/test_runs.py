@@ -45,7 +45,9 @@ def whole():
 
 
 CHILD = """
+import signal
 import sys
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whatever the tests are run by ignores
 import rig
 from tests.rig.test_runs import plan_with
 run = rig.run(plan_with(), output=sys.argv[1], seed=1, realtime=True)

@@ -4,10 +4,10 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from rig.bench import Bench
-from rig.configuration import Configured, validated
+from rig.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.kernels import exchange_block, fused
 from rig.drivers.virtual.loopback import loopback_of
@@ -22,6 +22,7 @@ __all__ = ["VirtualDAQ"]
 FACT_TOLERANCE = 1e-3
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
 FLAG_NAMES = tuple(str(flag.name).lower() for flag in Flag)
+GROWTH = 1e-3  # a step; of a plant that does not grow there is rounding alone, far below
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 
 
@@ -63,12 +64,34 @@ class VirtualDAQ(DAQ):
         options["converter"] = {**converter, **given}
         self.rig = validated(VirtualRig, options, "driver.options")
         self._compare_channels()
+        self._check_arrays(seed)
         self._seed = seed
         self._specimen = bench.specimen
         self._queue = np.zeros(0)
         self._loopback = loopback_of(self.channels, 0.0)
         self._counts = np.zeros(len(Flag), np.int64)
         self._first = 0
+
+    def _check_arrays(self, seed: int) -> None:
+        """Refuse, before a run has begun, parts whose arrays cannot be computed or hold numbers that are none."""
+        try:
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                arrays, _ = self.rig.build(seed)
+                delays = self.rig.channel_delays_samples
+        except ValidationError as error:  # of the specimen that scatters
+            raise ConfigurationError(f"driver.options: {explain(error, VirtualRig)}") from None
+        except (ArithmeticError, ValueError, MemoryError) as error:
+            raise ConfigurationError(
+                f"driver.options: this rig cannot be computed, a number of it is far too large or small ({error})"
+            ) from None
+        finite = all(np.all(np.isfinite(array)) for array in (arrays.step, arrays.correct, arrays.sense, delays))
+        size, first = self.rig.plant.dynamics.shape[0], self.rig.plant.site_rows.shape[0]
+        transition = arrays.step[:size, first : first + size].T  # behind the rows of the sites
+        if not finite or np.max(np.abs(np.linalg.eigvals(transition))) > 1.0 + GROWTH:
+            raise ConfigurationError(
+                "driver.options: this rig cannot be computed, its integration step grows: a mass, stiffness, resistance or "
+                "inductance is far too large or small beside the others"
+            )
 
     def _compare_channels(self) -> None:
         ours = [channel.name for channel in self.channels]

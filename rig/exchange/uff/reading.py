@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from rig.exchange.mat import ImportFailed
+from rig.text_files import read_bytes
 
 __all__ = ["Dataset", "degree_of", "read_uff"]
 
 Dataset = Mapping[str, Any]
+LARGEST_BYTES = 2_000_000_000
 _KNOWN = (55, 58, 151, 164)
 _DIRECTION = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 
@@ -23,10 +25,7 @@ def read_uff(path: Path) -> list[Dataset]:
     """
     import pyuff
 
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise ImportFailed(f"{path}: cannot be read ({error.strerror})") from None
+    text = read_bytes(path, LARGEST_BYTES, ImportFailed)
     if not re.match(rb"\s*-1\s*[\r\n]+\s*\d+", text[:400]):
         raise ImportFailed(f"{path}: is no universal file; those begin with a line -1 and a dataset's number")
     if not text.rstrip().endswith(b"    -1"):

@@ -7,9 +7,12 @@ import cantools
 import numpy as np
 
 from rig.errors import ConfigurationError
+from rig.text_files import read_text
 from rig.wire.can.layout import STRUCT_CODES, CompiledMessage, Layout
 
 __all__ = ["compile_layout", "compile_text"]
+
+LARGEST_DBC_BYTES = 10_000_000
 
 
 def compile_layout(path: str | Path) -> Layout:
@@ -17,10 +20,7 @@ def compile_layout(path: str | Path) -> Layout:
 
     Raises `ConfigurationError`, naming file, message and signal, for what cannot be read or compiled.
     """
-    try:
-        text = Path(path).read_text(encoding="cp1252")  # the encoding of DBC files
-    except OSError as error:
-        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}") from None
+    text = read_text(Path(path), LARGEST_DBC_BYTES, encoding="cp1252")  # the encoding of DBC files
     return compile_text(text, str(path))
 
 

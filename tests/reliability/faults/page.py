@@ -1,17 +1,13 @@
 """The tables of the page of the fault matrix: what every fault did, with date, machine and version."""
 
-import os
-import platform
 from collections.abc import Mapping
-from datetime import UTC, datetime
-from pathlib import Path
 
-import vibrolock
 from tests.reliability.faults.bounds import objections
 from tests.reliability.faults.matrix import CASES, Case
 from tests.reliability.faults.observing import Observation
 from tests.reliability.faults.plans import bench_for
 from tests.reliability.faults.table import FAULTS
+from tests.reliability.pages import between, measured
 
 __all__ = ["BEGIN", "END", "TABLES", "rows_of", "written"]
 
@@ -27,29 +23,14 @@ BEGIN, END = "<!-- begin of what the command writes -->", "<!-- end of what the 
 
 def written(text: str, observed: Mapping[Case, Observation]) -> str:
     """A page with the tables of what was observed between its two marks; its prose stays."""
-    before, rest = text.split(BEGIN)
-    after = rest.split(END)[1]
     tables = [f"## {heading}\n\n{_table(observed, *columns)}" for heading, columns in TABLES.items()]
-    return "\n\n".join((f"{before}{BEGIN}", _measured(), *tables, f"{END}{after}"))
+    return between(text, BEGIN, END, "\n\n".join((measured(), *tables)))
 
 
 def rows_of(text: str, heading: str) -> set[str]:
     """Names of the faults in a table of the page."""
     part = text.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
     return {line.split("`")[1] for line in part.splitlines() if line.startswith("| `")}
-
-
-def _measured() -> str:
-    day = datetime.now(UTC).date().isoformat()
-    return f"Measured on {day} with vibrolock {vibrolock.__version__}, {_processor()}, {os.cpu_count()} cores."
-
-
-def _processor() -> str:
-    """Name of the processor, as the system tells it."""
-    known = Path("/proc/cpuinfo")
-    lines = known.read_text(encoding="utf-8").splitlines() if known.exists() else []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
 
 
 def _table(observed: Mapping[Case, Observation], device: str, columns: tuple[str, ...]) -> str:

@@ -90,7 +90,7 @@ def test_a_finished_plan_has_no_segments_left():
         ({"stop_deg": -130.0}, r"stop_deg = -130: allowed is above start_deg"),
         ({"phase_lags_deg": [-90.0]}, "exactly one of the two"),
         ({"stop_deg": None}, "exactly one of the two"),
-        ({"step_deg": 0.001}, "step_deg = 0.001: allowed are up to 10000 lags"),
+        ({"step_deg": 0.001}, r"step_deg: .* 60001 \(step_deg\) are 120002 points, allowed are up to 10000"),
         ({"controller": TABLE["controller"] | {"phase_lag_deg": -80.0}}, r"controller.phase_lag_deg = -80"),
         ({"controller": TABLE["controller"] | {"detector": "sign"}}, "knows phase resonance only"),
     ],

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 from rig.recording.header import Column, Header
@@ -63,6 +64,12 @@ def journal(path: Path, n: int = 1000, **changes) -> Path:
     """A journal at ``path`` with one ended part of ``n`` rows."""
     with JournalWriter.create(path, header(**changes)) as writer:
         fill(writer, 0, n)
+    return path
+
+
+def without_digest(path: Path) -> Path:
+    """The HDF5 file at ``path`` as a program leaves it that has opened it for writing and changed nothing."""
+    h5py.File(path, "r+").close()
     return path
 
 

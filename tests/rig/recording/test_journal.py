@@ -18,18 +18,37 @@ from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path, read_journal
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
 
+HEAD = 36
+
 
 def blocks_by_hand(data):
-    """An independent reading of the documented layout: (kind, sequence, payload) of every block."""
-    found, position = [], 0
+    """An independent reading of the documented layout: (kind, sequence, payload) of every block, and where each belongs."""
+    found, position, part, row = [], 0, 0, 0
     while position < len(data):
-        magic, version, kind, length, sequence, crc = struct.unpack_from("<4sHHIQI", data, position)
-        payload = data[position + 24 : position + 24 + length]
-        assert (magic, version) == (b"VLJB", 1)
-        assert crc == zlib.crc32(data[position : position + 20] + payload)
+        magic, version, kind, length, sequence, of_part, before, crc = struct.unpack_from("<4sHHIQIQI", data, position)
+        payload = data[position + HEAD : position + HEAD + length]
+        assert (magic, version) == (b"VLJB", 2)
+        assert crc == zlib.crc32(data[position : position + HEAD - 4] + payload)
+        if kind == 2 and (not found or found[-1] != (2, sequence - 1, payload)):
+            part, row = part + 1, 0
+        assert (of_part, before) == (part, row)
+        row += length // ROW.itemsize if kind == 3 else 0
         found.append((kind, sequence, payload))
-        position += 24 + length
+        position += HEAD + length
     return found
+
+
+def packed_by_hand(blocks, version=2):
+    """The bytes of blocks (kind, payload) with right checksums, as documented for a version."""
+    data, part, row = b"", 0, 0
+    for sequence, (kind, payload) in enumerate(blocks):
+        if kind == 2 and (version == 1 or sequence == 0 or blocks[sequence - 1] != (kind, payload)):
+            part, row = part + 1, 0
+        head = struct.pack("<4sHHIQ", b"VLJB", version, kind, len(payload), sequence)
+        head += struct.pack("<IQ", part, row) if version == 2 else b""
+        data += head + struct.pack("<I", zlib.crc32(head + payload)) + payload
+        row += len(payload) // ROW.itemsize if kind == 3 else 0
+    return data
 
 
 def test_the_journal_of_a_recording_lies_beside_it(tmp_path):
@@ -39,10 +58,12 @@ def test_the_journal_of_a_recording_lies_beside_it(tmp_path):
 def test_a_journal_has_the_documented_layout(tmp_path):
     path = journal(tmp_path / "a.journal", 250)
     found = blocks_by_hand(path.read_bytes())
-    assert [kind for kind, _, _ in found] == [1, 2, 4, 3, 3, 3, 5, 6]
-    assert [sequence for _, sequence, _ in found] == list(range(8))
+    assert [kind for kind, _, _ in found] == [1, 1, 2, 2, 4, 3, 3, 3, 5, 6]
+    assert [sequence for _, sequence, _ in found] == list(range(10))
+    assert found[0][2] == found[1][2]
+    assert found[2][2] == found[3][2]
     assert json.loads(found[0][2])["configuration"] == header().configuration
-    assert json.loads(found[6][2])["harmonics"] == [1.0, 0.5]
+    assert json.loads(found[8][2])["harmonics"] == [1.0, 0.5]
     assert b"".join(payload for kind, _, payload in found if kind == 3) == rows(0, 250).tobytes()
 
 
@@ -102,7 +123,7 @@ def test_a_torn_tail_is_cut_off_and_the_sequence_goes_on(tmp_path):
     whole = path.read_bytes()
     path.write_bytes(whole[:-5])
     with JournalWriter.reopen(path) as writer:
-        assert writer.dropped.n_bytes == len(whole) - 5 - sum(24 + len(b[2]) for b in blocks_by_hand(whole)[:-1])
+        assert writer.dropped.n_bytes == len(whole) - 5 - sum(HEAD + len(b[2]) for b in blocks_by_hand(whole)[:-1])
         assert "the file ends within a block" in writer.dropped.reason
         assert (writer.n_rows, writer.n_points, writer.n_parts) == (1000, 1, 1)
         fill(writer, 1000, 200)
@@ -114,22 +135,116 @@ def test_a_torn_tail_is_cut_off_and_the_sequence_goes_on(tmp_path):
         assert [part.end is None for part in contents.parts] == [True, False]
 
 
-def test_damage_amid_the_file_is_told_from_a_torn_tail_and_nothing_is_thrown_away(tmp_path):
+def test_damage_amid_the_file_is_told_and_what_follows_it_is_kept(tmp_path):
     path = journal(tmp_path / "a.journal", 1000)
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
     with JournalWriter.reopen(path) as writer:
-        assert not writer.dropped.torn
-        assert "checksum" in writer.dropped.reason
-    assert (tmp_path / "a.journal.damaged").read_bytes() == data
+        assert writer.dropped.n_bytes == 0
+        assert (writer.n_rows, writer.n_points, writer.n_parts) == (1000, 1, 1)
+        fill(writer, 1000, 200)
+    assert path.read_bytes()[: len(data)] == data
+    with JournalContents(path) as contents:
+        assert contents.damaged
+        assert [part.n_rows for part in contents.parts] == [1000, 200]
+        told = contents.parts[0].dropped_reason
+        assert "1 block of" in told
+        assert "checksum does not match (at byte" in told
+        assert "which are not numbers now" in told
+        assert contents.parts[1].dropped_reason == ""
+
+
+@pytest.mark.parametrize("where", [0, 20, 33, 50])
+def test_a_changed_byte_costs_its_block_and_nothing_else_whichever_it_is(tmp_path, original, where):
+    path, position, whole = tmp_path / "a.journal", 0, blocks_by_hand(original)
+    for index, (kind, _, payload) in enumerate(whole):
+        data = bytearray(original)
+        data[position + min(where, HEAD + len(payload) - 1)] ^= 0x40
+        path.write_bytes(data)
+        position += HEAD + len(payload)
+        with JournalContents(path) as contents:
+            last = index == len(whole) - 1
+            assert contents.damaged is not last
+            assert sum(part.dropped_bytes for part in contents.parts) == HEAD + len(payload)
+            assert [part.n_rows for part in contents.parts] == [40, 30]
+            got = np.concatenate([all_rows(part) for part in contents.parts])
+            points = sum(len(part.points) for part in contents.parts)
+            ends = sum(part.end is not None for part in contents.parts)
+        lost = len(payload) // ROW.itemsize if kind == 3 else 0
+        assert np.isnan(got["frequency_hz"]).sum() == lost
+        good = np.isfinite(got["frequency_hz"])
+        assert got[good].tobytes() == rows(0, 70)[good].tobytes()
+        assert points == 2 - (kind == 5)
+        assert ends == 2 - (kind == 6)
+
+
+def test_where_the_beginning_of_a_part_is_lost_twice_the_other_parts_are_read_and_it_is_told(tmp_path, original):
+    kinds = [kind for kind, _, _ in blocks_by_hand(original)]
+    data, position = bytearray(original), 0
+    for index, (_, _, payload) in enumerate(blocks_by_hand(original)):
+        if kinds[index] == 2 and index > 5:
+            data[position + HEAD] ^= 1
+        position += HEAD + len(payload)
+    path = tmp_path / "a.journal"
+    path.write_bytes(data)
+    with JournalContents(path) as contents:
+        assert [part.n_rows for part in contents.parts] == [40]
+        assert "the beginning of part 2 is lost; all of that part" in contents.parts[0].dropped_reason
+
+
+def test_a_journal_of_blocks_of_version_1_is_read_up_to_its_first_damage(tmp_path, original):
+    blocks = [(kind, payload) for kind, _, payload in blocks_by_hand(original)]
+    once = [block for index, block in enumerate(blocks) if block[0] > 2 or block != blocks[index - 1]]
+    path = tmp_path / "a.journal"
+    path.write_bytes(packed_by_hand(once, version=1))
+    with JournalContents(path) as contents:
+        assert not contents.damaged
+        assert np.concatenate([all_rows(part) for part in contents.parts]).tobytes() == rows(0, 70).tobytes()
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with JournalContents(path) as contents:
+        assert contents.damaged
+        assert 0 < sum(part.n_rows for part in contents.parts) < 70
+        assert "checksum" in contents.parts[-1].dropped_reason
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows removes no open file")
+@pytest.mark.parametrize("gone", ["removed", "renamed", "folder removed"])
+def test_a_journal_that_loses_its_name_while_it_is_written_is_noticed_and_saved(tmp_path, monkeypatch, gone):
+    now = [100.0]
+    monkeypatch.setattr(appending.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(appending.tempfile, "tempdir", str(tmp_path))
+    folder = tmp_path / "results"
+    folder.mkdir()
+    path = folder / "a.journal"
+    with JournalWriter.create(path, header()) as writer:
+        writer.part({})
+        writer.rows(rows(0, 100))
+        if gone == "renamed":
+            path.rename(folder / "b.journal")
+        else:
+            path.unlink()
+        if gone == "folder removed":
+            folder.rmdir()
+        writer.rows(rows(100, 150))
+        now[0] += 0.6
+        with pytest.raises(RecordingError, match="was removed or renamed while it was written; its 200 rows") as told:
+            writer.rows(rows(150, 200))
+        with pytest.raises(RecordingError, match="closed"):
+            writer.rows(rows(200, 250))
+    place = {"removed": path, "renamed": folder / "b.journal"}.get(gone) or next(tmp_path.glob("vibrolock-*/a.journal"))
+    assert gone == "renamed" or str(place) in str(told.value)
+    with JournalContents(place) as contents:
+        assert all_rows(contents.parts[0]).tobytes() == rows(0, 200).tobytes()
 
 
 def test_a_tail_of_zeros_as_a_power_cut_leaves_it_is_torn(tmp_path):
     path = journal(tmp_path / "a.journal", 300)
     path.write_bytes(path.read_bytes() + bytes(5000))
     blocks = read_journal(path)
-    assert sum(1 for _ in blocks) == 7
+    assert sum(1 for _ in blocks) == 9
     assert (blocks.tail.n_bytes, blocks.tail.torn) == (5000, True)
 
 
@@ -168,19 +283,20 @@ def test_what_is_no_journal_is_refused_and_left_alone(tmp_path, content, message
 
 
 def test_a_journal_of_a_later_schema_asks_for_an_update(tmp_path, monkeypatch):
-    monkeypatch.setattr("rig.recording.header.SCHEMA", 3)
+    monkeypatch.setattr("rig.recording.header.SCHEMA", 4)
     path = journal(tmp_path / "a.journal", 10)
     monkeypatch.undo()
-    with pytest.raises(RecordingError, match="written by schema 3, this version reads up to 2; update"):
+    with pytest.raises(RecordingError, match="written by schema 4, this version reads up to 3; update"):
         read_journal(path)
 
 
 def test_a_later_block_version_asks_for_an_update(tmp_path):
     path = journal(tmp_path / "a.journal", 10)
     data = bytearray(path.read_bytes())
-    data[4] = 2
+    for start in (index for index in range(len(data)) if data.startswith(b"VLJB", index)):
+        data[start + 4] = 3
     path.write_bytes(data)
-    with pytest.raises(RecordingError, match="journal version 2, this version reads 1; update"):
+    with pytest.raises(RecordingError, match="journal version 3, this version reads up to 2; update"):
         read_journal(path)
 
 
@@ -296,69 +412,67 @@ def mutated(data, mutations):
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mutations=MUTATIONS)
-def test_of_a_damaged_journal_the_intact_beginning_is_recovered_and_nothing_else(tmp_path, original, mutations):
+def test_of_a_damaged_journal_whole_blocks_are_recovered_in_their_places_and_nothing_else(
+    tmp_path, original, mutations
+):
     data = mutated(original, mutations)
     same = [a == b for a, b in zip(original, data, strict=False)]
     intact = same.index(False) if False in same else len(same)
-    expected, position = [], 0
-    for kind, sequence, payload in blocks_by_hand(original):
-        position += 24 + len(payload)
-        if position <= intact:
-            expected.append((kind, sequence, payload))
+    whole = blocks_by_hand(original)
     path = tmp_path / "a.journal"
     path.write_bytes(data)
-    if not expected:
-        with pytest.raises(RecordingError):
-            read_journal(path)
+    try:
+        blocks = read_journal(path)
+        found = [(int(block.kind), block.sequence, block.payload) for block in blocks]
+        contents = JournalContents(path)
+    except RecordingError:
+        assert intact < sum(HEAD + len(whole[i][2]) for i in range(3))  # neither the header nor a part is there
         return
-    blocks = read_journal(path)
-    found = [(int(block.kind), block.sequence, block.payload) for block in blocks]
-    assert found[: len(expected) - 1] == expected[1:]
-    whole = blocks_by_hand(original)[1:]
-    assert found == whole[: len(found)]
-    assert 24 + len(blocks._first.payload) + sum(24 + len(p) for _, _, p in found) + blocks.tail.n_bytes == len(data)
-    assert bool(blocks.tail.reason) == bool(blocks.tail.n_bytes)
+    with contents:
+        assert set(found) <= set(whole)
+        assert [sequence for _, sequence, _ in found] == sorted({sequence for _, sequence, _ in found})
+        position = 0
+        for block in whole:
+            position += HEAD + len(block[2])
+            assert position > intact or block in [whole[0], *found]
+        for part in contents.parts:
+            first, got = part.information["first_sample"], all_rows(part)
+            good = np.isfinite(got["frequency_hz"])
+            assert got[good].tobytes() == rows(first, first + part.n_rows)[good].tobytes()
+        n_rows = sum(part.n_rows for part in contents.parts)
     with JournalWriter.reopen(path) as writer:
-        assert writer.n_rows == sum(len(p) for kind, _, p in found if kind == 3) // ROW.itemsize
+        assert writer.n_rows == n_rows
         fill(writer, 70, 5)
-    assert [(k, s, p) for k, s, p in blocks_by_hand(path.read_bytes())][1 : len(found) + 1] == found
-    for aside in tmp_path.glob("*.damaged*"):
-        assert aside.read_bytes() == data
-        aside.unlink()
+    with JournalContents(path) as after:
+        assert sum(part.n_rows for part in after.parts) == n_rows + 5
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(kind=st.integers(0, 9), payload=st.binary(max_size=80), at=st.integers(0, 15))
-def test_blocks_with_a_right_checksum_and_wrong_content_end_the_reading_without_a_crash(
-    tmp_path, original, kind, payload, at
+@given(kind=st.integers(0, 9), payload=st.binary(max_size=80), at=st.integers(0, 15), version=st.integers(1, 2))
+def test_blocks_with_a_right_checksum_and_wrong_content_are_passed_over_without_a_crash(
+    tmp_path, original, kind, payload, at, version
 ):
-    blocks = blocks_by_hand(original)
+    blocks = [(kind, content) for kind, _, content in blocks_by_hand(original)]
     at %= len(blocks)
-    blocks.insert(at, (kind, at, payload))
-    data = b""
-    for sequence, (number, _, content) in enumerate(blocks):
-        head = struct.pack("<4sHHIQ", b"VLJB", 1, number, len(content), sequence)
-        data += head + struct.pack("<I", zlib.crc32(head + content)) + content
+    blocks.insert(at, (kind, payload))
     path = tmp_path / "a.journal"
-    path.write_bytes(data)
-    if at == 0:
-        with pytest.raises(RecordingError):
-            JournalContents(path)
-        return
-    with JournalContents(path) as contents:
-        assert at <= contents.n_blocks <= len(blocks)
-        assert contents.size + contents.tail.n_bytes == len(data)
+    path.write_bytes(packed_by_hand(blocks, version))
+    try:
+        with JournalContents(path) as contents:
+            assert contents.n_blocks <= len(blocks)
+            assert contents.size + contents.tail.n_bytes == path.stat().st_size
+    except RecordingError:
+        assert at < 4 or kind == 1  # what stands before the first rows, or another header
 
 
 def test_deeply_nested_json_is_a_bad_block_and_no_crash(tmp_path, original):
     deep = b'{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}"
-    sequence = len(blocks_by_hand(original))
-    head = struct.pack("<4sHHIQ", b"VLJB", 1, Kind.PART, len(deep), sequence)
+    blocks = [(kind, payload) for kind, _, payload in blocks_by_hand(original)]
     path = tmp_path / "a.journal"
-    path.write_bytes(original + head + struct.pack("<I", zlib.crc32(head + deep)) + deep)
-    blocks = read_journal(path)
-    assert len(list(blocks)) == sequence - 1
-    assert "cannot be read" in blocks.tail.reason
+    path.write_bytes(packed_by_hand([*blocks, (Kind.PART, deep)]))
+    found = read_journal(path)
+    assert len(list(found)) == len(blocks) - 1
+    assert "cannot be read" in found.tail.reason
 
 
 def test_a_journal_of_any_length_is_read_in_little_memory(tmp_path):
@@ -383,12 +497,12 @@ def test_a_journal_of_any_length_is_read_in_little_memory(tmp_path):
 def test_an_absurd_length_is_not_believed(tmp_path):
     path = journal(tmp_path / "a.journal", 10)
     whole = path.read_bytes()
-    head = struct.pack("<4sHHIQI", b"VLJB", 1, 3, 2 * LARGEST_PAYLOAD, 6, 0)
+    head = struct.pack("<4sHHIQIQI", b"VLJB", 2, 3, 2 * LARGEST_PAYLOAD, 8, 1, 10, 0)
     with path.open("ab") as stream:
         stream.write(head)
         stream.truncate(len(whole) + 3 * LARGEST_PAYLOAD)
     blocks = read_journal(path)
-    assert [block.sequence for block in blocks] == [1, 2, 3, 4, 5]
+    assert [block.sequence for block in blocks] == [1, 2, 3, 4, 5, 6, 7]
     assert "a length of 33554432 bytes" in blocks.tail.reason
 
 

@@ -1,5 +1,6 @@
 import errno
 import os
+import shutil
 from pathlib import Path
 
 import h5py
@@ -13,7 +14,7 @@ from rig.recording.arrays import kind_of, read_arrays, write_arrays
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.recording.store import continue_recording, finalise
-from tests.rig.recording.samples import header, journal, rows
+from tests.rig.recording.samples import header, journal, without_digest
 
 
 @pytest.fixture
@@ -77,7 +78,7 @@ def test_an_hdf5_file_of_another_program_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("schema", "message"),
-    [(3, "written by schema 3, this version reads up to 2; update"), ("x", "damaged: schema 'x'")],
+    [(4, "written by schema 4, this version reads up to 3; update"), ("x", "damaged: schema 'x'")],
 )
 def test_a_later_or_impossible_schema_is_refused(output, schema, message):
     with h5py.File(output, "r+") as file:
@@ -105,27 +106,44 @@ def test_a_file_that_lacks_something_is_called_damaged(output, lost):
         Recording(output)
 
 
-def test_a_flipped_bit_in_the_rows_is_noticed_by_the_checksum(output):
+def test_a_flipped_bit_in_rows_without_a_digest_is_noticed_by_their_checksum(output):
+    without_digest(output)
     with h5py.File(output) as file:
         chunk = file["parts/0/rows/inputs"].id.get_chunk_info(0)
     data = bytearray(output.read_bytes())
     data[chunk.byte_offset + chunk.size // 2] ^= 4
     output.write_bytes(data)
-    with Recording(output) as recording:
-        assert np.array_equal(recording.parts[0].rows("theta_rad"), rows(0, 3000)["theta_rad"])
-        with pytest.raises(RecordingError, match="damaged: cannot be read"):
-            recording.parts[0].rows("inputs")
+    with pytest.raises(RecordingError, match="damaged: cannot be read"):
+        Recording(output)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1, exclude_max=True), value=st.integers(1, 255))
-def test_a_changed_byte_anywhere_in_the_file_gives_one_clear_line_or_a_readable_recording(output, where, value):
+def test_a_changed_byte_anywhere_in_the_file_is_refused_in_one_clear_line(output, where, value):
     broken = bytearray(output.read_bytes())
     broken[int(where * len(broken))] ^= value
+    path = output.with_name("broken.h5")
+    path.write_bytes(broken)
+    with pytest.raises(RecordingError) as refused:
+        Recording(path)
+    line = str(refused.value)
+    assert line == f"{path}: damaged: its digest does not match (a byte has changed since it was written)" or line == (
+        f"{path}: not a file of vibrolock, but no HDF5 file"
+    )
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(where=st.floats(0, 1, exclude_max=True), value=st.integers(1, 255))
+def test_without_a_digest_a_changed_byte_gives_one_clear_line_or_a_readable_recording(output, where, value):
     path, message, n_read = output.with_name("broken.h5"), "", 0
+    shutil.copy(output, path)
+    without_digest(path)
+    broken = bytearray(path.read_bytes())
+    broken[int(where * len(broken))] ^= value
     path.write_bytes(broken)
     try:
         with Recording(path) as recording:
+            assert recording.integrity.startswith("unverified: ")
             n_read = sum(len(recording.parts[0].rows(name)) for name in recording.parts[0].row_dtype.names)
     except RecordingError as error:
         message = str(error)
@@ -182,7 +200,7 @@ def test_arrays_and_attributes_come_back_as_they_were(tmp_path):
         np.testing.assert_array_equal(found[name], values)
         assert found[name].shape == values.shape
     with h5py.File(path) as file:
-        assert (file.attrs["format"], file.attrs["schema"]) == ("vibrolock", 2)
+        assert (file.attrs["format"], file.attrs["schema"]) == ("vibrolock", 3)
         assert file["arrays/force_n"][-1] == 0.56
 
 

@@ -34,7 +34,7 @@ def test_plain_h5py_reads_what_was_recorded(output):
     with h5py.File(output) as file:
         assert dict(file.attrs) | {"identity": ""} == {
             "format": "vibrolock",
-            "schema": 2,
+            "schema": 3,
             "kind": "backbone",
             "software_version": "0.1.0",
             "started": "2031-05-01T12:00:00Z",

@@ -1,0 +1,77 @@
+"""Reading in a child process: what crashes, hangs or asks for all memory there ends there.
+
+The child is a program of its own, so that a user's script needs no guard around its main part. Its memory and time are
+limited where the system can do that (Linux, macOS), and it ends with its parent.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+__all__ = ["MEMORY_BYTES", "ChildFailed", "ask_child", "confine"]
+
+MEMORY_BYTES = 4 * 2**30
+"""Address space of a child."""
+
+
+class ChildFailed(Exception):  # noqa: N818 (says what happened)
+    """A child gave no answer; the message says how it ended, as the end of a sentence."""
+
+
+def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
+    """What ``python -m MODULE ARGUMENTS TIMEOUT_S`` prints; raises `ChildFailed` where it crashes or takes too long."""
+    theirs, ours = os.pipe()
+    try:
+        child = subprocess.Popen(
+            [sys.executable, "-P", "-m", module, *arguments, f"{timeout_s:.0f}"],
+            stdin=theirs,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # noqa: PTH109
+                "OPENBLAS_NUM_THREADS": "1",  # each thread reserves address space
+            },
+        )
+    except OSError as error:
+        os.close(ours)
+        raise ChildFailed(f"cannot be started ({error.strerror})") from error
+    finally:
+        os.close(theirs)
+    try:
+        answer, _ = child.communicate(timeout=timeout_s)
+    except subprocess.TimeoutExpired:
+        raise ChildFailed(f"took more than {timeout_s:.0f} s") from None
+    finally:
+        os.close(ours)
+        child.kill()
+        child.communicate()
+    if child.returncode:
+        raise ChildFailed(f"crashed ({_how(child.returncode)})")
+    return answer
+
+
+def _how(status: int) -> str:
+    with contextlib.suppress(ValueError):
+        return signal.Signals(-status).name
+    return f"status {status}"
+
+
+def confine(cpu_s: float) -> None:
+    """Called by the child: limit its memory and time, leave Ctrl-C to the parent, and end when the parent has ended."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with contextlib.suppress(ImportError, ValueError, OSError):  # not on Windows; a lower limit may be in force
+        import resource
+
+        for what, most in ((resource.RLIMIT_CPU, int(cpu_s) + 1), (resource.RLIMIT_AS, MEMORY_BYTES)):
+            resource.setrlimit(what, (most, most))
+
+
+def _end_with_parent() -> None:
+    """Nobody writes to the child's input: it ends when the parent closes it or has ended."""
+    os.read(0, 1)
+    os._exit(1)

@@ -1,0 +1,109 @@
+"""What no file of ours holds, refused before any value is read: links elsewhere, data elsewhere, sizes without data."""
+
+from collections.abc import Iterator
+from math import ceil, prod
+from typing import Any
+
+from rig.errors import RecordingError
+
+__all__ = ["LARGEST_RATIO", "MOST_OBJECTS", "check_attributes", "examine", "objects_in"]
+
+MOST_OBJECTS = 200_000
+"""Groups and datasets of a file; a recording of 1000 parts has about 60 000."""
+LARGEST_RATIO = 200
+"""Bytes that the datasets of a file may declare, per byte of the file: our compression (LZF) reaches 88 on zeros."""
+
+_SMALL_BYTES = 2**26
+_LARGEST_CHUNK_BYTES = 2**28
+_LARGEST_ATTRIBUTE_BYTES = 2**16
+_MOST_ATTRIBUTES = 1000
+_MOST_TEXTS = 2**22
+
+
+def examine(file: Any, size: int) -> None:
+    """Look at every object of an open HDF5 file of ``size`` bytes, but at none of its values.
+
+    Raises:
+        RecordingError: it names the object, what it holds and what is allowed; without the file's name.
+    """
+    declared = texts = 0
+    for item in objects_in(file):
+        check_attributes(item)
+        if hasattr(item, "shape"):
+            _check_storage(item)
+            if item.dtype.kind == "O":
+                texts += item.size
+            else:
+                declared += item.size * item.dtype.itemsize
+    if declared > max(_SMALL_BYTES, LARGEST_RATIO * size):
+        raise RecordingError(
+            f"its datasets declare {declared} bytes in a file of {size}; allowed are {LARGEST_RATIO} times its size"
+        )
+    if texts > min(_MOST_TEXTS, size):
+        raise RecordingError(f"its datasets declare {texts} texts; allowed are {min(_MOST_TEXTS, size)}")
+
+
+def objects_in(file: Any) -> Iterator[Any]:
+    """Every group and dataset, the root first; each once, for all are linked once.
+
+    Raises:
+        RecordingError: a link that is not a plain one, an object with two names, or too many of them.
+    """
+    import h5py
+
+    seen, waiting = {h5py.h5o.get_info(file.id).addr}, [file["/"]]
+    while waiting:
+        group = waiting.pop()
+        yield group
+        for name in group:
+            where = f"{group.name.rstrip('/')}/{name}"
+            if type(group.get(name, getlink=True)) is not h5py.HardLink:
+                raise RecordingError(f"{where} is a link to elsewhere; a file of its own is wanted, without soft links")
+            item = group[name]
+            address = h5py.h5o.get_info(item.id).addr
+            if address in seen:
+                raise RecordingError(f"{where} is another name of an object; allowed is one name for each")
+            seen.add(address)
+            if len(seen) > MOST_OBJECTS:
+                raise RecordingError(f"it holds more than {MOST_OBJECTS} groups and datasets")
+            if isinstance(item, h5py.Group):
+                waiting.append(item)
+            elif isinstance(item, h5py.Dataset):
+                yield item
+            else:
+                raise RecordingError(f"{where} is a {type(item).__name__}; allowed are groups and datasets")
+
+
+def check_attributes(item: Any) -> None:
+    """Refuse an object with too many or too large attributes by `RecordingError`, before one of them is read."""
+    if len(item.attrs) > _MOST_ATTRIBUTES:
+        raise RecordingError(f"{item.name} has {len(item.attrs)} attributes; allowed are {_MOST_ATTRIBUTES}")
+    for name in item.attrs:
+        stored = item.attrs.get_id(name)
+        if prod(stored.shape) * stored.dtype.itemsize > _LARGEST_ATTRIBUTE_BYTES:
+            raise RecordingError(f"{item.name}: its attribute {name!r} is longer than {_LARGEST_ATTRIBUTE_BYTES} bytes")
+
+
+def _check_storage(dataset: Any) -> None:
+    """Refuse values that lie elsewhere or nowhere, and types other than numbers and texts."""
+    import h5py
+
+    if dataset.is_virtual or dataset.external:
+        raise RecordingError(f"{dataset.name} keeps its values in another file; allowed are values of its own")
+    if dataset.shape is None or dataset.dtype.kind not in "biufcSO":
+        raise RecordingError(f"{dataset.name} is {dataset.dtype}; numbers or texts are wanted")
+    if dataset.dtype.kind == "O" and h5py.check_string_dtype(dataset.dtype) is None:
+        raise RecordingError(f"{dataset.name} holds lists or references; numbers or texts are wanted")
+    if dataset.size == 0:
+        return
+    if dataset.chunks is None:
+        if dataset.dtype.kind != "O" and dataset.id.get_storage_size() < dataset.nbytes:
+            raise RecordingError(
+                f"{dataset.name} declares {dataset.nbytes} bytes and stores {dataset.id.get_storage_size()}"
+            )
+        return
+    if prod(dataset.chunks) * dataset.dtype.itemsize > _LARGEST_CHUNK_BYTES:
+        raise RecordingError(f"{dataset.name} has chunks of {dataset.chunks}; allowed are {_LARGEST_CHUNK_BYTES} bytes")
+    chunks = prod(ceil(length / chunk) for length, chunk in zip(dataset.shape, dataset.chunks, strict=True))
+    if dataset.id.get_num_chunks() != chunks:
+        raise RecordingError(f"{dataset.name} declares {chunks} chunks and stores {dataset.id.get_num_chunks()}")

@@ -1,0 +1,57 @@
+"""Whether a file is as it was written: by its digest, or by reading all of it in a child process first."""
+
+import json
+import time
+from pathlib import Path
+
+from rig.child import MEMORY_BYTES, ChildFailed, ask_child
+from rig.errors import RecordingError
+from rig.recording.trailer import digest_matches
+
+__all__ = ["FIRST_WITH_DIGEST", "VERIFIED", "integrity_of"]
+
+VERIFIED = "verified"
+FIRST_WITH_DIGEST = 3
+"""Schema from which on every HDF5 file has a digest."""
+
+_PATIENCE_S, _SLOWEST_BYTES_S = 60.0, 5e6
+_SETTLED_S = 2.0
+
+_known: dict[tuple[Path, int, int, int, int, int], str] = {}
+"""What was found, by all that tells one state of a file from another."""
+
+
+def integrity_of(path: Path) -> str:
+    """``"verified"`` where the digest matches, else ``"unverified: WHY"``: the file is whole, but anyone may have changed it.
+
+    What has no digest is first read by a child process, all of it, for at most 60 s and 1 s per 5 MB, in 4 GiB: bytes that
+    crash the HDF5 library crash that.
+
+    Raises:
+        RecordingError: the digest does not match, or the file cannot be read from beginning to end.
+        OSError: there is no such file, or it may not be read.
+    """
+    facts = path.stat()
+    state = (path.absolute(), facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns)
+    if state not in _known:
+        # A change within one tick of the file system's clock leaves its times as they are: what is new is not remembered.
+        settled = time.time() - max(facts.st_mtime, facts.st_ctime) > _SETTLED_S
+        found = VERIFIED if digest_matches(path) else _read_by_child(path, facts.st_size)
+        if not settled:
+            return found
+        _known[state] = found
+    return _known[state]
+
+
+def _read_by_child(path: Path, size: int) -> str:
+    try:
+        answer = json.loads(ask_child("rig.recording.walk", str(path), timeout_s=_PATIENCE_S + size / _SLOWEST_BYTES_S))
+    except ChildFailed as error:
+        raise RecordingError(f"{path}: damaged: the HDF5 library {error} over it") from error
+    if answer["memory"]:
+        raise RecordingError(f"{path}: damaged: reading it takes more than {MEMORY_BYTES / 2**30:g} GiB of memory")
+    if answer["refused"]:
+        raise RecordingError(answer["refused"])
+    if answer["schema"] < FIRST_WITH_DIGEST:
+        return f"unverified: written by schema {answer['schema']}, which has no digest"
+    return "unverified: its digest is gone; another program has changed or rewritten it, or cut off its end"

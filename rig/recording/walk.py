@@ -1,0 +1,47 @@
+"""Read an HDF5 file from beginning to end and print a verdict: the child process of `rig.recording.integrity`."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rig.child import confine
+from rig.errors import RecordingError
+from rig.recording.examination import objects_in
+from rig.recording.layout import open_unchecked, reading
+
+__all__ = ["main"]
+
+_AT_ONCE = 2**22
+
+
+def main(path: Path) -> dict[str, Any]:
+    """The verdict: why the file is refused, if it is, whether memory did not suffice, and the file's schema."""
+    verdict: dict[str, Any] = {"refused": "", "memory": False, "schema": 0}
+    try:
+        with open_unchecked(path) as file, reading(path):
+            verdict["schema"] = int(file.attrs["schema"])
+            for item in objects_in(file):
+                dict(item.attrs)
+                if hasattr(item, "shape"):
+                    _read_all(item)
+    except RecordingError as error:
+        verdict["memory"] = isinstance(error.__cause__, MemoryError)
+        verdict["refused"] = str(error)
+    return verdict
+
+
+def _read_all(dataset: Any) -> None:
+    """Read a dataset chunk by chunk, or by rows of some megabytes."""
+    if dataset.shape == () or 0 in dataset.shape:
+        dataset[()]
+        return
+    step = max(1, _AT_ONCE // max(1, dataset.nbytes // dataset.shape[0]))
+    step = step if dataset.chunks is None else dataset.chunks[0]
+    for first in range(0, dataset.shape[0], step):
+        dataset[first : first + step]
+
+
+if __name__ == "__main__":
+    confine(float(sys.argv[2]))
+    print(json.dumps(main(Path(sys.argv[1]))))

@@ -1,0 +1,54 @@
+"""Files that a user has written, read without waiting for them: a regular file of a bounded size, or an error that names it."""
+
+import os
+import stat
+from pathlib import Path
+
+from rig.errors import ConfigurationError, RigError
+
+__all__ = ["read_bytes", "read_text"]
+
+_AT_ONCE = getattr(os, "O_NONBLOCK", 0)  # opening a FIFO that nobody writes to would wait for ever
+_RAW = getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+
+
+def read_bytes(path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError) -> bytes:
+    """All of a regular file; ``error`` with one line for anything else, for more than ``largest_bytes``, and for a failure."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | _AT_ONCE | _RAW)
+        with os.fdopen(descriptor, "rb", closefd=True) as stream:
+            kind = os.fstat(descriptor)
+            if not stat.S_ISREG(kind.st_mode):
+                raise error(f"{path}: is a {_kind(kind.st_mode)}, allowed is a regular file")
+            read = b"" if kind.st_size > largest_bytes else stream.read(largest_bytes + 1)
+            if kind.st_size > largest_bytes or len(read) > largest_bytes:
+                size = max(kind.st_size, len(read))
+                raise error(f"{path}: has {size} bytes, allowed are up to {largest_bytes}")
+            return read
+    except FileNotFoundError:
+        raise error(f"{path}: there is no such file") from None
+    except IsADirectoryError:
+        raise error(f"{path}: is a folder, allowed is a regular file") from None
+    except PermissionError:
+        raise error(f"{path}: may not be read (permission denied)") from None
+    except OSError as failure:
+        raise error(f"{path}: cannot be read ({failure.strerror})") from None
+    except ValueError as failure:  # a NUL in its name
+        raise error(f"{str(path)!r}: is not the name of a file ({failure})") from None
+
+
+def read_text(
+    path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError, encoding: str = "utf-8-sig"
+) -> str:
+    """All of a regular file as text; raises as `read_bytes`, and where it is not of this encoding."""
+    try:
+        return read_bytes(path, largest_bytes, error).decode(encoding)
+    except UnicodeDecodeError as failure:
+        raise error(
+            f"{path}: is no text in {encoding.removesuffix('-sig').upper()} (byte {failure.start}: {failure.reason})"
+        ) from None
+
+
+def _kind(mode: int) -> str:
+    kinds = {stat.S_IFDIR: "folder", stat.S_IFIFO: "FIFO", stat.S_IFCHR: "device", stat.S_IFBLK: "device"}
+    return kinds.get(stat.S_IFMT(mode), "special file")
