@@ -66,6 +66,10 @@ class RunningLoop(Protocol):
     statistics: LoopStatistics
     """What the loop did so far."""
 
+    @property
+    def waits(self) -> bool:
+        """Whether time stands still for it while its rows are not taken."""
+
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks, until the output is off."""
 
@@ -108,6 +112,11 @@ class Loop(DrivenLoop):
         self.notes: tuple[str, ...] = ()
         self.statistics = LoopStatistics(daq.sample_rate_hz)
         self._fused = daq if fused and isinstance(daq, FusedDAQ) else None
+
+    @property
+    def waits(self) -> bool:
+        """Unless it is paced, or its device has a clock."""
+        return not (self.paced or self.daq.wall_clock)
 
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks, until the output is off."""

@@ -202,7 +202,7 @@ class Execution:
                     self.evaluations.ask(self._measured, first, rows, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
-        while self.evaluations.ready():
+        while self.evaluations if self.loop.waits else self.evaluations.ready():
             for point in self.evaluations.take():
                 self._report(point)
 

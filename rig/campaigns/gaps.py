@@ -11,7 +11,7 @@ __all__ = ["bridged", "lost_rows", "lost_warnings", "rms_of"]
 
 def lost_rows(rows: np.ndarray) -> np.ndarray:
     """bool[n]: rows whose inputs are NaN: lost on their way, or the whole row in a damaged journal."""
-    return np.asarray(((rows["flags"] & SAMPLE_LOST) != 0) | np.isnan(rows["theta_rad"]))
+    return np.asarray(((rows["flags"] & SAMPLE_LOST) != 0) | np.isnan(rows["inputs"]).all(axis=1))
 
 
 def lost_warnings(rows: np.ndarray) -> list[str]:

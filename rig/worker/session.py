@@ -66,6 +66,11 @@ class WorkerLoop:
             if end is not None:
                 end()
 
+    @property
+    def waits(self) -> bool:
+        """Never: the other process goes on."""
+        return False
+
     def request_stop(self, cause: str = "") -> None:
         """Ask for the ramp to 0 V; the loop looks at every block."""
         self.cause = self.cause or cause

@@ -50,6 +50,7 @@ def test_rows_are_taken_while_a_point_is_evaluated_however_long_that_takes(monke
         assert came.wait(60), "no row was taken while a point was evaluated"
         return real.measure(*arguments)
 
+    monkeypatch.setattr("rig.loop.Loop.waits", False)  # as by the wall clock
     monkeypatch.setitem(KINDS, "backbone", replace(real, measure=slow))
     with rig.run(plan_with(levels_v=(0.4, 0.8)), progress=Counting()) as run:
         assert run.complete
