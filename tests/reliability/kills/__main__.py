@@ -51,7 +51,10 @@ def main() -> int:
             for line in one.wrong:
                 print(f"{one.case.name}: {line}", flush=True)
     print("\n".join(table(found)))
-    print(f"{len(found)} kills, {sum(bool(one.wrong) for one in found)} with something wrong", file=sys.stderr)
+    print(
+        f"{sum(one.killed for one in found)} kills, {sum(bool(one.wrong) for one in found)} with something wrong",
+        file=sys.stderr,
+    )
     return int(any(one.wrong for one in found))
 
 

@@ -66,4 +66,4 @@ def drawn(number: int, seed: int) -> list[Case]:
 def _place(phase: str, device: str, chance: random.Random) -> int:
     if phase in ("loop", "overwrite in the loop", "resume"):
         return chance.randrange(1, _MOST_WRITES[device])
-    return chance.randrange(2) if phase in ("evaluation", "conversion", "file in place") else 0
+    return chance.randrange(2) if phase in ("evaluation", "conversion") else 0

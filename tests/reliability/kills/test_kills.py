@@ -21,3 +21,4 @@ CASES = [
 def test_a_kill_loses_no_row_and_leaves_nothing_behind(tmp_path, case):
     found = carried_out(case, tmp_path)
     assert found.wrong == []
+    assert found.killed
