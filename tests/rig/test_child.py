@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.child import ChildFailed, ask_child
-from tests.waiting import wait_until
+from tests.waiting import LONG_S, wait_until
 
 CHILD = "tests.rig.children"
 
@@ -46,6 +46,7 @@ def test_a_child_does_not_get_more_than_its_memory():
 def test_a_child_ends_with_its_parent(tmp_path, stop):
     told = tmp_path / "pid"
     code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # a shell's background job ignores it
         f"from rig.child import ask_child; ask_child({CHILD!r}, 'write-pid-and-hang', {str(told)!r}, timeout_s=600.0)"
     )
     parent = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
@@ -53,7 +54,7 @@ def test_a_child_ends_with_its_parent(tmp_path, stop):
         wait_until(lambda: told.exists() and told.read_text() != "", "the child")
         child = int(told.read_text())
         parent.send_signal(stop)
-        parent.wait(30.0)
+        parent.wait(LONG_S)
         wait_until(lambda: not runs(child), "the child's end")
     finally:
         parent.kill()
