@@ -59,7 +59,14 @@ def test_remarks_and_tables_cannot_move_the_cursor(capsys, monkeypatch):
 
 def test_the_summary_of_a_file_shows_names_in_it_escaped(capsys):
     finding = {"name": "n", "channel": "\x1b[5m", "verdict": "ok", "value": 1.0, "unit": "", "allowed": "", "text": ""}
-    head = {"kind": "check", "bench": "b\x1b[31m", "specimen": "s\x07", "level_rms_v": None, "verdict": "ok"}
+    head = {
+        "kind": "check",
+        "bench": "b\x1b[31m",
+        "specimen": "s\x07",
+        "level_rms_v": None,
+        "verdict": "ok",
+        "integrity": "verified",
+    }
     print_summary({**head, "findings": [finding]})
     out = capsys.readouterr().out
     assert "\x1b" not in out
