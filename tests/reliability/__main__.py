@@ -18,7 +18,7 @@ LONG = {
     "places": (),
     "mutations": ("--configurations", "500", "--files", "2000"),
     "frames": ("--bytes", "10000000"),
-    "soak": ("--minutes", "60"),
+    "soak": ("--minutes", "60", "--rate", "2000", "--block", "100"),
 }
 """The parts of the campaign, and what they are asked for."""
 
