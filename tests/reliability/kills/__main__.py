@@ -25,7 +25,7 @@ def killed(case: Case) -> Outcome:
 def table(found: Sequence[Outcome]) -> list[str]:
     """Kills by phase and device, and rows: noted as written, kept, lost or changed."""
     lines = [
-        f"| killed | {' | '.join(DEVICES)} | rows written before | cases with rows lost or changed |",
+        f"| killed | {' | '.join(DEVICES)} | rows written before | kills with something wrong |",
         "|---|" + "---|" * 6,
     ]
     for phase in PHASES:
