@@ -1,5 +1,6 @@
 """The command ``rig``. Exit status 0 only on success; errors are one line, with a traceback under ``--debug``."""
 
+import io
 import os
 import sys
 from pathlib import Path
@@ -217,6 +218,9 @@ def main() -> None:
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     say_what_is_imported()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal that knows no µ still says what there is to say
     try:
         status = app(arguments, prog_name="rig", standalone_mode=False)
         if status == STOPPED:  # typer makes a status of Ctrl-C without a word

@@ -70,10 +70,10 @@ def too_long_a_name(folder: Path) -> list[str]:
     return objections(ended, folder / "none.h5", succeeds=False)
 
 
-def locale(folder: Path, **environment: str) -> list[str]:
+def locale(folder: Path, note: str = "a note", **environment: str) -> list[str]:
     """Other locales and encodings."""
     output = folder / "run.h5"
-    ended = run_command("run", write_plan(folder), "-o", output, "--note", "a note", **environment)
+    ended = run_command("run", write_plan(folder), "-o", output, "--note", note, **environment)
     shown = run_command("show", output, **environment)
     return objections(ended, output, succeeds=True) + (
         [] if shown.status == 0 else [f"cannot be shown: {shown.complaint}"]
@@ -211,7 +211,10 @@ def _scenes() -> Iterator[tuple[str, Callable[[Path], list[str]]]]:
         yield f"output called {ascii(called)[:40]}", lambda folder, called=called: name(folder, called)
     yield "name too long", too_long_a_name
     yield "locale C", lambda folder: locale(folder, LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0")
-    yield "locale POSIX, ASCII output", lambda folder: locale(folder, LC_ALL="POSIX", PYTHONIOENCODING="ascii")
+    yield (
+        "locale POSIX, ASCII output",
+        lambda folder: locale(folder, "µ = 3 Ω", LC_ALL="POSIX", PYTHONIOENCODING="ascii"),
+    )
     yield "another time zone", lambda folder: locale(folder, TZ="Pacific/Kiritimati")
     yield "no home", lambda folder: unwritable(folder, "HOME")
     yield "no state", lambda folder: unwritable(folder, "XDG_STATE_HOME XDG_CACHE_HOME XDG_CONFIG_HOME")
