@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 __all__ = ["MEMORY_BYTES", "ChildFailed", "ask_child", "confine"]
 
@@ -32,7 +33,7 @@ def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
             stderr=subprocess.DEVNULL,
             env={
                 **os.environ,
-                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # noqa: PTH109
+                "PYTHONPATH": os.pathsep.join(_import_path()),
                 "OPENBLAS_NUM_THREADS": "1",  # each thread reserves address space
             },
         )
@@ -52,6 +53,13 @@ def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
     if child.returncode:
         raise ChildFailed(f"crashed ({_how(child.returncode)})")
     return answer
+
+
+def _import_path() -> list[str]:
+    """Where this process finds its modules; the working folder in full, unless it was removed."""
+    with contextlib.suppress(FileNotFoundError):
+        return [path or str(Path.cwd()) for path in sys.path]
+    return [path for path in sys.path if path]
 
 
 def _how(status: int) -> str:

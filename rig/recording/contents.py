@@ -20,6 +20,11 @@ __all__ = ["JournalContents", "JournalPart"]
 
 MISSING = -1
 """Offset of rows that cannot be read."""
+MOST_TOLD = 20
+"""Gaps of a part that are told one by one."""
+LARGEST_RATIO = 200
+"""Bytes of missing rows that are believed, per byte of the journal."""
+_SMALL_BYTES = 2**26
 
 
 class JournalPart(Part):
@@ -28,7 +33,7 @@ class JournalPart(Part):
     def __init__(self, stream: BufferedReader, header: Header, information: dict[str, Any]) -> None:
         self.information, self.points, self.events, self.end = information, [], [], None
         self.n_rows, self.row_dtype, self.columns = 0, header.row_dtype, header.columns
-        self.dropped_bytes, self.dropped_reason = 0, ""
+        self.dropped_bytes, self.dropped_reason, self._n_gaps = 0, "", 0
         self._stream = stream
         self._offsets, self._firsts = array("q"), array("q")
 
@@ -41,7 +46,11 @@ class JournalPart(Part):
     def add_gap(self, n_bytes: int, text: str) -> None:
         """Note bytes that cannot be read, and what was lost with them."""
         self.dropped_bytes += n_bytes
-        self.dropped_reason += f"; {text}" if self.dropped_reason else text
+        self._n_gaps += 1
+        if self._n_gaps <= MOST_TOLD:
+            self.dropped_reason += f"; {text}" if self.dropped_reason else text
+        elif self._n_gaps == MOST_TOLD + 1:
+            self.dropped_reason += "; and more of the kind"
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Read rows across blocks; see ``Part.read``."""
@@ -97,6 +106,7 @@ class JournalContents:
         """Number of the part of the last whole block, from 1."""
         self._part_number = 0
         self._before_parts: list[tuple[int, str]] = []
+        self._homeless: tuple[int, int, int] | None = None
         self._stream: BufferedReader = self.path.open("rb")
         try:
             if blocks.header_gap is not None:
@@ -104,6 +114,7 @@ class JournalContents:
             for block in blocks:
                 self._add(block)
                 self.n_blocks, self.size, self.last_part = block.sequence + 1, block.stop, block.part
+            self._tell_homeless()
             if self.damaged and not self.parts:
                 raise RecordingError(f"{path}: damaged: the beginnings of all its parts cannot be read")
         except BaseException:
@@ -126,13 +137,20 @@ class JournalContents:
                 self._begin(block)
             return
         if not here:  # no part of that number has begun
-            self._note(
-                Gap(block.stop - block.start, 1, f"the beginning of part {block.part} is lost"), "all of that part"
-            )
+            n_bytes, n_blocks, _ = self._homeless or (0, 0, 0)
+            self._homeless = (n_bytes + block.stop - block.start, n_blocks + 1, block.part)
             return
         self._add_to_part(block, self.parts[-1])
 
+    def _tell_homeless(self) -> None:
+        """Say in one line what is lost of a part whose beginning cannot be read."""
+        if self._homeless is not None:
+            n_bytes, n_blocks, part = self._homeless
+            self._homeless = None
+            self._note(Gap(n_bytes, n_blocks, f"the beginning of part {part} is lost"), "all of that part")
+
     def _begin(self, block: Block) -> None:
+        self._tell_homeless()
         self._part_number = block.part
         self.parts.append(JournalPart(self._stream, self.header, block.value))
         for n_bytes, text in self._before_parts:
@@ -144,6 +162,9 @@ class JournalContents:
         first, n_rows = self.parts[-1].n_rows, block.row - self.parts[-1].n_rows
         if n_rows == 0:
             return "no rows"
+        n_bytes = n_rows * self.header.row_dtype.itemsize
+        if n_bytes > max(_SMALL_BYTES, LARGEST_RATIO * block.stop):
+            raise RecordingError(f"{self.path}: damaged: a block says that {n_rows} rows before it are missing")
         self.parts[-1].add_rows(MISSING, n_rows)
         return f"rows {first} to {block.row - 1}, which are not numbers now"
 

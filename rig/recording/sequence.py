@@ -87,10 +87,11 @@ class JournalBlocks:
 
     def _behind(self, stream: BinaryIO, last: Block, size: int) -> Block | None:
         """The first whole block behind damage that can have followed ``last``."""
-        start = last.stop + 1
+        start = last.stop
         while found := following_block(stream, start, size, last.sequence + 1):
             whole = found.kind is not Kind.ROWS or len(found.payload) % self.header.row_dtype.itemsize == 0
             follows = (found.part, found.row) >= (last.part, last.row) and found.part > 0
+            follows = follows and (found.start, found.sequence) != (last.stop, last.sequence + 1)  # which is no gap
             if found.version == 1 or (whole and follows and found.kind is not Kind.HEADER):
                 return found
             start = found.start + 1

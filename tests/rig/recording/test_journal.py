@@ -16,6 +16,8 @@ from rig.recording.blocks import LARGEST_PAYLOAD, Kind
 from rig.recording.contents import JournalContents
 from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path, read_journal
+from rig.recording.reader import Recording
+from rig.recording.store import finalise
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
 
 HEAD = 36
@@ -191,6 +193,51 @@ def test_where_the_beginning_of_a_part_is_lost_twice_the_other_parts_are_read_an
     with JournalContents(path) as contents:
         assert [part.n_rows for part in contents.parts] == [40]
         assert "the beginning of part 2 is lost; all of that part" in contents.parts[0].dropped_reason
+
+
+def test_of_a_long_part_without_its_beginning_one_line_is_told_and_the_rest_becomes_a_file(tmp_path):
+    path = journal_path(tmp_path / "OUT.h5")
+    with JournalWriter.create(path, header()) as writer:
+        fill(writer, 0, 40)
+        fill(writer, 40, 3000, block=1)
+    data, position = bytearray(path.read_bytes()), 0
+    for index, (kind, _, payload) in enumerate(blocks_by_hand(data[:])):
+        if kind == 2 and index > 5:
+            data[position + HEAD] ^= 1
+        position += HEAD + len(payload)
+    path.write_bytes(data)
+    finalise(path, tmp_path / "OUT.h5")
+    with Recording(tmp_path / "OUT.h5") as recording:
+        assert recording.n_rows == 40
+        told = recording.parts[0].dropped_reason
+    assert told.count("the beginning of part 2 is lost") == 1
+    assert "3003 blocks of" in told
+
+
+def test_of_many_gaps_the_first_are_told_one_by_one_and_the_file_is_made(tmp_path):
+    path = journal_path(tmp_path / "OUT.h5")
+    with JournalWriter.create(path, header()) as writer:
+        fill(writer, 0, 2000, block=1)
+    data, position = bytearray(path.read_bytes()), 0
+    for index, (kind, _, payload) in enumerate(blocks_by_hand(data[:])):
+        if kind == 3 and index % 2:
+            data[position + HEAD] ^= 1
+        position += HEAD + len(payload)
+    path.write_bytes(data)
+    finalise(path, tmp_path / "OUT.h5")
+    with Recording(tmp_path / "OUT.h5") as recording:
+        assert np.isnan(recording.parts[0].rows("frequency_hz")).sum() == 1000
+        told = recording.parts[0].dropped_reason
+    assert told.count("1 block of") == 20
+    assert told.endswith("and more of the kind")
+
+
+def test_a_block_that_tells_of_rows_without_end_is_not_believed(tmp_path, original):
+    head = struct.pack("<4sHHIQIQ", b"VLJB", 2, 4, 2, 10**6, 2, 2**60)
+    path = tmp_path / "a.journal"
+    path.write_bytes(original[:-70] + head + struct.pack("<I", zlib.crc32(head + b"{}")) + b"{}")
+    with pytest.raises(RecordingError, match="rows before it are missing"):
+        JournalContents(path)
 
 
 def test_a_journal_of_blocks_of_version_1_is_read_up_to_its_first_damage(tmp_path, original):
