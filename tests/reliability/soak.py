@@ -41,10 +41,10 @@ class Soaked(NamedTuple):
 
 
 class _Clock(Silent):
-    """Looks at the memory once a second, and ends the run by a signal once its time is up."""
+    """Looks at the memory once a second, and ends the run by a signal once so many rows have been recorded."""
 
-    def __init__(self, minutes: float) -> None:
-        self._until_s = time.monotonic() + 60.0 * minutes
+    def __init__(self, n_rows: int) -> None:
+        self._rows_left = n_rows
         self._next_s = 0.0
         self.memory_mb: list[float] = []
 
@@ -54,8 +54,9 @@ class _Clock(Silent):
         if now_s >= self._next_s:
             self._next_s = now_s + 1.0
             self.memory_mb.append(_resident_mb())
-        if now_s > self._until_s:
-            self._until_s = float("inf")
+        asked_already = self._rows_left <= 0
+        self._rows_left -= len(rows)
+        if self._rows_left <= 0 and not asked_already:
             signal.raise_signal(signal.SIGTERM)
 
 
@@ -69,7 +70,7 @@ def soak(minutes: float, rate_hz: float, block: int) -> Soaked:
         "oversampling": 1,
         "anti_alias_hz": 0.0,
     }
-    clock = _Clock(minutes)
+    clock = _Clock(round(60.0 * minutes * rate_hz))
     levels = tuple(0.3 + 1e-4 * k for k in range(min(5000, max(4, int(20 * minutes)))))
     with tempfile.TemporaryDirectory(prefix="vibrolock-soak-") as folder:
         output = Path(folder) / "soak.h5"
