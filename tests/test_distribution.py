@@ -28,9 +28,9 @@ def test_a_wheel_holds_benches_plans_specimens_and_type_markers(tmp_path):
     (wheel,) = tmp_path.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     for wanted in (
-        "rig/benches/magnet-beam.toml",
-        "rig/plans/magnet-beam/backbone.toml",
-        "rig/plans/magnet-beam-symmetric/backbone.toml",
+        "rig/bench/shipped/magnet-beam.toml",
+        "rig/campaigns/shipped/magnet-beam/backbone.toml",
+        "rig/campaigns/shipped/magnet-beam-symmetric/backbone.toml",
         "simulators/specimens/magnet-beam.toml",
         *(f"{package}/py.typed" for package in PACKAGES),
     ):

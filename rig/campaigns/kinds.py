@@ -4,21 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.backbone_points import BACKBONE_COLUMNS, measure_backbone_point
-from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
-from rig.campaigns.continuous_backbone_points import CONTINUOUS_BACKBONE_COLUMNS, measure_continuous_backbone
-from rig.campaigns.multisine import MultisinePlan
-from rig.campaigns.multisine_points import MULTISINE_COLUMNS, measure_multisine_point
-from rig.campaigns.plan import Column, Plan
-from rig.campaigns.response_controlled import ResponseControlledPlan
-from rig.campaigns.response_controlled_points import RESPONSE_CONTROLLED_COLUMNS, measure_response_controlled_point
-from rig.campaigns.stepped_phase import SteppedPhasePlan
-from rig.campaigns.stepped_phase_points import STEPPED_PHASE_COLUMNS, measure_stepped_phase_point
-from rig.campaigns.stepped_sine import SteppedSinePlan
-from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS, measure_stepped_sine_point
-from rig.campaigns.sweep import SweepPlan
-from rig.campaigns.sweep_points import SWEEP_COLUMNS, measure_sweep
+from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.backbone.points import BACKBONE_COLUMNS, measure_backbone_point
+from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
+from rig.campaigns.continuous_backbone.points import CONTINUOUS_BACKBONE_COLUMNS, measure_continuous_backbone
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.multisine.points import MULTISINE_COLUMNS, measure_multisine_point
+from rig.campaigns.planning.plan import Column, Plan
+from rig.campaigns.response_controlled.plan import ResponseControlledPlan
+from rig.campaigns.response_controlled.points import RESPONSE_CONTROLLED_COLUMNS, measure_response_controlled_point
+from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
+from rig.campaigns.stepped_phase.points import STEPPED_PHASE_COLUMNS, measure_stepped_phase_point
+from rig.campaigns.stepped_sine.plan import SteppedSinePlan
+from rig.campaigns.stepped_sine.points import STEPPED_SINE_COLUMNS, measure_stepped_sine_point
+from rig.campaigns.sweep.plan import SweepPlan
+from rig.campaigns.sweep.points import SWEEP_COLUMNS, measure_sweep
 
 __all__ = ["KINDS", "Campaign"]
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from identification import ModalAnalysis
-from rig.campaigns.evaluate import VOLTAGE, channels_of
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 from rig.errors import ConfigurationError, RecordingError
 from rig.exchange.time_data import TimeData
 from rig.measurements import backbone, bench_of_recording, frequency_responses, point_rows, response_matrices, sweeps
-from rig.models.files import load
-from rig.models.force_surface import MeasuredSurface
-from rig.models.pnlss import IdentifiedPnlss
+from rig.models.files.files import load
+from rig.models.files.force_surface import MeasuredSurface
+from rig.models.files.pnlss import IdentifiedPnlss
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 

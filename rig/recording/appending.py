@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Self
 
 from rig.recording.blocks import Kind, pack
-from rig.recording.locking import lock
+from rig.system.locking import lock
 
 __all__ = ["SYNC_INTERVAL_S", "BlockFile", "NameLost"]
 

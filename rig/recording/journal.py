@@ -20,8 +20,8 @@ from rig.recording.appending import BlockFile, NameLost
 from rig.recording.blocks import LARGEST_PAYLOAD, TWICE, Kind
 from rig.recording.contents import JournalContents
 from rig.recording.header import Column, Header, packed
-from rig.recording.locking import synchronise_folder
 from rig.recording.sequence import Tail, read_journal
+from rig.system.locking import synchronise_folder
 
 __all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]
 

@@ -10,9 +10,9 @@ from rig.errors import RecordingError
 from rig.recording.examination import check_attributes, examine
 from rig.recording.header import FORMAT, SCHEMA, check_schema
 from rig.recording.integrity import integrity_of
-from rig.recording.locking import synchronise_folder
 from rig.recording.sink import Sink
 from rig.recording.trailer import append_trailer
+from rig.system.locking import synchronise_folder
 
 __all__ = ["file_integrity", "identify", "kind_in", "new_file", "one_line", "open_file", "open_unchecked", "reading"]
 
