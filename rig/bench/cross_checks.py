@@ -19,6 +19,8 @@ __all__ = ["Objection", "cautions", "objections", "refuse"]
 LONGEST_BLOCK_S = (
     0.2  # a person's reaction at the stop button: a loop that looks less often protects less than a person
 )
+OVERTRAVEL_FACTOR = 1.25
+"""Beyond this multiple of a limit a ramp would take too long: the output drops to 0 V."""
 RANGES = {
     "force": (1e-3, 1e8),  # N: from micro force sensors to the load cells of building test floors
     "drive": (1e-2, 1e7),  # m/s^2: from seismic accelerometers to shock ones, with a decade to spare at either end
@@ -121,8 +123,6 @@ def _ramp(bench: "Bench") -> list[Objection]:
 
 def _drops(bench: "Bench") -> list[Objection]:
     """Limits whose multiple at which the output drops to 0 V is more than a channel can show."""
-    from rig.tick.safety.kernels import OVERTRAVEL_FACTOR  # compiled: loading a bench must not wait for it
-
     out = []
     for field, roles in (("force_n", ("force",)), ("acceleration_m_s2", ("drive", "response"))):
         narrowest: Channel = min((c for c in bench.channels if c.role in roles), key=lambda c: c.range_in_unit)

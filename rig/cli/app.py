@@ -142,10 +142,11 @@ def _carry(json: bool, kind: str, start: Any) -> None:
     from rig.api import Run
     from rig.campaigns.kinds import KINDS
     from rig.recording.reader import Recording
+    from rig.show.progress import RunProgress
     from rig.show.summary import summarise_recording
     from rig.show.tables import say_how_it_ended
     from rig.system.stop_signals import Interrupted, Terminated, ignore_from_now_on
-    from rig.text.console import RunProgress, print_json
+    from rig.text.console import print_json
 
     progress = RunProgress(KINDS[kind].columns)
     try:

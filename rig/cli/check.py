@@ -35,7 +35,8 @@ def check_(
     from rig.check.report import say, summary
     from rig.check.run import check
     from rig.errors import ConfigurationError
-    from rig.text.console import RunProgress, print_json
+    from rig.show.progress import RunProgress
+    from rig.text.console import print_json
     from rig.tuning.figure import check_figure
 
     loaded = load_bench(bench)

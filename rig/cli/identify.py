@@ -101,8 +101,8 @@ def identify(
     from rig.models.files.pnlss import IdentifiedPnlss
     from rig.models.identify.identify import Request, identify_model
     from rig.models.identify.pnlss_request import PnlssOptions
+    from rig.show.progress import FitLines
     from rig.system.stop_signals import insisting
-    from rig.text.console import FitLines
 
     keep_existing([*files, *(validation or ())], output, overwrite or resume)
     request = Request(
@@ -211,7 +211,8 @@ def predict(
 ) -> None:
     """Predict vibrations with a model, and compare them with recordings."""
     from rig.models.files.files import save
-    from rig.models.predict.predict import PredictionRequest, predict_vibrations
+    from rig.models.predict.predict import predict_vibrations
+    from rig.models.predict.request import PredictionRequest
 
     given = (model, exciter, modes, *(sweep or ()), *(multisine or ()), *(reference or ()))
     keep_existing([path for path in given if path is not None], output, overwrite)

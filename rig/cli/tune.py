@@ -41,8 +41,9 @@ def tune_(
     from rig.bench import load_bench
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
     from rig.errors import ConfigurationError
+    from rig.show.progress import RunProgress
     from rig.system.whole_file import whole_file
-    from rig.text.console import RunProgress, print_json
+    from rig.text.console import print_json
     from rig.text.printable import printable_strings
     from rig.tuning.figure import check_figure, draw_tuning
     from rig.tuning.report import lines, summary

@@ -4,56 +4,21 @@ A virtual rig runs here, as fast as the machine allows; what has to keep to a cl
 """
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
-from controller.law import Law
-from controller.layout import AmplitudeLaw
-from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.bench.cross_checks import refuse
 from rig.daq import DAQ, Capabilities
 from rig.drivers import make_daq
 from rig.errors import RigError
 from rig.loop.loop import Loop, RunningLoop
-from rig.tick.sequencer.segments import Segment, SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import TickSettings
 
-__all__ = ["Session", "TickSettings", "open_session"]
+__all__ = ["Session", "open_session"]
 
 NO_PROCESS = "this system has no process for the loop alone: it shares its time with the recorder, nothing is promised"
-
-
-@dataclass(frozen=True, eq=False)
-class TickSettings:
-    """What a tick is built from once the latency of the device is known; can be handed to another process."""
-
-    bench: Bench
-    law: Law
-    amplitude_law: AmplitudeLaw
-    settle: SettleRule
-    segments: Sequence[Segment]
-    waveforms: np.ndarray | None = None
-    exciter: PlantModel | None = None
-    armed: bool = True
-
-    def build(self, latency_samples: float) -> Tick:
-        """The tick for a device of this latency: its outputs are one block later still."""
-        return Tick(
-            self.bench,
-            self.law,
-            self.amplitude_law,
-            self.settle,
-            self.segments,
-            self.bench.block + latency_samples,
-            waveforms=self.waveforms,
-            exciter=self.exciter,
-            armed=self.armed,
-        )
 
 
 class Session(Protocol):

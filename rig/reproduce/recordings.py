@@ -18,7 +18,7 @@ from rig.measurements.experiments import experiments
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.reproduce.options import Options
-from rig.text.console import RunProgress
+from rig.show.progress import RunProgress
 
 __all__ = ["multisines", "recorded", "segments", "training_data"]
 

@@ -1,6 +1,7 @@
 """Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
 
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,7 +56,7 @@ def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
             page.set_size_inches(*KINDS[kind].figure_in)
             found = load(source)
             with understood(source, kind):
-                KINDS[kind].draw(page, found)
+                resolve_name(KINDS[kind].draw)(page, found)
         else:
             with Recording(source) as recording:
                 draw = _draw_check if is_check(recording) else _DRAW[recording.kind]

@@ -6,8 +6,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rig.errors import RecordingError, RigError
-from rig.recording.layout import one_line
 from rig.system.locking import synchronise_folder
+from rig.text.printable import error_text
 
 __all__ = ["whole_file"]
 
@@ -42,4 +42,4 @@ def _reason(error: BaseException) -> str:
         if isinstance(cause, OSError) and cause.strerror:
             return cause.strerror
         cause = cause.__cause__ or cause.__context__
-    return one_line(error)
+    return error_text(error)

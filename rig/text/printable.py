@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 from unicodedata import category
 
-__all__ = ["LONGEST_LINE", "one_line", "printable", "printable_strings", "shown"]
+__all__ = ["LONGEST_LINE", "error_text", "one_line", "printable", "printable_strings", "shown"]
 
 LONGEST_LINE = 800
 """Characters of a message; what is left out lies in its middle, for it begins with the field and ends with what is allowed."""
@@ -39,6 +39,11 @@ def one_line(text: str, longest: int = LONGEST_LINE) -> str:
         text = _without_middle(text, 8 * longest)
     line = printable(" ".join(text.split()))
     return line if len(line) <= longest + 40 else _without_middle(line, longest)
+
+
+def error_text(error: BaseException) -> str:
+    """The message of a library's error without its line breaks; the error's type where it has no message."""
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _without_middle(text: str, longest: int) -> str:

@@ -15,8 +15,8 @@ from rig.campaigns.sweep.plan import SweepPlan
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
+from rig.show.progress import RunProgress
 from rig.show.summary import summarise_recording as show
-from rig.text.console import RunProgress
 from rig.tick.safety.layout import GuardMode
 from simulators.virtual_rig import VirtualRig
 from tests.reference.harmonic_balance import response_to_voltage

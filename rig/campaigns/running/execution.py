@@ -8,6 +8,7 @@ import numpy as np
 
 from controller import LockState
 from rig.bench import Bench
+from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.quality import what_was_skipped
 from rig.campaigns.evaluation.vibrations import failed_point
@@ -17,7 +18,6 @@ from rig.campaigns.running.advice import Before, Trip, advice_on
 from rig.campaigns.running.device_remarks import flag_names, with_device_remarks
 from rig.campaigns.running.evaluations import Evaluations
 from rig.campaigns.running.kept_rows import KeptRows
-from rig.campaigns.running.measured_together import round_at
 from rig.campaigns.running.trips import tripped_at
 from rig.errors import RecordingError
 from rig.loop.loop import LoopStatistics, RunningLoop

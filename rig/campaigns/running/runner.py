@@ -20,7 +20,7 @@ from rig.campaigns.running.output_file import forget_before, make_way, put_back,
 from rig.campaigns.running.trips import refuse_tripped
 from rig.errors import RigError
 from rig.loop.loop import RunningLoop
-from rig.loop.session import Session, TickSettings, open_session
+from rig.loop.session import Session, open_session
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
@@ -30,6 +30,7 @@ from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.limits import describe_end
 from rig.tick.sequencer.segments import Segment
+from rig.tick.tick import TickSettings
 
 __all__ = ["carry_out", "take_up"]
 

@@ -13,13 +13,13 @@ from rig.bench import Bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, DaqError, RigError
-from rig.loop.session import TickSettings
 from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import Layout, SharedMemory, packed
 from rig.loop.worker.pace import pacing_of
 from rig.loop.worker.probe import probe, round_trips
 from rig.system.privileges import prepare
 from rig.tick.kernels import tick_block
+from rig.tick.tick import TickSettings
 
 __all__ = ["main"]
 

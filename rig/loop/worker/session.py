@@ -14,10 +14,10 @@ from rig.daq import Capabilities
 from rig.errors import DaqError
 from rig.loop.driven_loop import end_by_driver
 from rig.loop.loop import LoopStatistics, RunningLoop
-from rig.loop.session import TickSettings
 from rig.loop.worker.loop import CHUNK_DONE
 from rig.loop.worker.memory import TIMES, Layout, SharedMemory, packed
 from rig.loop.worker.spawn import Worker, rebuilt
+from rig.tick.tick import TickSettings
 
 __all__ = ["WorkerLoop", "WorkerSession"]
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from identification import Exciter
 from identification.prediction.exciter import PARAMETERS
-from rig.models.files.exciter_figure import draw_exciter
-from rig.models.files.kind import Kind
+from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["EXCITER"]
@@ -54,12 +53,12 @@ def _say(summary: dict[str, Any]) -> None:
     )
 
 
-EXCITER = Kind(
+EXCITER = FileKind(
     name="exciter",
     holds=Exciter,
     pack=Exciter.to_arrays,
     unpack=Exciter.from_arrays,
     summarise=_summarise,
     say=_say,
-    draw=draw_exciter,
+    draw="rig.models.files.exciter_figure:draw_exciter",
 )

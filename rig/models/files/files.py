@@ -13,7 +13,7 @@ from rig.errors import RecordingError
 from rig.models.files.exciter import EXCITER
 from rig.models.files.force_surface import FORCE_SURFACE
 from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
-from rig.models.files.kind import Kind
+from rig.models.files.kind import FileKind
 from rig.models.files.linear_modes import LINEAR_MODES
 from rig.models.files.measured_backbone import MEASURED_BACKBONE
 from rig.models.files.nonlinear_mode import NONLINEAR_MODE
@@ -21,7 +21,7 @@ from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.files.predictions import PREDICTIONS
 from rig.models.files.response_matrix import RESPONSE_MATRIX
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
-from rig.recording.layout import one_line
+from rig.text.printable import error_text
 
 __all__ = ["KINDS", "load", "load_as", "save", "understood"]
 
@@ -76,10 +76,10 @@ def understood(path: Path, kind: str) -> Iterator[None]:
             warnings.simplefilter("error", ComplexWarning)  # an imaginary part must not get lost
             yield
     except (*_MISFITS, ComplexWarning) as error:
-        raise RecordingError(f"{path}: does not hold what makes a {kind} ({one_line(error)})") from error
+        raise RecordingError(f"{path}: does not hold what makes a {kind} ({error_text(error)})") from error
 
 
-def load_as(kind: Kind, path: Path) -> Any:
+def load_as(kind: FileKind, path: Path) -> Any:
     """The same where one kind alone will do; `RecordingError` for any other."""
     found = kind_of(path)
     if found != kind.name:

@@ -14,8 +14,7 @@ from identification import (
     pack_frequency_responses,
     unpack_frequency_responses,
 )
-from rig.figures.force_surface import draw_force_surface
-from rig.models.files.kind import Arrays, Attributes, Kind
+from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["FORCE_SURFACE", "MeasuredSurface"]
@@ -97,13 +96,13 @@ def _say(summary: dict[str, Any]) -> None:
     print(f"one more level would tell most at {1e3 * summary['next_level_m']:.4g} mm")
 
 
-FORCE_SURFACE = Kind(
+FORCE_SURFACE = FileKind(
     name="force-surface",
     holds=MeasuredSurface,
     pack=_pack,
     unpack=_unpack,
     summarise=_summarise,
     say=_say,
-    draw=lambda page, measured: draw_force_surface(page, measured.responses, measured.surface),
+    draw="rig.figures.force_surface:draw_measured_surface",
     figure_in=(11.0, 7.0),
 )

@@ -3,8 +3,7 @@
 from typing import Any
 
 from identification import FrequencyResponse, pack_frequency_responses, unpack_frequency_responses
-from rig.models.files.frequency_responses_figure import draw_responses
-from rig.models.files.kind import Kind
+from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["FREQUENCY_RESPONSES"]
@@ -37,12 +36,12 @@ def _say(summary: dict[str, Any]) -> None:
     )
 
 
-FREQUENCY_RESPONSES = Kind(
+FREQUENCY_RESPONSES = FileKind(
     name="frequency-responses",
     holds=tuple,
     pack=pack_frequency_responses,
     unpack=unpack_frequency_responses,
     summarise=_summarise,
     say=_say,
-    draw=draw_responses,
+    draw="rig.models.files.frequency_responses_figure:draw_responses",
 )

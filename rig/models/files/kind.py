@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
-__all__ = ["Arrays", "Attributes", "Kind"]
+__all__ = ["Arrays", "Attributes", "FileKind"]
 
 Arrays = Mapping[str, NDArray[Any]]
 Attributes = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Kind:
+class FileKind:
     """One kind of file."""
 
     name: str
@@ -31,7 +31,7 @@ class Kind:
     """What ``rig show --json`` prints, without the kind."""
     say: Callable[[dict[str, Any]], None]
     """Print a summary for a person."""
-    draw: Callable[["Figure", Any], None]
-    """Draw on an empty page."""
+    draw: str
+    """``module:function`` that draws the object on an empty page, ``(page, object)``; loaded when a figure is wanted."""
     figure_in: tuple[float, float] = (9.0, 6.4)
     """Width and height of the page, inches."""

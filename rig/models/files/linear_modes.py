@@ -3,8 +3,7 @@
 from typing import Any
 
 from identification import ModalAnalysis
-from rig.models.files.kind import Kind
-from rig.models.files.linear_modes_figure import draw_linear_modes
+from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["LINEAR_MODES"]
@@ -47,17 +46,13 @@ def _say(summary: dict[str, Any]) -> None:
     )
 
 
-def _draw(page: Any, analysis: ModalAnalysis) -> None:
-    draw_linear_modes(page, analysis.modes, analysis.responses, analysis.stabilisation)
-
-
-LINEAR_MODES = Kind(
+LINEAR_MODES = FileKind(
     name="linear-modes",
     holds=ModalAnalysis,
     pack=ModalAnalysis.to_arrays,
     unpack=ModalAnalysis.from_arrays,
     summarise=_summarise,
     say=_say,
-    draw=_draw,
+    draw="rig.models.files.linear_modes_figure:draw_linear_modes",
     figure_in=(12.0, 8.0),
 )

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification import FrequencyResponseMatrix, LinearModes, StabilisationDiagram
+from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
 from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
 
 if TYPE_CHECKING:
@@ -18,13 +18,12 @@ _MOST_DOTS = 4000
 _POOLED_LINES = 21
 
 
-def draw_linear_modes(
-    page: "Figure",
-    modes: LinearModes,
-    responses: FrequencyResponseMatrix | None = None,
-    stabilisation: StabilisationDiagram | None = None,
-) -> None:
-    """Draw what is known; ``page`` is an empty figure, about 11 by 8 inches."""
+def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
+    """Draw modes with the responses and the stabilisation diagram, where the file has them.
+
+    ``page`` is an empty figure, about 11 by 8 inches.
+    """
+    modes, responses, stabilisation = found.modes, found.responses, found.stabilisation
     left, right = np.asarray(page.subfigures(1, 2, width_ratios=(1.35, 1.0)))
     responses_on(left, modes, responses)
     top, middle, bottom = right.subplots(3, 1, height_ratios=(1.1, 1.0, 1.0))

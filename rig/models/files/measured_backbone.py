@@ -7,7 +7,7 @@ import numpy as np
 from identification import Backbone
 from rig.figures.style import MAIN, title
 from rig.measurements.backbone_table import backbone_from, backbone_parts
-from rig.models.files.kind import Kind
+from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def _say(summary: dict[str, Any]) -> None:
     print_table(("force N", "frequency Hz", "amplitude mm", "phase error deg"), rows)
 
 
-def _draw(page: "Figure", backbone: Backbone) -> None:
+def draw_backbone(page: "Figure", backbone: Backbone) -> None:
     """Amplitude and force over the frequency."""
     size, force = page.subplots(1, 2)
     size.plot(backbone.frequency_hz, 1e3 * backbone.amplitude_m, "o-", color=MAIN, ms=4)
@@ -50,12 +50,12 @@ def _draw(page: "Figure", backbone: Backbone) -> None:
     title(page, f"{backbone.specimen or 'specimen'}: measured backbone")
 
 
-MEASURED_BACKBONE = Kind(
+MEASURED_BACKBONE = FileKind(
     name="measured-backbone",
     holds=Backbone,
     pack=_pack,
     unpack=backbone_from,
     summarise=_summarise,
     say=_say,
-    draw=_draw,
+    draw="rig.models.files.measured_backbone:draw_backbone",
 )

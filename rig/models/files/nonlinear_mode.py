@@ -3,8 +3,7 @@
 from typing import Any
 
 from identification import NonlinearMode
-from rig.figures.nonlinear_mode import draw_mode
-from rig.models.files.kind import Kind
+from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["NONLINEAR_MODE"]
@@ -40,13 +39,13 @@ def _say(summary: dict[str, Any]) -> None:
     print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
 
 
-NONLINEAR_MODE = Kind(
+NONLINEAR_MODE = FileKind(
     name="nonlinear-mode",
     holds=NonlinearMode,
     pack=NonlinearMode.to_arrays,
     unpack=NonlinearMode.from_arrays,
     summarise=_summarise,
     say=_say,
-    draw=draw_mode,
+    draw="rig.figures.nonlinear_mode:draw_mode",
     figure_in=(12.0, 6.4),
 )

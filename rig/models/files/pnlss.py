@@ -9,8 +9,7 @@ import numpy as np
 
 from identification import ErrorSpectra, Features, IdentificationError, PnlssFit, PnlssModel, SimulatedRun
 from identification.packing import pack_all, unpack_all
-from rig.models.files.kind import Arrays, Attributes, Kind
-from rig.models.files.pnlss_figure import draw_pnlss
+from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
@@ -189,13 +188,13 @@ def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str
     return own if before is None else f"{own} ({number(before['errors'][name], '.2f', 100.0)})"
 
 
-PNLSS = Kind(
+PNLSS = FileKind(
     name="pnlss",
     holds=IdentifiedPnlss,
     pack=_pack,
     unpack=_unpack,
     summarise=_summarise,
     say=_say,
-    draw=draw_pnlss,
+    draw="rig.models.files.pnlss_figure:draw_pnlss",
     figure_in=(12.0, 7.5),
 )

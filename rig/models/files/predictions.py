@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from identification import FrequencyResponse, Predictions, ResponseBand, SteadyPrediction, SweepPrediction, Transient
-from rig.models.files.kind import Kind
-from rig.models.files.predictions_figure import draw_predictions
+from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["CUT", "PREDICTIONS"]
@@ -145,13 +144,13 @@ def _say(summary: dict[str, Any]) -> None:
             shown.add(note)
 
 
-PREDICTIONS = Kind(
+PREDICTIONS = FileKind(
     name="predictions",
     holds=Predictions,
     pack=Predictions.to_arrays,
     unpack=Predictions.from_arrays,
     summarise=_summarise,
     say=_say,
-    draw=draw_predictions,
+    draw="rig.models.files.predictions_figure:draw_predictions",
     figure_in=(12.0, 7.0),
 )

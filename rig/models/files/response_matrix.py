@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from identification import FrequencyResponseMatrix
-from rig.models.files.kind import Kind
-from rig.models.files.response_matrix_figure import draw_response_matrix
+from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["RESPONSE_MATRIX"]
@@ -53,12 +52,12 @@ def _say(summary: dict[str, Any]) -> None:
     )
 
 
-RESPONSE_MATRIX = Kind(
+RESPONSE_MATRIX = FileKind(
     name="frequency-response-matrix",
     holds=FrequencyResponseMatrix,
     pack=FrequencyResponseMatrix.to_arrays,
     unpack=FrequencyResponseMatrix.from_arrays,
     summarise=_summarise,
     say=_say,
-    draw=draw_response_matrix,
+    draw="rig.models.files.response_matrix_figure:draw_response_matrix",
 )

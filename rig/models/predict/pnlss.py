@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from identification import (
     Exciter,
@@ -26,16 +26,14 @@ from rig.models.identify.data_fingerprints import fingerprint
 from rig.models.predict.pnlss_steady import Held, Reference, compared, default_held
 from rig.models.predict.pnlss_sweep_models import PnlssSweepModels
 from rig.models.predict.pnlss_sweeps import planned_pnlss_sweeps, recorded_pnlss_sweeps
+from rig.models.predict.request import PredictionRequest
 from rig.models.predict.sweeps import strangers
 from rig.recording.reader import Recording
-
-if TYPE_CHECKING:
-    from rig.models.predict.predict import PredictionRequest
 
 __all__ = ["pnlss_predictions"]
 
 
-def pnlss_predictions(path: Path, request: "PredictionRequest", references: Sequence[Reference]) -> Predictions:
+def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequence[Reference]) -> Predictions:
     """What is asked for, with errors where there is something to compare with; unbounded runs are results like others.
 
     Raises `ConfigurationError` for what a nonlinear state-space model does not answer, `identification.IdentificationError`
@@ -76,7 +74,7 @@ def pnlss_predictions(path: Path, request: "PredictionRequest", references: Sequ
     )
 
 
-def _check(request: "PredictionRequest", model: PnlssModel, path: Path) -> None:
+def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
     """Refuse what is asked of a nonlinear mode alone, and what the model's channels do not allow."""
     given = {
         "--zero-crossings": request.zero_crossings is not None,
@@ -114,7 +112,7 @@ def _check(request: "PredictionRequest", model: PnlssModel, path: Path) -> None:
         )
 
 
-def _default(request: "PredictionRequest", held: Held) -> tuple[str, ...]:
+def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
     """What was chosen where nothing was said."""
     if request.held is not None or held != "pure-sine":
         return ()

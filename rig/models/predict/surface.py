@@ -1,7 +1,6 @@
 """Frequency responses at constant force cut from a force surface, as predictions."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +14,7 @@ from identification import (
 )
 from rig.errors import ConfigurationError, RecordingError
 from rig.models.files.force_surface import MeasuredSurface
-
-if TYPE_CHECKING:
-    from rig.models.predict.predict import PredictionRequest
+from rig.models.predict.request import PredictionRequest
 
 __all__ = ["surface_predictions"]
 
@@ -25,7 +22,7 @@ _INTERVAL = 1.96
 
 
 def surface_predictions(
-    measured: MeasuredSurface, request: "PredictionRequest", references: Sequence[FrequencyResponse]
+    measured: MeasuredSurface, request: PredictionRequest, references: Sequence[FrequencyResponse]
 ) -> Predictions:
     """Curves at the forces asked for, and at those of ``references``, with their errors over the phase.
 
@@ -61,7 +58,7 @@ def surface_predictions(
     )
 
 
-def _check(request: "PredictionRequest") -> None:
+def _check(request: PredictionRequest) -> None:
     """Refuse what is asked of a nonlinear mode alone."""
     given = {
         "--force": request.held not in (None, "fundamental"),

@@ -3,11 +3,11 @@
 import math
 
 from controller.kernels import wrap
+from rig.bench.cross_checks import OVERTRAVEL_FACTOR
 from rig.tick.safety.layout import ARMED, DISARMED, OFF, RAMPING, EndReason
 from vibrolock.compiled import Record, kernel
 
 FORCE = 0  # `rig.daq.Role.FORCE`
-OVERTRAVEL_FACTOR = 1.25  # beyond this multiple of a limit a ramp would take too long: drop to 0 V
 
 FORCE_LIMIT = int(EndReason.FORCE_LIMIT)
 RESPONSE_LIMIT = int(EndReason.RESPONSE_LIMIT)

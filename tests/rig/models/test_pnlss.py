@@ -14,7 +14,7 @@ from rig.campaigns.plans import plan_from
 from rig.models.files.files import load, save
 from rig.models.files.pnlss_figure import draw_pnlss
 from rig.models.identify.pnlss_request import PnlssOptions
-from rig.text.console import FitLines
+from rig.show.progress import FitLines
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
 

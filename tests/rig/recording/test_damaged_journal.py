@@ -8,7 +8,7 @@ import pytest
 import rig
 from rig.campaigns.running.execution import Silent
 from rig.cli import main
-from rig.recording.blocks import Kind
+from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.recording.sequence import read_journal
@@ -48,7 +48,7 @@ def test_a_lost_block_of_rows_costs_its_rows_and_no_point(recorded, monkeypatch,
     with Recording(recorded) as recording:
         n_rows, points = recording.n_rows, recording.points
         before = recording.parts[0].read(0, n_rows)
-    block = damage(recorded, Kind.ROWS, 4)
+    block = damage(recorded, BlockKind.ROWS, 4)
     lost = len(block.payload) // before.dtype.itemsize
     with Recording(recorded) as recording:
         assert recording.points == points
@@ -72,7 +72,7 @@ def test_a_lost_block_of_rows_costs_its_rows_and_no_point(recorded, monkeypatch,
 
 
 def test_a_lost_point_is_told_and_measured_again_alone(recorded, capsys):
-    damage(recorded, Kind.POINT, 0)
+    damage(recorded, BlockKind.POINT, 0)
     with Recording(recorded) as recording:
         assert [point["number"] for point in recording.points] == [1]
         kept = recording.points[0]

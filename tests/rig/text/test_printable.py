@@ -6,8 +6,9 @@ import sys
 import pytest
 
 from rig.errors import ConfigurationError, DaqError
+from rig.show.progress import RunProgress
 from rig.show.tables import print_summary
-from rig.text.console import RunProgress, print_table
+from rig.text.console import print_table
 from rig.text.printable import LONGEST_LINE, one_line, printable, shown
 
 

@@ -19,7 +19,7 @@ from rig.campaigns.multisine.plan import MultisinePlan
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.measurements.points_left_out import points_left_out
-from rig.recording.blocks import Kind
+from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.recording.sequence import read_journal
@@ -177,9 +177,9 @@ def test_realisations_of_different_lengths_make_one_spectrum(tmp_path):
 def test_the_journal_of_a_killed_second_part_is_read_wherever_it_ends_and_knows_its_plan(under_way, tmp_path):
     whole = journal_path(under_way).read_bytes()
     blocks = [(block.kind, block.stop) for block in read_journal(journal_path(under_way))]
-    begins = next(stop for kind, stop in blocks if kind is Kind.PART)
+    begins = next(stop for kind, stop in blocks if kind is BlockKind.PART)
     output = Path(shutil.copy(under_way, tmp_path / "run.h5"))
-    points_at = [stop for kind, stop in blocks if kind is Kind.POINT]
+    points_at = [stop for kind, stop in blocks if kind is BlockKind.POINT]
     cuts = {begins - 1, begins, *(stop + offset for stop in points_at for offset in (-1, 0)), len(whole) - 1}
     for cut in sorted(cuts):
         journal_path(output).write_bytes(whole[:cut])
@@ -195,7 +195,7 @@ def test_the_journal_of_a_killed_second_part_is_read_wherever_it_ends_and_knows_
 @pytest.mark.parametrize("points_left", [0, 1, 2])
 def test_a_kill_in_the_second_part_is_resumed_by_the_changed_plan(under_way, tmp_path, points_left):
     whole = journal_path(under_way).read_bytes()
-    stops = [block.stop for block in read_journal(journal_path(under_way)) if block.kind is Kind.POINT]
+    stops = [block.stop for block in read_journal(journal_path(under_way)) if block.kind is BlockKind.POINT]
     output = Path(shutil.copy(under_way, tmp_path / "run.h5"))
     journal_path(output).write_bytes(whole[: [*stops, len(whole)][2 - points_left] - 5])
     with rig.resume(output) as run:

@@ -1,9 +1,9 @@
 """A rig held at a tone, for as long as a test wants."""
 
 from controller import AmplitudeLaw, preset
-from rig.loop.session import TickSettings
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
+from rig.tick.tick import TickSettings
 from tests.rig.rigs import bench_with
 
 RATE_HZ = 1000.0

@@ -12,7 +12,6 @@ from controller.layout import FORCE, RESPONSE
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
-from rig.loop.session import TickSettings
 from rig.tick.safety.following.expected import expected_record
 from rig.tick.safety.following.kernels import (
     ASTRAY_PERIODS,
@@ -27,6 +26,7 @@ from rig.tick.safety.following.kernels import (
 from rig.tick.safety.following.layout import FOLLOWING
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.limits import describe_end
+from rig.tick.tick import TickSettings
 from tests.rig.rigs import bench_with
 
 FORCE_CHANNEL, DRIVE_CHANNEL = 0, 1
