@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from simulators.plant.assembly import LinearPlant
-from vibrolock.lanes.kernels import WIDTH
+from vibrolock.lanes import WIDTH
 
 __all__ = ["PhiMatrices", "StepColumns", "aligned", "pad", "phi_matrices", "round_up", "step_columns"]
 

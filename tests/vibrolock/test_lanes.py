@@ -1,7 +1,7 @@
 import numpy as np
 
 from vibrolock.compiled import kernel
-from vibrolock.lanes.kernels import WIDTH, greatest, least, load, spread, store
+from vibrolock.lanes import WIDTH, greatest, least, load, spread, store
 
 
 @kernel
