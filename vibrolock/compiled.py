@@ -18,7 +18,7 @@ import time
 import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, ParamSpec, TypeAlias, TypeVar
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numba
 import numpy as np
@@ -145,7 +145,7 @@ class _ContentLocator:
 
 
 class _ContentImpl(CompileResultCacheImpl):
-    _locator_classes: ClassVar[list[type[object]]] = [_ContentLocator]
+    _locator_classes: list[type[object]] = [_ContentLocator]  # noqa: RUF012
 
 
 class _ContentCache(FunctionCache):
