@@ -16,8 +16,10 @@ from identification import (
     force_drop_out,
     periodic_spectra,
 )
+from rig.campaigns.multisine.figure import draw_multisine
+from rig.campaigns.stepped_sine.figure import draw_stepped_sine
+from rig.campaigns.sweep.figure import draw_sweep
 from rig.figures.style import STYLE
-from rig.figures.transients import draw_multisine, draw_stepped_sine, draw_sweep
 
 CHANNELS = (
     Channel("voltage", "monitor", "V"),
