@@ -14,6 +14,7 @@ from identification import (
 )
 from identification import force_surface as surface_of
 from identification.multisine.best_linear_approximation import Estimator
+from rig.campaigns.dwell.campaign import DwellCourse
 from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows
 from rig.campaigns.kinds import KINDS, kinds_that_yield
 from rig.errors import RecordingError
@@ -25,6 +26,7 @@ __all__ = [
     "backbone",
     "bench_of_recording",
     "continuous_backbones",
+    "dwell_course",
     "force_surface",
     "frequency_responses",
     "load_backbone",
@@ -63,6 +65,14 @@ def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
     `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
     return cast(tuple[FrequencyResponse, ...], _measured(recording, FrequencyResponse))
+
+
+def dwell_course(recording: Recording) -> DwellCourse:
+    """Frequency, damping, amplitude and force of every accepted mean of a dwell, over cycles and time.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any mean.
+    """
+    return cast(DwellCourse, _measured(recording, DwellCourse))
 
 
 def force_surface(recording: Recording) -> ForceSurface:
