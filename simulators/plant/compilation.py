@@ -18,7 +18,7 @@ from simulators.sites.elements import Element
 from simulators.sites.friction import FrictionSite
 from vibrolock.lanes import WIDTH
 
-__all__ = ["at_rest", "jenkins_elements", "rig_arrays"]
+__all__ = ["at_rest", "jenkins_elements", "rediscretised", "rig_arrays"]
 
 Matrix = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def rig_arrays(
     seed: int,
 ) -> RigArrays:
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
-    step = step_columns(plant, len(joints), 1.0 / (converter.sample_rate_hz * converter.substeps))
+    step = step_columns(plant, len(joints), _step_s(converter))
     jenkins = jenkins_elements(joints)
     substeps = converter.substeps // converter.oversampling
     sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
@@ -57,6 +57,19 @@ def rig_arrays(
         reconstruction=output_sections(converter),
         taps=taps,
     )
+
+
+def rediscretised(
+    rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Matrix], converter: Converter
+) -> RigArrays:
+    """The arrays of a rig with another plant of the same coordinates and sites; ``outputs``: one row per sensor, of it."""
+    step = step_columns(plant, n_joint, _step_s(converter))
+    return rig._replace(step=step.predictor, correct=step.corrector, sense=pad(np.array(outputs).T))
+
+
+def _step_s(converter: Converter) -> float:
+    """Integration step (s)."""
+    return 1.0 / (converter.sample_rate_hz * converter.substeps)
 
 
 def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:
