@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.multisine.best_linear_approximation import chosen
+from identification.multisine.estimators import chosen
 from identification.multisine.spectra import PeriodicSpectra
 
 __all__ = ["coherence"]
@@ -26,7 +26,7 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     Parameters
     ----------
     spectra
-        What was recorded.
+        Recorded spectra.
     output
         Name of a channel.
     inputs
@@ -59,6 +59,8 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     dependent = np.linalg.eigvalsh(powers)[:, 0] < _DEPENDENT
     if np.any(dependent):
         where = spectra.frequency_hz[spectra.excited][int(np.argmax(dependent))]
-        raise IdentificationError(f"inputs: depend on each other at {where:g} Hz, their parts cannot be told")
+        raise IdentificationError(
+            f"inputs: depend on each other at {where:g} Hz, their shares cannot be separated"
+        )
     found = np.einsum("ki,kij,kj->k", cross, np.linalg.inv(powers), np.conj(cross)).real
     return np.asarray(np.clip(found, 0.0, 1.0))
