@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from identification.linear.extrapolation import extrapolated_to_zero
     from identification.linear.modal_analysis import linear_modes
     from identification.linear.mode_correlation import mac_matrix
+    from identification.linear.mode_shapes import ModeShapes, mac
     from identification.linear.modes import LinearModes
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from identification.multisine.design import MultisineDesign
     from identification.multisine.distortion import DistortionLevels, distortion_levels
     from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
-    from identification.nonlinear.mode_shapes import ModeShapes, mac
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
@@ -45,7 +45,13 @@ if TYPE_CHECKING:
     from identification.pnlss.best_linear import best_linear_responses
     from identification.pnlss.coupled.run import CoupledRun, pnlss_coupled_run
     from identification.pnlss.error_table import ErrorTable
-    from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
+    from identification.pnlss.errors import (
+        PnlssErrors,
+        error_spectra,
+        estimated_initial_state,
+        pnlss_errors,
+        simulated_run,
+    )
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
     from identification.pnlss.fitting.fit import fit_pnlss
@@ -67,7 +73,7 @@ if TYPE_CHECKING:
     from identification.prediction.predictions import Predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
-    from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun, error_spectra, simulated_run
+    from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun
     from identification.prediction.steady_prediction import SteadyPrediction
     from identification.prediction.sweep_inputs import VoltageSweep
     from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
@@ -233,7 +239,7 @@ _MODULE_OF = {
     "LinearModes": "linear.modes",
     "ModalAnalysis": "linear.analysis",
     "ModalProperties": "prediction.properties",
-    "ModeShapes": "nonlinear.mode_shapes",
+    "ModeShapes": "linear.mode_shapes",
     "ModelJob": "pnlss.model_jobs",
     "MultisineDesign": "multisine.design",
     "MultisineMapping": "mapping.multisine",
@@ -274,7 +280,7 @@ _MODULE_OF = {
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
-    "error_spectra": "prediction.simulated_runs",
+    "error_spectra": "pnlss.errors",
     "error_table": "prediction.comparison",
     "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
@@ -288,7 +294,7 @@ _MODULE_OF = {
     "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
     "linear_pnlss": "pnlss.linear_model",
-    "mac": "nonlinear.mode_shapes",
+    "mac": "linear.mode_shapes",
     "mac_matrix": "linear.mode_correlation",
     "map_backbone": "mapping.backbone",
     "map_frequency_responses": "mapping.stepped_sine",
@@ -311,7 +317,7 @@ _MODULE_OF = {
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",
     "short_point": "slow_flows.short_points",
-    "simulated_run": "prediction.simulated_runs",
+    "simulated_run": "pnlss.errors",
     "single_point_mode": "nonlinear.single_points",
     "slow_flow": "slow_flows.slow_flow",
     "stabilisation": "linear.stabilisation",

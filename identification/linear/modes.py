@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
+from identification.linear.mode_shapes import ModeShapes
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.nonlinear.mode_shapes import ModeShapes
 from identification.validation import finite_array
 
 __all__ = ["LinearModes"]

@@ -59,8 +59,6 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     dependent = np.linalg.eigvalsh(powers)[:, 0] < _DEPENDENT
     if np.any(dependent):
         where = spectra.frequency_hz[spectra.excited][int(np.argmax(dependent))]
-        raise IdentificationError(
-            f"inputs: depend on each other at {where:g} Hz, their shares cannot be separated"
-        )
+        raise IdentificationError(f"inputs: depend on each other at {where:g} Hz, their shares cannot be separated")
     found = np.einsum("ki,kij,kj->k", cross, np.linalg.inv(powers), np.conj(cross)).real
     return np.asarray(np.clip(found, 0.0, 1.0))
