@@ -59,13 +59,11 @@ if TYPE_CHECKING:
     from identification.pnlss.fitting.settings import FitProgress, FitSettings
     from identification.pnlss.identify import identify_pnlss
     from identification.pnlss.linear_model import linear_pnlss
-    from identification.pnlss.many import IdentifiedModel, identify_many
+    from identification.pnlss.many import IdentifiedModel, ModelJob, identify_many, realisation_combinations
     from identification.pnlss.model import PnlssModel
-    from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
     from identification.pnlss.steady.response import pnlss_frequency_response, pnlss_response, pnlss_steady_state
-    from identification.pnlss.steady.result import PnlssResponse
-    from identification.pnlss.steady.states import SteadyStates
+    from identification.pnlss.steady.states import PnlssResponse, SteadyStates
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
@@ -240,7 +238,7 @@ _MODULE_OF = {
     "ModalAnalysis": "linear.analysis",
     "ModalProperties": "prediction.properties",
     "ModeShapes": "linear.mode_shapes",
-    "ModelJob": "pnlss.model_jobs",
+    "ModelJob": "pnlss.many",
     "MultisineDesign": "multisine.design",
     "MultisineMapping": "mapping.multisine",
     "NonlinearMode": "nonlinear.nonlinear_modes",
@@ -251,7 +249,7 @@ _MODULE_OF = {
     "PnlssFit": "pnlss.fitting.result",
     "PnlssMapping": "mapping.pnlss",
     "PnlssModel": "pnlss.model",
-    "PnlssResponse": "pnlss.steady.result",
+    "PnlssResponse": "pnlss.steady.states",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
@@ -312,7 +310,7 @@ _MODULE_OF = {
     "pnlss_response": "pnlss.steady.response",
     "pnlss_steady_state": "pnlss.steady.response",
     "predict_sweep": "prediction.sweeps",
-    "realisation_combinations": "pnlss.model_jobs",
+    "realisation_combinations": "pnlss.many",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",

@@ -15,8 +15,7 @@ from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.spectra import PeriodicSpectra
-from identification.pnlss.experiment import Experiment
-from identification.pnlss.experiment_groups import excited_band, same_channels
+from identification.pnlss.experiment import Experiment, excited_band, same_channels
 from identification.pnlss.periods import periodic_ones
 
 __all__ = ["best_linear_responses"]

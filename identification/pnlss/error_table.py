@@ -10,8 +10,8 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
+from identification.pnlss.many import ModelJob
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.model_jobs import ModelJob
 
 __all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest"]
 

@@ -11,7 +11,7 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
-__all__ = ["Experiment", "InitialState"]
+__all__ = ["Experiment", "InitialState", "excited_band", "same_channels", "same_data"]
 
 Float = NDArray[np.float64]
 InitialState = Literal["zero", "estimated"]
@@ -193,3 +193,36 @@ class Experiment:
     def weighted(self, weight: float) -> "Experiment":
         """The same with another weight."""
         return replace(self, weight=weight)
+
+
+def excited_band(experiments: Sequence[Experiment]) -> tuple[float, float] | None:
+    """Lowest and highest frequency that any experiment excites; None if no experiment states a band."""
+    bands = [experiment.excited_hz for experiment in experiments if experiment.excited_hz is not None]
+    return (min(low for low, _ in bands), max(high for _, high in bands)) if bands else None
+
+
+def same_data(one: Experiment, other: Experiment) -> bool:
+    """Whether two experiments hold the same samples: one object, or the same file read twice."""
+    if one is other:
+        return True
+    pairs = ((one.inputs, other.inputs), (one.outputs, other.outputs))
+    return all(a.shape == b.shape for a, b in pairs) and all(np.array_equal(a, b) for a, b in pairs)
+
+
+def same_channels(experiments: Sequence[Experiment]) -> None:
+    """Raise `IdentificationError` unless there is at least one and all have the same channels and sample rate."""
+    if not experiments:
+        raise IdentificationError("experiments: none given, needs one at least")
+    first = experiments[0]
+    for index, other in enumerate(experiments):
+        what = f"experiments[{index}]{f' ({other.name})' if other.name else ''}"
+        if abs(other.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
+            raise IdentificationError(
+                f"{what}: sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one"
+            )
+        for name in ("input_channels", "output_channels"):
+            mine, theirs = (tuple(c.name for c in getattr(e, name)) for e in (other, first))
+            if mine != theirs:
+                raise IdentificationError(
+                    f"{what}: {name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}"
+                )

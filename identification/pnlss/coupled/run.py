@@ -20,7 +20,7 @@ from identification.pnlss.coupled.reaction import Reaction, chosen_filter
 from identification.pnlss.kernels import workspace
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulation import Simulation, use_of
-from identification.pnlss.steady.excitation import linear_resonance_hz
+from identification.pnlss.steady.setting_up import linear_resonance_hz
 from identification.prediction.exciter import Exciter
 from identification.validation import finite_array, positive
 

@@ -15,9 +15,8 @@ from scipy.linalg.blas import dgemm, dsyrk
 from identification.pnlss.fitting.frequency_lines import transformed
 from identification.pnlss.fitting.kernels import sensitivities
 from identification.pnlss.fitting.layout import System, room
-from identification.pnlss.fitting.parameters import Parameters
+from identification.pnlss.fitting.parameters import Parameters, slopes_of
 from identification.pnlss.fitting.records import BOUND, Record
-from identification.pnlss.fitting.slopes import slopes_of
 
 __all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "kept_samples", "normal_equations"]
 

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.frequency_lines import with_lines
-from identification.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
 from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
-from identification.pnlss.fitting.records import Record, records_of, simulated
+from identification.pnlss.fitting.records import PRIOR, Record, fitted_initial_state, records_of, simulated
 from identification.pnlss.fitting.settings import FitSettings
 from identification.pnlss.model import PnlssModel
 

@@ -1,4 +1,4 @@
-"""Periodic vibrations of a nonlinear state-space model, with all their harmonics."""
+"""Periodic vibrations of a nonlinear state-space model with all harmonics, and a frequency response made of them."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,8 +12,9 @@ from identification.pnlss.simulation import use_of
 from identification.pnlss.steady.balance import Balance
 from identification.pnlss.steady.basis import harmonics_of
 from identification.pnlss.steady.stability import Loss, loss_of_stability, multipliers
+from identification.prediction.steady_prediction import SteadyPrediction
 
-__all__ = ["SteadyStates", "motion_rows", "steady_states"]
+__all__ = ["PnlssResponse", "SteadyStates", "motion_rows", "steady_states"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -172,3 +173,53 @@ def steady_states(
         input_channels=model.inputs,
         output_channels=model.outputs,
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PnlssResponse:
+    """Frequency response of a nonlinear state-space model at constant force, with all harmonics.
+
+    Parameters
+    ----------
+    force_n, force
+        Level and kind of the force that is held, as in `SteadyPrediction`.
+    points, folds
+        The vibrations along the curve, and those at its turning points in frequency.
+    branch
+        int[n], 0 for the response that begins at the lowest frequency; 1 for a part followed from the highest frequency
+        because the first did not reach it.
+    notes
+        Notes for the user, one line each.
+    complete
+        Whether every path reached the far end of the band; otherwise a note says where it ended and why.
+    """
+
+    force_n: float
+    force: str
+    points: SteadyStates
+    folds: SteadyStates
+    branch: NDArray[np.int64]
+    notes: tuple[str, ...]
+    complete: bool = True
+
+    @property
+    def prediction(self) -> SteadyPrediction:
+        """The fundamental harmonics; the modal amplitude is unknown, for no mode shape is needed."""
+        count, folds = self.points.count, self.folds.count
+        return SteadyPrediction(
+            force_n=self.force_n,
+            force=self.force,
+            channels=self.points.channels,
+            frequency_hz=self.points.frequency_hz,
+            modal_amplitude=np.full(count, np.nan),
+            fundamental_n=np.abs(self.points.force_n[:, 1]),
+            displacement_m=self.points.displacement_m[:, 1],
+            stable=self.points.stable,
+            branch=self.branch,
+            range_use=np.asarray(self.points.range_use),
+            fold_frequency_hz=self.folds.frequency_hz,
+            fold_amplitude_m=np.abs(self.folds.displacement_m[:, 1, 0]),
+            fold_modal_amplitude=np.full(folds, np.nan),
+            notes=self.notes,
+            complete=self.complete,
+        )

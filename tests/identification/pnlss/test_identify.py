@@ -20,8 +20,8 @@ from identification import (
 from identification.linear.state_space_fit import spectral_radius
 from identification.pnlss import identify, saturating_starts
 from identification.pnlss import linear_model as linear_model_module
-from identification.pnlss.fitting import memory
-from identification.pnlss.linear_start import linear_start, reflected
+from identification.pnlss.fitting import checks
+from identification.pnlss.linear_model import linear_start, reflected
 from tests.identification.pnlss.multisines import RATE_HZ, channels, linear_model, measured, multisine, oscillator
 
 
@@ -270,7 +270,7 @@ def test_what_cannot_be_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         identify_pnlss(experiments, states=4, linear=oscillator())
     with pytest.raises(IdentificationError, match="linear: has an eigenvalue of magnitude 2"):
         identify_pnlss(experiments, states=2, linear=oscillator()._replace(a=2.0 * np.eye(2)))
-    monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
+    monkeypatch.setattr(checks, "available_bytes", lambda: 1000)
     with pytest.raises(IdentificationError, match="memory: the fit needs"):
         identify_pnlss(experiments, states=2)
 
