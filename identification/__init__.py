@@ -15,12 +15,10 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
-    from identification.linear.analysis import ModalAnalysis
     from identification.linear.extrapolation import extrapolated_to_zero
-    from identification.linear.modal_analysis import linear_modes
-    from identification.linear.mode_correlation import mac_matrix
+    from identification.linear.modal_analysis import ModalAnalysis, linear_modes
     from identification.linear.mode_shapes import ModeShapes, mac
-    from identification.linear.modes import LinearModes
+    from identification.linear.modes import LinearModes, mac_matrix
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
     from identification.linear.state_space_fit import StateSpaceFit, fit_state_space
@@ -235,7 +233,7 @@ _MODULE_OF = {
     "IdentifiedModel": "pnlss.many",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
-    "ModalAnalysis": "linear.analysis",
+    "ModalAnalysis": "linear.modal_analysis",
     "ModalProperties": "prediction.properties",
     "ModeShapes": "linear.mode_shapes",
     "ModelJob": "pnlss.many",
@@ -293,7 +291,7 @@ _MODULE_OF = {
     "linear_modes": "linear.modal_analysis",
     "linear_pnlss": "pnlss.linear_model",
     "mac": "linear.mode_shapes",
-    "mac_matrix": "linear.mode_correlation",
+    "mac_matrix": "linear.modes",
     "map_backbone": "mapping.backbone",
     "map_frequency_responses": "mapping.stepped_sine",
     "map_multisine": "mapping.multisine",

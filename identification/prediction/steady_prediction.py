@@ -1,4 +1,4 @@
-"""A predicted frequency response at constant force, as data."""
+"""A predicted frequency response at constant force, and the peak of a sampled curve."""
 
 from dataclasses import dataclass
 
@@ -6,12 +6,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.prediction.peaks import peak_of
 
-__all__ = ["Peak", "SteadyPrediction"]
+__all__ = ["Peak", "SteadyPrediction", "peak_of"]
 
-Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_NEAR_THE_TOP = 0.9
+
+
+def peak_of(amplitude: Float, *columns: Float) -> tuple[float, ...]:
+    """Largest amplitude of a curve and the other columns there, by a parabola through the three highest points.
+
+    Points are taken as evenly spaced along the curve. The result is the largest point itself if one of its
+    neighbours is missing, or lies so far below that the curve jumps there or is too coarsely sampled.
+    """
+    top = int(np.argmax(amplitude))
+    values = np.column_stack([amplitude, *columns])
+    if not 0 < top < amplitude.size - 1:
+        return tuple(values[top].tolist())
+    before, here, after = amplitude[top - 1 : top + 2]
+    bend = before - 2.0 * here + after
+    if min(before, after) < _NEAR_THE_TOP * here or bend == 0.0:
+        return tuple(values[top].tolist())
+    shift = 0.5 * (before - after) / bend
+    weights = np.array([0.5 * shift * (shift - 1.0), 1.0 - shift**2, 0.5 * shift * (shift + 1.0)])
+    return tuple((weights @ values[top - 1 : top + 2]).tolist())
 
 
 @dataclass(frozen=True)

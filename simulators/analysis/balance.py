@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from simulators.analysis.condensed import CondensedRig, CondensedStructure
 from simulators.analysis.conditions import Conditions
-from simulators.analysis.errors import NotConvergedError
-from simulators.analysis.series import Series
-from simulators.analysis.site_forces import SiteForces
+from simulators.analysis.responses import NotConvergedError
+from simulators.analysis.site_forces import Series, SiteForces
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["Balance", "Solution"]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from simulators.analysis.balance import Balance, Solution
 from simulators.analysis.condensed import CondensedStructure
 from simulators.analysis.responses import PeriodicResponses
-from simulators.analysis.series import Series
+from simulators.analysis.site_forces import Series
 from simulators.layout import Flag
 from simulators.virtual_rig import VirtualRig
 

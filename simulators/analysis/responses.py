@@ -1,11 +1,11 @@
-"""Periodic vibrations of a coupled rig as data: arrays with one entry per point."""
+"""Periodic vibrations of a coupled rig as data, one entry per point, and the error for those that are not found."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HysteresisLoop", "PeriodicResponses"]
+__all__ = ["HysteresisLoop", "NotConvergedError", "PeriodicResponses"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -94,3 +94,14 @@ class HysteresisLoop:
     def dissipated_j(self) -> float:
         """Energy lost per period (J): the area of the loop."""
         return float(np.sum(0.5 * (self.force[1:] + self.force[:-1]) * np.diff(self.coordinate)))
+
+
+class NotConvergedError(ArithmeticError):
+    """No periodic vibration was found at a point asked for: the level is out of reach, or the path ends.
+
+    The message names the point. ``found`` holds the points found before, in the order asked for; None if there are none.
+    """
+
+    def __init__(self, message: str, found: "PeriodicResponses | None" = None) -> None:
+        super().__init__(message)
+        self.found = found

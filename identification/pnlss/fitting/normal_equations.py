@@ -21,6 +21,7 @@ from identification.pnlss.fitting.records import BOUND, Record
 __all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "kept_samples", "normal_equations"]
 
 Float = NDArray[np.float64]
+
 BLOCK = 256
 """Samples of a block whose derivatives are kept: its Jacobian stays in the cache between the recursion and the products."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
