@@ -21,7 +21,9 @@ def model_arrays(fields: Mapping[str, Any]) -> tuple[dict[str, NDArray[Any]], di
     arrays: dict[str, NDArray[Any]] = {name: fields[name] for name in (*MATRICES, "state_range", "input_range")}
     for name in _FEATURES:
         arrays |= {f"{name}/{part}": getattr(fields[name], part) for part in _PARTS}
+    functions = {f"{name}/functions": list(fields[name].functions) for name in _FEATURES if fields[name].functions}
     return arrays, {
+        **functions,
         "sample_rate_hz": fields["sample_rate_hz"],
         "inputs": [vars(channel) for channel in fields["inputs"]],
         "outputs": [vars(channel) for channel in fields["outputs"]],
@@ -39,7 +41,8 @@ def model_values(arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, An
         variables = int(values["a"].shape[0] + values["b"].shape[1])
         for name in _FEATURES:
             parts: dict[str, Any] = {part: arrays[f"{name}/{part}"] for part in _PARTS}
-            values[name] = Features(variables=variables, **parts)
+            functions = tuple(attributes.get(f"{name}/functions", ()))
+            values[name] = Features(variables=variables, functions=functions, **parts)
         for name in ("inputs", "outputs"):
             values[name] = tuple(Channel(**channel) for channel in attributes[name])
         for name in ("training", "notes"):

@@ -133,10 +133,9 @@ def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int, validated
                 f"resume: its {name} has shape {theirs}, that of the start {mine}; give the same start"
             )
     for name in ("state_features", "output_features"):
-        if not np.array_equal(getattr(start, name).exponents, getattr(resume.last, name).exponents):
-            raise IdentificationError(
-                f"resume: its {name} are other monomials than those of the start; give the same start"
-            )
+        mine, theirs = getattr(start, name), getattr(resume.last, name)
+        if not np.array_equal(mine.exponents, theirs.exponents) or mine.functions != theirs.functions:
+            raise IdentificationError(f"resume: its {name} differ from those of the start; give the same start")
     if len(resume.last_initial_states) != estimated:
         raise IdentificationError(
             f"resume: has {len(resume.last_initial_states)} estimated initial states, the experiments {estimated}; "

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.pnlss.features import with_weights
 from identification.pnlss.fitting.layout import Slopes, System
 from identification.pnlss.kernels import Matrices, Table
 from identification.pnlss.model import PnlssModel
@@ -19,8 +20,8 @@ Float = NDArray[np.float64]
 class Parameters:
     """Layout of the vector: first the parameters that all outputs share, then those of each output.
 
-    Shared are [A B E] row by row, the weights of saturating state features row by row, those of saturating output features,
-    and the initial states of the experiments that have theirs estimated; own are [C D F] row by row.
+    Shared are [A B E] row by row, the weights in the state features row by row, those in the output features, and the
+    estimated initial states of experiments; own are [C D F] row by row.
 
     Parameters
     ----------
@@ -108,8 +109,8 @@ class Parameters:
         return System(
             linear.reshape(self.start.states, -1),
             own.reshape(len(self.start.outputs), -1),
-            _weighted(state, inner_state),
-            _weighted(output, inner_output),
+            with_weights(state, inner_state.reshape(state.weights.shape)),
+            with_weights(output, inner_output.reshape(output.weights.shape)),
         )
 
     def initial_states(self, vector: Float) -> Float:
@@ -125,11 +126,6 @@ class Parameters:
             state_features=replace(start.state_features, weights=system.state_table.weights),
             output_features=replace(start.output_features, weights=system.output_table.weights),
         )
-
-
-def _weighted(table: Table, weights: Float) -> Table:
-    rows = weights.reshape(table.weights.shape)
-    return table._replace(weights=rows, at_rest=np.tanh(rows[:, -1]))
 
 
 def matrices_of(system: System) -> Matrices:
@@ -167,5 +163,6 @@ def slopes_of(system: System) -> Slopes:
         np.minimum(system.state_table.limits, system.output_table.limits),
         np.zeros((0, system.state_table.limits.size + 1)),
         np.zeros(0),
+        np.zeros(0, dtype=np.int64),
     )
     return Slopes(table, np.array(list(found.values())).reshape(len(found), (n + outputs) * n))
