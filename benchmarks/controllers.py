@@ -19,7 +19,7 @@ import rig
 from controller import preset
 from controller.tuning import PlantModel, complex_response_law, exact_phase_law, exact_scheduled_law, hippold_gains
 from rig.bench import Bench, load_bench
-from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.plans import load_plan
 from simulators.analysis import PeriodicResponses, frequency_response, phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig

@@ -19,9 +19,9 @@ from controller import AmplitudeLaw, PhaseLockedLoop, preset
 from rig.bench import Bench, load_bench
 from rig.drivers import make_daq
 from rig.drivers.virtual.driver import VirtualDAQ
-from rig.sequencer.layout import SegmentKind
-from rig.sequencer.segments import Segment, SettleRule
 from rig.tick.kernels import tick_block
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
 
 ROUNDS = 11

@@ -20,7 +20,7 @@ from joblib import parallel_config
 
 import rig
 from identification import FitSettings, identify_many, identify_pnlss, realisation_combinations
-from rig.experiments import experiments
+from rig.measurements.experiments import experiments
 
 ITERATIONS = 30
 WORKERS = 2

@@ -29,11 +29,11 @@ import numpy as np
 
 from rig.bench import Bench, DriverChoice, load_bench
 from rig.drivers import make_daq
+from rig.emulator.emulated import Emulator
 from rig.errors import RigError
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.recording.store import finalise
-from rig.wire.device.emulator import Emulator
 from rig.wire.serial.pty import open_pseudo_terminal
 
 RUN = """
@@ -74,7 +74,7 @@ def relay(port: str) -> None:
 def child_of(process: int) -> int:
     """Number of the loop process of a campaign."""
     found = subprocess.run(
-        ["pgrep", "-P", str(process), "-f", "rig.worker"], capture_output=True, text=True, check=False
+        ["pgrep", "-P", str(process), "-f", "rig.loop.worker"], capture_output=True, text=True, check=False
     )
     if not found.stdout:
         raise EndedEarlyError

@@ -31,15 +31,15 @@ import numpy as np
 
 from controller import AmplitudeLaw, preset
 from rig.bench import Bench, load_bench
+from rig.loop.worker.memory import TIMES
+from rig.loop.worker.session import WorkerSession
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter
-from rig.sequencer.layout import SegmentKind
-from rig.sequencer.segments import Excitation, Segment, SettleRule
-from rig.session import TickSettings
+from rig.system.privileges import PRIORITY
 from rig.tick.layout import ROW_COLUMNS
-from rig.worker.memory import TIMES
-from rig.worker.privileges import PRIORITY
-from rig.worker.session import WorkerSession
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
+from rig.tick.tick import TickSettings
 
 TURN_S = 15.0
 FREQUENCY_HZ = 24.4

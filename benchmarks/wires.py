@@ -17,7 +17,7 @@ import numpy as np
 import rig
 from rig.bench import Bench
 from rig.campaigns.plans import bench_of, load_plan
-from rig.wire.device.emulator import emulated
+from rig.emulator.emulated import emulated
 
 BLOCKS = {"serial": 14, "can": 14}
 QUEUE = 2

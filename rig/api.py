@@ -13,17 +13,17 @@ from identification import (
     PeriodicSpectra,
     Transient,
 )
+from rig.arming.arming import Arm
+from rig.arming.run_facts import About
 from rig.bench import Bench, load_bench
-from rig.campaigns.about import About
-from rig.campaigns.arming import Arm
-from rig.campaigns.execution import Progress
-from rig.campaigns.plan import Plan
+from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
-from rig.campaigns.runner import carry_out, take_up
+from rig.campaigns.running.execution import Progress
+from rig.campaigns.running.runner import carry_out, take_up
 from rig.errors import ConfigurationError
-from rig.experiments import experiments
-from rig.experiments.periods import Periods
 from rig.measurements import Estimator, backbone, force_surface, frequency_responses, response_matrices, spectra, sweeps
+from rig.measurements.experiments import experiments
+from rig.measurements.experiments.periods import Periods
 from rig.recording.reader import Recording
 
 __all__ = ["Run", "resume", "run"]
@@ -75,7 +75,7 @@ class Run:
         transient_periods: float | None = None,
         segment_periods: int = 30,
     ) -> tuple[Experiment, ...]:
-        """The accepted points as training or test data of nonlinear state-space models (`rig.experiments.experiments`)."""
+        """The accepted points as data of nonlinear state-space models (`rig.measurements.experiments.experiments`)."""
         return experiments(
             self.recording,
             inputs=inputs,
@@ -122,7 +122,7 @@ def run(
     same recording bit for bit on the same machine. ``realtime`` holds a virtual rig back to the wall clock.
 
     A bench on which something physical moves is armed by a person: ``arm`` is True, or a callable that is given a
-    `rig.campaigns.arming.ArmingRequest` and answers. ``operator`` (the user if not given), ``specimen_serial`` and
+    `rig.arming.arming.ArmingRequest` and answers. ``operator`` (the user if not given), ``specimen_serial`` and
     ``notes`` are recorded.
 
     Raises `rig.errors.ConfigurationError` for a plan or bench that is not allowed, `rig.errors.RecordingError` for a

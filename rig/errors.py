@@ -1,6 +1,6 @@
 """The errors of the bench: a small tree, each with one clear line that says what happened, where, and what to do."""
 
-from rig.printable import one_line
+from rig.text.printable import one_line
 
 __all__ = [
     "ConfigurationError",

@@ -28,23 +28,11 @@ def test_a_wheel_holds_benches_plans_specimens_and_type_markers(tmp_path):
     (wheel,) = tmp_path.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     for wanted in (
-        "rig/benches/magnet-beam.toml",
-        "rig/plans/magnet-beam/backbone.toml",
-        "rig/plans/magnet-beam-symmetric/backbone.toml",
+        "rig/bench/shipped/magnet-beam.toml",
+        "rig/campaigns/shipped/magnet-beam/backbone.toml",
+        "rig/campaigns/shipped/magnet-beam-symmetric/backbone.toml",
         "simulators/specimens/magnet-beam.toml",
         *(f"{package}/py.typed" for package in PACKAGES),
     ):
         assert wanted in names
     assert not [name for name in names if name.startswith(("tests/", "benchmarks/", "docs/"))]
-
-
-def test_a_changed_kernel_source_gets_a_cache_of_its_own(monkeypatch, tmp_path):
-    from vibrolock import compiled
-
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    before = compiled.kernel_cache_folder()
-    assert before.is_dir()
-    assert compiled.kernel_cache_folder() == before
-    read = Path.read_bytes
-    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + (b" " if path.name == "kernels.py" else b""))
-    assert compiled.kernel_cache_folder() != before

@@ -1,25 +1,30 @@
-"""One decorator for every compiled kernel of the distribution.
+"""One decorator for every compiled kernel of the distribution, and a cache of machine code that knows its content.
 
-A kernel is a module-level function in a file called ``kernels.py``: plain arrays, structured arrays and scalars in
-and out, no allocation per sample, never raising. It returns codes; its caller raises.
+A kernel is a module-level function: plain arrays, structured arrays and scalars in and out, no allocation per sample, never
+raising. It returns codes; its caller raises.
 
-numba's own cache does not notice when a kernel that is called from another file has changed. The cache folder therefore
-carries a hash of all kernel sources and record layouts of the distribution, and a changed source starts an empty folder.
+numba's own cache knows a kernel by its file, and does not notice when a kernel that it calls, or a constant that is compiled
+in, has changed elsewhere. Here machine code is found by a digest of all that goes into it (`content_digest`).
 """
 
 import contextlib
+import enum
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 import time
+import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numba
+import numpy as np
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
-__all__ = ["Record", "inner_kernel", "kernel", "kernel_cache_folder"]
+__all__ = ["Record", "content_digest", "inner_kernel", "kernel", "kernel_cache_folder"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -27,33 +32,172 @@ R = TypeVar("R")
 Record: TypeAlias = Any
 """One record of a structured array inside a kernel; numba knows its fields, the type checker does not."""
 
-_PACKAGES = ("vibrolock", "controller", "simulators", "identification", "rig")
-_COMPILED_FROM = (
-    "kernels.py",
-    "layout.py",
-    "compiled.py",
-)  # the code, constants and layouts in it, the compiler's options
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "_nrt": False}
+"""IEEE arithmetic only, so that runs repeat bit for bit. Kernels allocate nothing, so arrays need no reference counts
+inside them, which otherwise cost a third of the time of a sample."""
+
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 _UNUSED_AFTER_DAYS = 30
+_DAY_S = 86400.0
 
 
-def _source_hash() -> str:
-    root = Path(__file__).parent.parent
-    sources = sorted(path for name in _PACKAGES for file in _COMPILED_FROM for path in (root / name).rglob(file))
-    digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for path in sources:
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a kernel with numba, cached on disk."""
+    return _compiled(function, OPTIONS)
+
+
+def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a kernel that becomes part of each kernel that calls it.
+
+    For what runs every sample and takes bundles of arrays: handing over a rig and its state costs as much as the sensors do.
+    """
+    return _compiled(function, {**OPTIONS, "forceinline": True})
+
+
+def _compiled(function: Callable[P, R], options: dict[str, Any]) -> Callable[P, R]:
+    dispatcher: Any = numba.njit(**options)(function)
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
+        return function
+    dispatcher._cache = _ContentCache(dispatcher)
+    compiled: Callable[P, R] = dispatcher
+    return compiled
+
+
+def content_digest(kernel: Any) -> str:
+    """Digest of all that goes into a kernel's machine code, as hexadecimal text.
+
+    Code and options of the kernel and of every kernel that it calls, and the constants that they name. The types of the
+    arguments, the processor and numba's version are further keys of the cache. Comments and docstrings do not count.
+    Module-level names are looked up when the digest is made, so a kernel may call one that is defined below it.
+    """
+    known: str | None = getattr(kernel, "_content_digest", None)
+    if known is None:
+        digest = hashlib.sha256()
+        for part in _content(kernel, set()):
+            digest.update(part.encode())
+            digest.update(b"\0")
+        known = kernel._content_digest = digest.hexdigest()
+    return known
+
+
+def _content(value: Any, seen: set[int]) -> Iterator[str]:
+    """A value that a kernel names, as texts that differ where the machine code may."""
+    inner = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel; of a numba intrinsic
+    if isinstance(value, types.FunctionType):
+        inner = value
+    if inner is not None:
+        yield f"{inner.__module__}.{inner.__qualname__} {sorted(getattr(value, 'targetoptions', {}).items())}"
+        if id(inner) in seen:
+            return
+        seen.add(id(inner))
+        cells = [cell.cell_contents for cell in inner.__closure__ or ()]
+        for part in (*cells, *(inner.__defaults__ or ())):
+            yield from _content(part, seen)
+        yield from _code(inner.__code__, inner.__globals__, seen, inner.__doc__)
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype!r} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    elif isinstance(value, types.ModuleType):
+        yield value.__name__
+    elif isinstance(value, type) and issubclass(value, enum.Enum):
+        yield f"{value.__qualname__} {[(one.name, one.value) for one in value]}"
+    elif isinstance(value, type | types.BuiltinFunctionType):
+        yield f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
+    else:
+        yield _ADDRESS.sub("", f"{type(value).__qualname__} {value!r}")  # an address is another one in every process
+
+
+def _code(code: types.CodeType, names: dict[str, Any], seen: set[int], doc: str | None) -> Iterator[str]:
+    yield code.co_code.hex()
+    yield f"{code.co_names} {code.co_varnames} {code.co_freevars}"
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _code(constant, names, seen, None)
+        elif constant != doc or doc is None:
+            yield repr(constant)
+    for name in code.co_names:
+        if name in names:
+            yield name
+            yield from _content(names[name], seen)
+
+
+class _ContentLocator:
+    """Tells numba where a kernel's machine code is: in one folder, under the kernel's name and digest."""
+
+    def __init__(self, digest: str) -> None:
+        self._digest = digest
+        self._py_file = ""  # numba names it in a warning
+
+    @classmethod
+    def from_function(cls, function: Any, _: str) -> "_ContentLocator":
+        return cls(function._content_digest)
+
+    def ensure_cache_path(self) -> None:
+        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        return str(kernel_cache_folder())
+
+    def get_source_stamp(self) -> str:
+        return self._digest
+
+    def get_disambiguator(self) -> str:
+        return self._digest[:24]
+
+
+class _ContentImpl(CompileResultCacheImpl):
+    _locator_classes: list[type[object]] = [_ContentLocator]  # noqa: RUF012
+
+
+class _ContentCache(FunctionCache):
+    """numba's cache of one kernel, opened when the kernel is first called: by then all that it names is defined."""
+
+    _impl_class = _ContentImpl
+
+    def __init__(self, dispatcher: Any) -> None:
+        self._dispatcher: Any = dispatcher
+        self._opened = False
+
+    def _open(self) -> None:
+        if self._opened:
+            return
+        self._opened = True
+        function = self._dispatcher.py_func
+        function._content_digest = content_digest(self._dispatcher)
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        _note_use(Path(self._cache_file._index_path))
+
+    @property
+    def cache_path(self) -> str:
+        self._open()
+        return str(super().cache_path)
+
+    def flush(self) -> None:
+        self._open()
+        super().flush()  # type: ignore[no-untyped-call]
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        self._open()
+        return super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+
+
+_folder: Path | None = None
 
 
 def kernel_cache_folder() -> Path:
-    """Folder that holds the machine code of exactly these kernel sources; made if need be.
+    """Folder that holds the machine code of all kernels; made if need be.
 
     Below ``NUMBA_CACHE_DIR``, ``XDG_CACHE_HOME`` or ``~/.cache``, the first that can be written; else a temporary folder of
     this process alone, for machine code is loaded from it and nobody else may have put it there.
     """
+    global _folder
+    if _folder is None:
+        _folder = _first_writable() or Path(tempfile.mkdtemp(prefix="vibrolock-"))
+    return _folder
+
+
+def _first_writable() -> Path | None:
     for parent in _possible_parents():
-        folder = parent / _source_hash()
+        folder = parent / "kernels"
         try:
             folder.mkdir(parents=True, exist_ok=True)
             os.utime(folder)
@@ -61,7 +205,7 @@ def kernel_cache_folder() -> Path:
             continue
         _remove_unused(parent)
         return folder
-    return Path(tempfile.mkdtemp(prefix="vibrolock-"))
+    return None
 
 
 def _possible_parents() -> Iterator[Path]:
@@ -72,31 +216,23 @@ def _possible_parents() -> Iterator[Path]:
         yield Path.home() / ".cache" / "vibrolock"
 
 
+def _note_use(index: Path) -> None:
+    with contextlib.suppress(OSError):
+        if index.stat().st_mtime < time.time() - _DAY_S:
+            os.utime(index)
+
+
 def _remove_unused(parent: Path) -> None:
-    oldest = time.time() - _UNUSED_AFTER_DAYS * 86400.0
-    for folder in parent.iterdir():
-        if folder.is_dir() and folder.stat().st_mtime < oldest:
-            shutil.rmtree(folder, ignore_errors=True)
+    """Remove machine code that nobody has asked for in a month, and folders that earlier versions kept it in."""
+    oldest = time.time() - _UNUSED_AFTER_DAYS * _DAY_S
+    with contextlib.suppress(OSError):
+        for folder in parent.iterdir():
+            if folder.is_dir() and folder.name != "kernels" and folder.stat().st_mtime < oldest:
+                shutil.rmtree(folder, ignore_errors=True)
+        for index in (parent / "kernels").glob("*.nbi"):
+            if index.stat().st_mtime < oldest:
+                for file in index.parent.glob(f"{index.stem}.*"):
+                    file.unlink(missing_ok=True)
 
 
 setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)
-
-
-OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
-"""IEEE arithmetic only, so that runs repeat bit for bit. Kernels allocate nothing, so arrays need no reference counts
-inside them, which otherwise cost a third of the time of a sample."""
-
-
-def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a kernel with numba, cached on disk."""
-    compiled: Callable[P, R] = numba.njit(**OPTIONS)(function)
-    return compiled
-
-
-def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a kernel that becomes part of each kernel that calls it.
-
-    For what runs every sample and takes bundles of arrays: handing over a rig and its state costs as much as the sensors do.
-    """
-    compiled: Callable[P, R] = numba.njit(forceinline=True, **OPTIONS)(function)
-    return compiled

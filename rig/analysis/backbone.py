@@ -9,8 +9,8 @@ from rig.analysis.backbone_figure import draw_backbone
 from rig.analysis.levels import By, level_range, samples_for
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, refusing
-from rig.console import number, print_table
 from rig.errors import ConfigurationError
+from rig.text.console import number, print_table
 from simulators.analysis import (
     HysteresisLoop,
     NotConvergedError,

@@ -11,8 +11,8 @@ from rig.analysis.constant_force_figure import draw_curves
 from rig.analysis.levels import highest_resonance, most_points, samples_for
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
-from rig.console import number, print_table
 from rig.errors import ConfigurationError
+from rig.text.console import number, print_table
 from simulators.analysis import (
     NotConvergedError,
     PeriodicResponses,

@@ -10,8 +10,8 @@ from rig.analysis.levels import most_points
 from rig.analysis.linear_figure import draw_responses
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
-from rig.console import number, print_table
 from rig.errors import ConfigurationError
+from rig.text.console import number, print_table
 from simulators.analysis import FrequencyResponses, frequency_response
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rig.analysis.modes_figure import draw_modes
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject
-from rig.console import number, print_table
+from rig.text.console import number, print_table
 from simulators.modes import LinearModes
 
 if TYPE_CHECKING:

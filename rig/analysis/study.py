@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.plain import plain
 from rig.analysis.subject import Subject
 from rig.errors import RecordingError
-from rig.printable import printable
+from rig.text.printable import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

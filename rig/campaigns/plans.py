@@ -5,17 +5,17 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench import Bench, load_bench
+from rig.bench.configuration import find_toml, read_toml, shipped_names, validated
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.plan import Plan
-from rig.configuration import find_toml, read_toml, shipped_names, validated
+from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
-from rig.printable import shown
+from rig.text.printable import shown
 
 __all__ = ["bench_of", "load_plan", "plan_from", "shipped_plans"]
 
 
 def _folder() -> Path:
-    return Path(str(resources.files("rig"))) / "plans"
+    return Path(str(resources.files("rig.campaigns"))) / "shipped"
 
 
 def shipped_plans() -> list[str]:

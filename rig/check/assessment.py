@@ -8,9 +8,9 @@ import numpy as np
 
 from identification import IdentificationError
 from rig.bench import Bench
-from rig.bench_limits import objections
-from rig.campaigns.multisine import MultisinePlan
-from rig.campaigns.multisine_points import spectra_of
+from rig.bench.cross_checks import objections
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
 from rig.check.findings import Finding, failed
 from rig.check.judging import driven_findings
@@ -21,7 +21,7 @@ from rig.check.silence import silent_findings
 from rig.errors import RecordingError
 from rig.measurements import bench_of_recording
 from rig.recording.reader import Recording
-from rig.safety.layout import EndReason
+from rig.tick.safety.layout import EndReason
 
 __all__ = ["PURPOSE", "Assessment", "assess", "is_check", "responses_in"]
 

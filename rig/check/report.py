@@ -5,8 +5,8 @@ from dataclasses import asdict
 from typing import Any
 
 from rig.check.assessment import Assessment
-from rig.console import number, print_table
-from rig.printable import printable_strings
+from rig.text.console import number, print_table
+from rig.text.printable import printable_strings
 
 __all__ = ["say", "summary"]
 

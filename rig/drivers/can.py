@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import Field
 
 from rig.bench import Bench
-from rig.configuration import validated
+from rig.bench.configuration import validated
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.wire.can.bus import FrameBus, PythonCanBus
 from rig.wire.can.frames import DATA_BIT_RATE_HZ

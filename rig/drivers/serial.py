@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from rig.bench import Bench
-from rig.configuration import validated
+from rig.bench.configuration import validated
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.wire.serial.link import SerialLink
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.exchange.contents import Contents
 from rig.exchange.mat import ImportFailed
-from rig.text_files import read_text
+from rig.measurements.contents import Contents
+from rig.system.text_files import read_text
 
 __all__ = ["read_csv", "table_of_ours", "write_csv"]
 

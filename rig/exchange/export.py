@@ -4,13 +4,13 @@ from pathlib import Path
 
 from identification import IdentificationError
 from rig.errors import RecordingError, RigError
-from rig.exchange.contents import Contents
 from rig.exchange.csv import write_csv
 from rig.exchange.kinds import taken_apart
 from rig.exchange.mat import write_mat
 from rig.exchange.sources import read_objects
 from rig.exchange.uff.writing import write_uff
-from rig.exchange.whole_file import whole_file
+from rig.measurements.contents import Contents
+from rig.system.whole_file import whole_file
 
 __all__ = ["export_file", "write_contents"]
 

@@ -20,11 +20,11 @@ from identification import (
 )
 from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
-from rig.exchange.backbone_table import backbone_from, backbone_parts
-from rig.exchange.contents import Contents, Labels, unit_of
 from rig.exchange.pnlss import pnlss_from, pnlss_parts
 from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
 from rig.exchange.time_data import TimeData
+from rig.measurements.backbone_table import backbone_from, backbone_parts
+from rig.measurements.contents import Contents, Labels, unit_of
 
 __all__ = ["KINDS", "put_together", "taken_apart"]
 
@@ -82,7 +82,7 @@ def _frequency_responses(responses: tuple[FrequencyResponse, ...]) -> Contents:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ExchangeKind:
     """How objects of one type are taken apart and put together; ``name`` stands in exchanged files."""
 
     name: str
@@ -92,14 +92,16 @@ class Kind:
 
 
 KINDS = (
-    Kind("backbone", Backbone, backbone_parts, backbone_from),
-    Kind("frequency-responses", tuple, _frequency_responses, unpack_frequency_responses),
-    Kind("frequency-response-matrix", FrequencyResponseMatrix, _response_matrix, FrequencyResponseMatrix.from_arrays),
-    Kind("linear-modes", LinearModes, _linear_modes, LinearModes.from_arrays),
-    Kind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays),
-    Kind("time-data", TimeData, time_data_parts, time_data_from),
-    Kind("pnlss", PnlssModel, pnlss_parts, pnlss_from),
-    Kind("sweep", Transient, transient_parts, transient_from),
+    ExchangeKind("backbone", Backbone, backbone_parts, backbone_from),
+    ExchangeKind("frequency-responses", tuple, _frequency_responses, unpack_frequency_responses),
+    ExchangeKind(
+        "frequency-response-matrix", FrequencyResponseMatrix, _response_matrix, FrequencyResponseMatrix.from_arrays
+    ),
+    ExchangeKind("linear-modes", LinearModes, _linear_modes, LinearModes.from_arrays),
+    ExchangeKind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays),
+    ExchangeKind("time-data", TimeData, time_data_parts, time_data_from),
+    ExchangeKind("pnlss", PnlssModel, pnlss_parts, pnlss_from),
+    ExchangeKind("sweep", Transient, transient_parts, transient_from),
 )
 
 

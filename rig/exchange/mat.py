@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from rig.child import ChildFailed, ask_child
 from rig.errors import RigError
-from rig.exchange.contents import Contents
 from rig.exchange.mat_values import read_values
+from rig.measurements.contents import Contents
+from rig.system.child import ChildFailed, ask_child
 
 __all__ = ["ImportFailed", "read_mat", "structures_of_ours", "write_mat"]
 

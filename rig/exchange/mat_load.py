@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from rig.child import MEMORY_BYTES, confine
 from rig.exchange.mat_values import write_values
+from rig.system.child import MEMORY_BYTES, confine
 
 __all__ = ["main"]
 

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.configuration import read_toml, validated
+from rig.bench.configuration import read_toml, validated
 from rig.errors import ConfigurationError
 from rig.exchange.mat import ImportFailed, read_mat, structures_of_ours
-from rig.printable import shown
+from rig.text.printable import shown
 
 if TYPE_CHECKING:
     from identification import FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_force_surface"]
+__all__ = ["draw_force_surface", "draw_measured_surface"]
 
 _CURVES = 4
 _SECTIONS_DEG = (30.0, 90.0, 150.0)
@@ -52,6 +52,11 @@ def draw_force_surface(
         _sections(axes[1, 1], surface, scale, unit)
     specimen = responses[0].specimen or "specimen"
     title(page, text or f"{specimen}: response-controlled test, {len(levels)} levels")
+
+
+def draw_measured_surface(page: "Figure", measured: Any) -> None:
+    """Draw a force surface as its file holds it: ``measured`` has ``responses`` and ``surface``."""
+    draw_force_surface(page, measured.responses, measured.surface)
 
 
 def _name(response: FrequencyResponse, levels: list[float], scale: float, unit: str) -> str | None:

@@ -4,7 +4,7 @@ import pytest
 
 from rig.api import Run
 from rig.bench import Bench
-from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.hil.subject import ArmedRig
 
 LEVELS = (0.04, 0.08)  # of the largest voltage: small, and well above noise

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 import rig
+from rig.arming.arming import ArmingRequest
 from rig.bench import Bench, load_bench
-from rig.campaigns.arming import ArmingRequest
-from rig.campaigns.plan import Plan
+from rig.campaigns.planning.plan import Plan
 from rig.daq import Capabilities
 from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
@@ -101,7 +101,7 @@ def subject(name: str | Path, *, wire: str | None = None, arm: bool = False) -> 
         )
     with ExitStack() as stack:
         if wire is not None:
-            from rig.wire.device.emulator import emulated
+            from rig.emulator.emulated import emulated
 
             block = max(bench.block, round(EMULATED_BLOCK_S * bench.sample_rate_hz))
             bench = stack.enter_context(emulated(bench.model_copy(update={"block": block}), wire, lockstep=True))

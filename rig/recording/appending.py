@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Self
 
-from rig.recording.blocks import Kind, pack
-from rig.recording.locking import lock
+from rig.recording.blocks import BlockKind, pack
+from rig.system.locking import lock
 
 __all__ = ["SYNC_INTERVAL_S", "BlockFile", "NameLost"]
 
@@ -64,7 +64,7 @@ class BlockFile:
         os.ftruncate(self._descriptor, n_bytes)
         self._end = (n_bytes, n_blocks)
 
-    def append(self, kind: Kind, part: int, row: int, payload: bytes, *, twice: bool = False) -> None:
+    def append(self, kind: BlockKind, part: int, row: int, payload: bytes, *, twice: bool = False) -> None:
         """Append one block, or the same again behind it; it is in the hands of the operating system on return."""
         if self._descriptor < 0:
             raise OSError(errno.EBADF, "the journal is closed")

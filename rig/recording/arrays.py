@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rig.errors import RecordingError
 from rig.recording.journal import journal_path
-from rig.recording.layout import identify, kind_in, new_file, one_line, open_file, reading
+from rig.recording.layout import identify, kind_in, new_file, open_file, reading
 from rig.recording.sequence import read_journal
 from rig.recording.tables import StoredTexts, write_object
+from rig.text.printable import error_text
 
 __all__ = ["kind_of", "read_arrays", "write_arrays"]
 
@@ -33,7 +34,7 @@ def write_arrays(path: str | Path, kind: str, arrays: Mapping[str, ArrayLike], a
     try:
         plain = {name: np.asarray(values) for name, values in arrays.items()}
     except ValueError as error:
-        raise RecordingError(f"{path}: an array has rows of unequal length ({one_line(error)})") from error
+        raise RecordingError(f"{path}: an array has rows of unequal length ({error_text(error)})") from error
     for name, values in plain.items():
         if not _NAME.match(name):
             raise RecordingError(

@@ -16,7 +16,17 @@ from typing import Any, BinaryIO
 
 from rig.recording import jsontext
 
-__all__ = ["LARGEST_PAYLOAD", "TWICE", "BadBlockError", "Block", "Gap", "Kind", "following_block", "pack", "read_block"]
+__all__ = [
+    "LARGEST_PAYLOAD",
+    "TWICE",
+    "BadBlockError",
+    "Block",
+    "BlockKind",
+    "Gap",
+    "following_block",
+    "pack",
+    "read_block",
+]
 
 MAGIC = b"VLJB"
 VERSION = 2
@@ -29,7 +39,7 @@ _CRC = struct.Struct("<I")
 _SEARCH_BYTES = 2**20
 
 
-class Kind(IntEnum):
+class BlockKind(IntEnum):
     """What a block holds: JSON text, but for ``ROWS``, which holds the bytes of whole rows."""
 
     HEADER = 1
@@ -40,7 +50,7 @@ class Kind(IntEnum):
     END = 6
 
 
-TWICE = frozenset((Kind.HEADER, Kind.PART))
+TWICE = frozenset((BlockKind.HEADER, BlockKind.PART))
 """Kinds that are written twice, one block behind the other: without them nothing that follows could be read."""
 
 
@@ -59,7 +69,7 @@ class Block:
     """One whole block whose checksum holds."""
 
     version: int
-    kind: Kind
+    kind: BlockKind
     sequence: int
     part: int
     """Number of its part, from 1; of version 1 as counted."""
@@ -85,7 +95,7 @@ class BadBlockError(Exception):
     """What is wrong with a block."""
 
 
-def pack(kind: Kind, sequence: int, part: int, row: int, payload: bytes) -> bytes:
+def pack(kind: BlockKind, sequence: int, part: int, row: int, payload: bytes) -> bytes:
     """Return the bytes of one block; ``payload`` holds at most ``LARGEST_PAYLOAD`` bytes."""
     head = _HEADS[VERSION].pack(MAGIC, VERSION, kind, len(payload), sequence, part, row)
     return b"".join((head, _CRC.pack(zlib.crc32(payload, zlib.crc32(head))), payload))
@@ -117,8 +127,8 @@ def read_block(stream: BinaryIO, start: int, size: int) -> Block:
     if zlib.crc32(payload, zlib.crc32(head)) != _CRC.unpack(checksum)[0]:
         raise BadBlockError("checksum does not match")
     try:
-        known = Kind(kind)
-        value = {} if known is Kind.ROWS else jsontext.decode(payload)
+        known = BlockKind(kind)
+        value = {} if known is BlockKind.ROWS else jsontext.decode(payload)
     except ValueError as error:
         raise BadBlockError(f"a block of kind {kind} that cannot be read ({error})") from error
     part, row = where or (0, 0)

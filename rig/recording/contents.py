@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import RecordingError
-from rig.recording.blocks import Block, Gap, Kind
+from rig.recording.blocks import Block, BlockKind, Gap
 from rig.recording.header import Header
 from rig.recording.parts import Part, missing_rows, rows_at_once
 from rig.recording.sequence import Tail, read_journal
@@ -130,9 +130,9 @@ class JournalContents:
         here = block.part == self._part_number
         if block.gap is not None:
             self._note(block.gap, self._lost_before(block) if here else "the end of a part")
-        if block.kind is Kind.HEADER:
+        if block.kind is BlockKind.HEADER:
             return
-        if block.kind is Kind.PART:
+        if block.kind is BlockKind.PART:
             if not here:
                 self._begin(block)
             return
@@ -178,11 +178,11 @@ class JournalContents:
             self._before_parts.append(told)
 
     def _add_to_part(self, block: Block, part: JournalPart) -> None:
-        if block.kind is Kind.ROWS:
+        if block.kind is BlockKind.ROWS:
             part.add_rows(block.offset, len(block.payload) // self.header.row_dtype.itemsize)
-        elif block.kind is Kind.EVENT:
+        elif block.kind is BlockKind.EVENT:
             part.events.append(block.value)
-        elif block.kind is Kind.POINT:
+        elif block.kind is BlockKind.POINT:
             part.points.append(block.value)
         else:
             part.end = block.value

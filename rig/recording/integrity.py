@@ -4,9 +4,9 @@ import json
 import time
 from pathlib import Path
 
-from rig.child import MEMORY_BYTES, ChildFailed, ask_child
 from rig.errors import RecordingError
 from rig.recording.trailer import digest_matches
+from rig.system.child import MEMORY_BYTES, ChildFailed, ask_child
 
 __all__ = ["FIRST_WITH_DIGEST", "VERIFIED", "integrity_of"]
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from rig.errors import RecordingError
 from rig.recording import jsontext
 from rig.recording.appending import BlockFile, NameLost
-from rig.recording.blocks import LARGEST_PAYLOAD, TWICE, Kind
+from rig.recording.blocks import LARGEST_PAYLOAD, TWICE, BlockKind
 from rig.recording.contents import JournalContents
 from rig.recording.header import Column, Header, packed
-from rig.recording.locking import synchronise_folder
 from rig.recording.sequence import Tail, read_journal
+from rig.system.locking import synchronise_folder
 
 __all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]
 
@@ -80,7 +80,7 @@ class JournalWriter:
             )
         writer = cls(path, blocks, header)
         try:
-            writer._append(Kind.HEADER, header.encoded(), 0)
+            writer._append(BlockKind.HEADER, header.encoded(), 0)
             writer._synchronise()
             synchronise_folder(path)
         except BaseException:
@@ -125,7 +125,7 @@ class JournalWriter:
     def part(self, information: Mapping[str, Any]) -> None:
         """Begin a part; ``information`` is the caller's (``first_sample``: number of its first row's sample)."""
         text = jsontext.encode(information, what="part")
-        self._append(Kind.PART, text, self._part_number + 1)
+        self._append(BlockKind.PART, text, self._part_number + 1)
         self._in_part = True
         self._part_number, self._rows_in_part = self._part_number + 1, 0
         self.n_parts += 1
@@ -142,25 +142,25 @@ class JournalWriter:
         step = max(_ROWS_BLOCK_BYTES // wanted.itemsize, 1)
         for first in range(0, len(stored), step):
             block = stored[first : first + step]
-            self._append_to_part(Kind.ROWS, block.tobytes())
+            self._append_to_part(BlockKind.ROWS, block.tobytes())
             self.n_rows += len(block)
             self._rows_in_part += len(block)
         self._synchronise(if_due=True)
 
     def event(self, event: Mapping[str, Any]) -> None:
         """Append an event."""
-        self._append_to_part(Kind.EVENT, jsontext.encode(event, what="event"))
+        self._append_to_part(BlockKind.EVENT, jsontext.encode(event, what="event"))
         self._synchronise(if_due=True)
 
     def point(self, point: Mapping[str, Any]) -> None:
         """Append the result of a completed point."""
-        self._append_to_part(Kind.POINT, jsontext.encode(point, what="point"))
+        self._append_to_part(BlockKind.POINT, jsontext.encode(point, what="point"))
         self.n_points += 1
         self._synchronise(if_due=True)
 
     def end(self, end: Mapping[str, Any]) -> None:
         """End the part and force all to the disk; ``completed: True`` in ``end`` says that the run is finished."""
-        self._append_to_part(Kind.END, jsontext.encode(end, what="end"))
+        self._append_to_part(BlockKind.END, jsontext.encode(end, what="end"))
         self._in_part = False
         self._synchronise()
 
@@ -180,17 +180,17 @@ class JournalWriter:
     ) -> None:
         self.close()
 
-    def _append_to_part(self, kind: Kind, payload: bytes) -> None:
+    def _append_to_part(self, kind: BlockKind, payload: bytes) -> None:
         if not self._in_part:
             raise RecordingError(f"{self.path}: {kind.name.lower()} outside any part; call part() first")
         self._append(kind, payload, self._part_number)
 
-    def _append(self, kind: Kind, payload: bytes, part: int) -> None:
+    def _append(self, kind: BlockKind, payload: bytes, part: int) -> None:
         if len(payload) > LARGEST_PAYLOAD:
             raise RecordingError(
                 f"{kind.name.lower()}: {len(payload)} bytes of JSON, at most {LARGEST_PAYLOAD} are allowed"
             )
-        row = 0 if kind is Kind.PART else self._rows_in_part
+        row = 0 if kind is BlockKind.PART else self._rows_in_part
         with self._telling("written"):
             self._blocks.append(kind, part, row, payload, twice=kind in TWICE)
 

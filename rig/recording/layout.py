@@ -10,11 +10,12 @@ from rig.errors import RecordingError
 from rig.recording.examination import check_attributes, examine
 from rig.recording.header import FORMAT, SCHEMA, check_schema
 from rig.recording.integrity import integrity_of
-from rig.recording.locking import synchronise_folder
 from rig.recording.sink import Sink
 from rig.recording.trailer import append_trailer
+from rig.system.locking import synchronise_folder
+from rig.text.printable import error_text
 
-__all__ = ["file_integrity", "identify", "kind_in", "new_file", "one_line", "open_file", "open_unchecked", "reading"]
+__all__ = ["file_integrity", "identify", "kind_in", "new_file", "open_file", "open_unchecked", "reading"]
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FOREIGN = {
@@ -39,11 +40,6 @@ def _foreign(path: Path) -> str:
     return "a text file" if text else "no HDF5 file"
 
 
-def one_line(error: BaseException) -> str:
-    """Return the message of a library's error without its line breaks."""
-    return " ".join(str(error).split()) or type(error).__name__
-
-
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Turn whatever h5py raises on a damaged or vanished file into one ``RecordingError`` that names ``path``."""
@@ -54,7 +50,7 @@ def reading(path: Path) -> Iterator[None]:
             raise
         raise RecordingError(f"{path}: damaged: {error}") from error
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, MemoryError) as error:
-        raise RecordingError(f"{path}: damaged: cannot be read ({one_line(error)})") from error
+        raise RecordingError(f"{path}: damaged: cannot be read ({error_text(error)})") from error
 
 
 def open_file(path: Path) -> Any:
@@ -90,7 +86,7 @@ def open_unchecked(path: Path) -> Any:
     try:
         file = h5py.File(path, "r")
     except (OSError, RuntimeError, ValueError) as error:
-        why = "truncated" if "truncated" in str(error) else f"damaged ({one_line(error)})"
+        why = "truncated" if "truncated" in str(error) else f"damaged ({error_text(error)})"
         raise RecordingError(f"{path}: cannot be opened: {why}") from error
     try:
         with reading(path):
@@ -139,7 +135,7 @@ def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]
         part.replace(path)
         synchronise_folder(path)
     except (OSError, RuntimeError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
+        why = error.strerror if isinstance(error, OSError) and error.strerror else error_text(error)
         raise RecordingError(f"{path}: cannot be written ({why}); {kept}") from error
     finally:
         with suppress(OSError):

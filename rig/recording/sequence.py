@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rig.errors import RecordingError
-from rig.recording.blocks import TWICE, BadBlockError, Block, Gap, Kind, following_block, read_block
+from rig.recording.blocks import TWICE, BadBlockError, Block, BlockKind, Gap, following_block, read_block
 from rig.recording.header import Header
 
 __all__ = ["JournalBlocks", "Tail", "read_journal"]
@@ -34,7 +34,7 @@ class JournalBlocks:
                 first = self._header_in(stream)
         except OSError as error:
             raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
-        if first.kind is not Kind.HEADER:
+        if first.kind is not BlockKind.HEADER:
             raise RecordingError(f"{path}: not a readable journal; it does not begin with a header")
         self.header = Header.decoded(first.payload, path)
         self._first = first
@@ -46,7 +46,7 @@ class JournalBlocks:
             return read_block(stream, 0, size)
         except BadBlockError as error:
             second = following_block(stream, 1, size, 1)
-            if second is None or second.kind is not Kind.HEADER:
+            if second is None or second.kind is not BlockKind.HEADER:
                 why = f"at its beginning: {error}" if size else "it is empty"
                 raise RecordingError(f"{self.path}: not a readable journal; {why}") from error
             return replace(second, gap=Gap(second.start, second.sequence, f"{error} (at byte 0)"))
@@ -89,10 +89,10 @@ class JournalBlocks:
         """The first whole block behind damage that can have followed ``last``."""
         start = last.stop
         while found := following_block(stream, start, size, last.sequence + 1):
-            whole = found.kind is not Kind.ROWS or len(found.payload) % self.header.row_dtype.itemsize == 0
+            whole = found.kind is not BlockKind.ROWS or len(found.payload) % self.header.row_dtype.itemsize == 0
             follows = (found.part, found.row) >= (last.part, last.row) and found.part > 0
             follows = follows and (found.start, found.sequence) != (last.stop, last.sequence + 1)  # which is no gap
-            if found.version == 1 or (whole and follows and found.kind is not Kind.HEADER):
+            if found.version == 1 or (whole and follows and found.kind is not BlockKind.HEADER):
                 return found
             start = found.start + 1
         return None
@@ -101,14 +101,14 @@ class JournalBlocks:
         """The block with its place, which is where it belongs behind ``last``."""
         if block.sequence != last.sequence + 1:
             raise BadBlockError(f"block {block.sequence} where block {last.sequence + 1} belongs")
-        n_rows = len(last.payload) // self.header.row_dtype.itemsize if last.kind is Kind.ROWS else 0
+        n_rows = len(last.payload) // self.header.row_dtype.itemsize if last.kind is BlockKind.ROWS else 0
         part, row = last.part, last.row + n_rows
         copy = block.version > 1 and block.kind is last.kind and block.kind in TWICE and block.part == last.part
-        if block.kind is Kind.PART and not copy:
+        if block.kind is BlockKind.PART and not copy:
             part, row = last.part + 1, 0
-        elif not copy and (block.kind is Kind.HEADER or last.kind in (Kind.HEADER, Kind.END)):
+        elif not copy and (block.kind is BlockKind.HEADER or last.kind in (BlockKind.HEADER, BlockKind.END)):
             raise BadBlockError(f"a block of kind {block.kind.name.lower()} outside any part")
-        if block.kind is Kind.ROWS and len(block.payload) % self.header.row_dtype.itemsize:
+        if block.kind is BlockKind.ROWS and len(block.payload) % self.header.row_dtype.itemsize:
             raise BadBlockError(f"{len(block.payload)} bytes are no whole number of rows")
         if block.version == 1:
             return replace(block, part=part, row=row)

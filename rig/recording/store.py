@@ -13,9 +13,9 @@ from rig.recording.contents import JournalContents
 from rig.recording.header import SCHEMA, Column, Header, packed
 from rig.recording.journal import JournalWriter, journal_path, set_aside
 from rig.recording.layout import new_file, open_file
-from rig.recording.locking import exclusive
 from rig.recording.parts import Part
 from rig.recording.stored import read_recording, recording_integrity, taken_over, write_recording
+from rig.system.locking import exclusive
 
 __all__ = ["check_continuation", "continue_recording", "finalise"]
 

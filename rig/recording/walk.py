@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from rig.child import confine
 from rig.errors import RecordingError
 from rig.recording.examination import objects_in
 from rig.recording.layout import open_unchecked, reading
+from rig.system.child import confine
 
 __all__ = ["main"]
 

@@ -11,7 +11,7 @@ from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, title
 from rig.reproduce.steady import Steady
 from rig.reproduce.study import Study
 from rig.reproduce.sweeps import COUPLED
-from rig.reproduce.truths import Truth
+from rig.reproduce.true_responses import Truth
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.errors import RecordingError
 from rig.reproduce.options import Options
-from rig.text_files import read_text
+from rig.system.text_files import read_text
 
 __all__ = ["prepare", "write_json"]
 

@@ -17,9 +17,9 @@ from identification import (
     realisation_combinations,
 )
 from rig.errors import RecordingError
-from rig.models.data_fingerprints import uses_of
-from rig.models.files import load_as, save
-from rig.models.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.files.files import load_as, save
+from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.identify.data_fingerprints import uses_of
 from rig.reproduce.options import Options
 
 __all__ = ["Models", "identify_all"]

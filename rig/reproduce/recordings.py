@@ -8,17 +8,17 @@ from typing import Any
 import rig
 from identification import Experiment
 from rig.bench import Bench
-from rig.campaigns.execution import Progress
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.multisine import MultisinePlan
-from rig.campaigns.plan import Plan
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan
-from rig.console import RunProgress
+from rig.campaigns.running.execution import Progress
 from rig.errors import RigError
-from rig.experiments import experiments
+from rig.measurements.experiments import experiments
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.reproduce.options import Options
+from rig.show.progress import RunProgress
 
 __all__ = ["multisines", "recorded", "segments", "training_data"]
 

@@ -6,13 +6,13 @@ import json
 from typing import Any
 
 from identification.pnlss.error_table import SAME_LEVEL
-from rig.console import number, print_table
 from rig.errors import RecordingError
-from rig.models.predictions import CUT
+from rig.models.files.predictions import CUT
 from rig.reproduce.folder import write_json
 from rig.reproduce.options import Options
 from rig.reproduce.study import VARIANTS, Study
-from rig.text_files import read_text
+from rig.system.text_files import read_text
+from rig.text.console import number, print_table
 
 __all__ = ["say_study", "write_tables"]
 

@@ -15,7 +15,7 @@ from identification import (
 )
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
-from rig.reproduce.truths import Truth, truths
+from rig.reproduce.true_responses import Truth, truths
 
 __all__ = ["Steady", "steady"]
 

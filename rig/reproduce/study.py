@@ -11,7 +11,7 @@ from rig.reproduce.options import Options
 from rig.reproduce.recordings import multisines, segments
 from rig.reproduce.steady import Steady, steady
 from rig.reproduce.sweeps import SweepResult, simulated_sweeps
-from rig.reproduce.truths import Truth
+from rig.reproduce.true_responses import Truth
 
 __all__ = ["VARIANTS", "Study", "reproduce"]
 

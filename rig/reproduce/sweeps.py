@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identification import Exciter, Experiment, PnlssModel, pnlss_coupled_run
 from identification.channels import find_role
 from rig.campaigns.plans import load_plan
-from rig.campaigns.sweep import SweepPlan
+from rig.campaigns.sweep.plan import SweepPlan
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded, training_data

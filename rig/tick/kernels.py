@@ -12,8 +12,12 @@ from controller.demodulation.kernels import adapt, demodulate, sign_product, tur
 from controller.kernels import TWO_PI, advance_phase, size, track, wrap
 from controller.layout import ADAPTIVE, SIGN, VOLTAGE
 from rig.daq import LOST
-from rig.safety.following.kernels import contradicts_exciter, permitted_level
-from rig.safety.kernels import (
+from rig.tick.laws.amplitude.kernels import controlled_size, demanded_amplitude, take_over
+from rig.tick.laws.frequency.kernels import choose_frequency, phase_error, see_rest
+from rig.tick.laws.periods.kernels import add_to_period, close_period
+from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
+from rig.tick.safety.following.kernels import contradicts_exciter, permitted_level
+from rig.tick.safety.kernels import (
     NON_FINITE_OUTPUT,
     PLANT_CONTRADICTED,
     SENSOR_OVERLOAD,
@@ -26,13 +30,9 @@ from rig.safety.kernels import (
     watch_input,
     watch_motion,
 )
-from rig.safety.layout import ARMED
-from rig.sequencer.kernels import advance, is_ramp
-from rig.sequencer.layout import LOOP_DRIVE, WAVEFORM
-from rig.tick.laws.amplitude.kernels import controlled_size, demanded_amplitude, take_over
-from rig.tick.laws.frequency.kernels import choose_frequency, phase_error, see_rest
-from rig.tick.laws.periods.kernels import add_to_period, close_period
-from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
+from rig.tick.safety.layout import ARMED
+from rig.tick.sequencer.kernels import advance, is_ramp
+from rig.tick.sequencer.layout import LOOP_DRIVE, WAVEFORM
 from vibrolock.compiled import Record, kernel
 
 STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has

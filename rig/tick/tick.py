@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,16 +11,16 @@ from controller.layout import LOCK, AmplitudeLaw
 from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.errors import ConfigurationError
-from rig.safety.following.expected import expected_record
-from rig.safety.following.kernels import see_frequency
-from rig.safety.following.layout import FOLLOWING
-from rig.safety.kernels import is_over
-from rig.safety.limits import guard_record, input_records, limits_record, watch_records
-from rig.sequencer.layout import PROGRESS, SETTLING
-from rig.sequencer.segments import Segment, SettleRule, segment_table
 from rig.tick.layout import HISTORY, LOOP, ROW, TickArrays, recorded_row
+from rig.tick.safety.following.expected import expected_record
+from rig.tick.safety.following.kernels import see_frequency
+from rig.tick.safety.following.layout import FOLLOWING
+from rig.tick.safety.kernels import is_over
+from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
+from rig.tick.sequencer.layout import PROGRESS, SETTLING
+from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
-__all__ = ["Tick"]
+__all__ = ["Tick", "TickSettings"]
 
 SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude
 
@@ -141,6 +142,34 @@ class Tick:
         for name in ROW.names or ():
             out[name] = rows[name]
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class TickSettings:
+    """What a tick is built from once the latency of the device is known; can be handed to another process."""
+
+    bench: Bench
+    law: Law
+    amplitude_law: AmplitudeLaw
+    settle: SettleRule
+    segments: Sequence[Segment]
+    waveforms: np.ndarray | None = None
+    exciter: PlantModel | None = None
+    armed: bool = True
+
+    def build(self, latency_samples: float) -> Tick:
+        """The tick for a device of this latency: its outputs are one block later still."""
+        return Tick(
+            self.bench,
+            self.law,
+            self.amplitude_law,
+            self.settle,
+            self.segments,
+            self.bench.block + latency_samples,
+            waveforms=self.waveforms,
+            exciter=self.exciter,
+            armed=self.armed,
+        )
 
 
 def _history(loop: np.ndarray, dt: float) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from controller.tuning import PlantModel
 from rig.bench import Bench
-from rig.campaigns.levels_on_plant import voltage_for
+from rig.campaigns.planning.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
 
 __all__ = ["LevelChoice", "choose_levels", "lowest_force_n", "needed_v", "reach_m"]

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from identification import FrequencyResponseMatrix, PeriodicSpectra
+from rig.arming.arming import Arm, asked_once
+from rig.arming.run_facts import About
 from rig.bench import Bench
-from rig.campaigns.about import About
-from rig.campaigns.arming import Arm, asked_once
-from rig.campaigns.execution import Progress
-from rig.campaigns.multisine import MultisinePlan
-from rig.campaigns.runner import carry_out, take_up
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.running.execution import Progress
+from rig.campaigns.running.runner import carry_out, take_up
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import get_args
 
 from controller.tuning import PlantModel
+from rig.arming.arming import Arm
+from rig.arming.run_facts import About
 from rig.bench import Bench, load_bench
-from rig.campaigns.about import About
-from rig.campaigns.arming import Arm
-from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.execution import Progress
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.plans import plan_from
+from rig.campaigns.running.execution import Progress
 from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
 from rig.tuning.levels import PART, LevelChoice, choose_levels, lowest_force_n, reach_m
@@ -80,7 +80,7 @@ def tune(
 
     ``level_rms_v`` spares the search for a level; ``law`` is ``frequency-error`` (with complex response control, levels in
     metres) or ``phase`` (levels in volts); ``from_m``, ``to_m`` and ``points`` set the levels; ``named`` is what the plan calls
-    the bench. ``arm`` and ``about`` as for `rig.campaigns.runner.carry_out`.
+    the bench. ``arm`` and ``about`` as for `rig.campaigns.running.runner.carry_out`.
 
     Raises `rig.tuning.errors.TuningError` where the rig is unsuited, with the numbers,
     `rig.errors.ConfigurationError` for what the bench does not allow, `rig.errors.RecordingError` for a recording that

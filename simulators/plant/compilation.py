@@ -16,7 +16,7 @@ from simulators.sensing.filters import channel_sections, output_sections, ring_s
 from simulators.sensing.parts import Converter, Sensor
 from simulators.sites.elements import Element
 from simulators.sites.friction import FrictionSite
-from vibrolock.lanes.kernels import WIDTH
+from vibrolock.lanes import WIDTH
 
 __all__ = [
     "PhiMatrices",

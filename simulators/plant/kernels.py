@@ -29,7 +29,7 @@ from simulators.layout import (
     RigState,
 )
 from vibrolock.compiled import Record, inner_kernel, kernel
-from vibrolock.lanes.kernels import WIDTH, greatest, least, load, spread, store
+from vibrolock.lanes import WIDTH, greatest, least, load, spread, store
 
 
 def _call_at(typing: Any, address: Any, z: Any, parameters: Any) -> Any:

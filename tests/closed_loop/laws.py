@@ -8,11 +8,11 @@ import numpy as np
 
 from controller import AmplitudeLaw, PhaseLockedLoop
 from rig.bench import Bench
-from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.drivers import make_daq
 from rig.drivers.virtual.driver import VirtualDAQ
-from rig.loop import Loop
-from rig.sequencer.segments import Segment, SettleRule
+from rig.loop.loop import Loop
+from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
 
 FREQUENCY_HZ = {"magnet-beam": 24.37, "friction-beam": 149.0}
@@ -72,5 +72,5 @@ def knock(monkeypatch: Any, mode: int, at_s: float, change: float, length_s: flo
             self._state.inputs[self.rig.plant.n_mode + mode] += change * len(inputs) / self.sample_rate_hz / length_s
         exchange(self, voltages, inputs)
 
-    monkeypatch.setattr("rig.session.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.loop.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", knocked)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from controller import AmplitudeLaw
-from rig.sequencer.layout import SegmentKind
-from rig.sequencer.segments import Segment
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Segment
 from tests.closed_loop.laws import carried_out, law_of
 from tests.rig.rigs import bench_with
 

@@ -5,10 +5,10 @@ import pytest
 
 import rig
 from controller import AmplitudeLaw, preset
-from rig.campaigns.backbone import BackbonePlan
-from rig.sequencer.layout import Outcome, SegmentKind
-from rig.sequencer.segments import Segment, SettleRule
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.tick.layout import FREQUENCY_CLAMPED, SATURATED
+from rig.tick.sequencer.layout import Outcome, SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule
 from tests.closed_loop.laws import carried_out, knock, law_of, plan_of
 from tests.rig.rigs import bench_with
 

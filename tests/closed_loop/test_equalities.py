@@ -5,10 +5,10 @@ import pytest
 
 from controller import AmplitudeLaw
 from rig.drivers import make_daq
-from rig.loop import Loop
-from rig.sequencer.layout import SegmentKind
-from rig.sequencer.segments import Excitation, Segment, SettleRule
+from rig.loop.loop import Loop
 from rig.tick.kernels import tick_block
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
 from rig.tick.tick import Tick
 from tests.closed_loop.laws import law_of
 from tests.rig.rigs import bench_with, tick_for

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import rig
-from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 from rig.measurements import point_rows
-from rig.summary import summarise_recording
+from rig.show.summary import summarise_recording
 from rig.tick.layout import DEVICE_SHIFT
 from tests.rig.rigs import bench_with
 

@@ -6,8 +6,8 @@ import pytest
 import rig
 from controller.layout import LOCK, LockState
 from rig.campaigns.plans import load_plan
-from rig.sequencer.kernels import CLAMPED_PERIODS, FAR_PERIODS, start_verdict
-from rig.sequencer.layout import SETTLING, Outcome
+from rig.tick.sequencer.kernels import CLAMPED_PERIODS, FAR_PERIODS, start_verdict
+from rig.tick.sequencer.layout import SETTLING, Outcome
 from tests.rig.rigs import bench_with
 
 

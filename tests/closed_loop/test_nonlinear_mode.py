@@ -6,7 +6,7 @@ from scipy.interpolate import PchipInterpolator
 
 import rig
 from identification import Backbone, LinearModes, NonlinearMode, nonlinear_mode, repeatability
-from rig.campaigns.backbone import BackbonePlan
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.plans import load_plan
 from simulators.analysis import PeriodicResponses, phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig

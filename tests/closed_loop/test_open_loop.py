@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 import rig
-from rig.campaigns.execution import Silent
-from rig.campaigns.multisine import MultisinePlan
-from rig.campaigns.multisine_points import MULTISINE_COLUMNS
-from rig.campaigns.stepped_sine import SteppedSinePlan
-from rig.campaigns.stepped_sine_points import STEPPED_SINE_COLUMNS
-from rig.campaigns.sweep import SweepPlan
-from rig.console import RunProgress
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.multisine.points import MULTISINE_COLUMNS
+from rig.campaigns.running.execution import Silent
+from rig.campaigns.stepped_sine.plan import SteppedSinePlan
+from rig.campaigns.stepped_sine.points import STEPPED_SINE_COLUMNS
+from rig.campaigns.sweep.plan import SweepPlan
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
-from rig.safety.layout import GuardMode
-from rig.summary import summarise_recording as show
+from rig.show.progress import RunProgress
+from rig.show.summary import summarise_recording as show
+from rig.tick.safety.layout import GuardMode
 from simulators.virtual_rig import VirtualRig
 from tests.reference.harmonic_balance import response_to_voltage
 from tests.reference.parameters import ONE_SIDED

@@ -7,11 +7,11 @@ import pytest
 
 import rig
 from controller import preset
-from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.multisine import MultisinePlan
-from rig.campaigns.stepped_sine import SteppedSinePlan
+from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 from rig.drivers.virtual.driver import VirtualDAQ
-from rig.loop import Loop
+from rig.loop.loop import Loop
 from tests.rig.rigs import bench_with
 
 FORCE, DRIVE, BESIDE, TIP = range(4)
@@ -52,7 +52,7 @@ def spoil(monkeypatch, after, change):
         if samples[id(self)] > after:
             change(inputs, NOISE_V * noise.normal(size=len(inputs)))
 
-    monkeypatch.setattr("rig.session.Loop", partial(Loop, fused=False))
+    monkeypatch.setattr("rig.loop.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", spoiled)
 
 

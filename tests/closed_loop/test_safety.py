@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rig.drivers import make_daq
-from rig.safety.layout import EndReason, GuardMode
-from rig.safety.limits import describe_end
 from rig.tick.kernels import tick_block
+from rig.tick.safety.layout import EndReason, GuardMode
+from rig.tick.safety.limits import describe_end
 from tests.rig.rigs import bench_with, tick_for
 
 FORCE, DRIVE, RESPONSE = 0, 1, 3

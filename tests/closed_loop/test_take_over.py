@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from controller import AmplitudeLaw
-from rig.sequencer.layout import SegmentKind
-from rig.sequencer.segments import Excitation, Segment
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Excitation, Segment
 from tests.closed_loop.laws import FREQUENCY_HZ, carried_out, law_of
 from tests.rig.rigs import bench_with
 

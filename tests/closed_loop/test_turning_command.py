@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from controller import AmplitudeLaw
 from rig.drivers import make_daq
-from rig.loop import Loop
-from rig.safety.kernels import permitted_amplitude, permitted_turn
-from rig.safety.limits import guard_record, limits_record
-from rig.sequencer.layout import SegmentKind
-from rig.sequencer.segments import Segment, SettleRule
+from rig.loop.loop import Loop
+from rig.tick.safety.kernels import permitted_amplitude, permitted_turn
+from rig.tick.safety.limits import guard_record, limits_record
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
 from tests.closed_loop.laws import law_of
 from tests.rig.rigs import bench_with

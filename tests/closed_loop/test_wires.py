@@ -8,11 +8,11 @@ import pytest
 
 import rig
 from rig.bench import Bench, load_bench
-from rig.campaigns.gaps import lost_rows
+from rig.campaigns.evaluation.gaps import lost_rows
+from rig.emulator.emulated import emulated
 from rig.measurements import point_rows
 from rig.wire.can.slcan import SlcanBus
-from rig.wire.device.emulator import emulated
-from tests.rig.test_runs import plan_with
+from tests.rig.campaigns.running.test_runs import plan_with
 
 QUEUE = 1
 BLOCKS = {"shipped": 14, "1 kHz": 4}  # two frames of CAN FD, four classical ones
@@ -70,7 +70,7 @@ def test_frames_that_a_bus_loses_are_gaps_that_are_counted_and_leave_the_point_r
         return None if samples and next(frames) % every == 0 else frame
 
     monkeypatch.setattr(SlcanBus, "receive", lossy)
-    monkeypatch.setattr("rig.worker.spawn.supported", lambda: False)  # the loop runs here, where the bus is ours
+    monkeypatch.setattr("rig.loop.worker.spawn.supported", lambda: False)  # the loop runs here, where the bus is ours
     with (
         emulated(bench_at("shipped"), "can", lockstep=True, seed=1) as bench,
         rig.run(PLAN, bench=bench, seed=1) as run,

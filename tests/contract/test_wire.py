@@ -12,7 +12,7 @@ from rig.conformance import DriverContract, last_output_v, with_loopback
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.drivers.wire import WireOptions
-from rig.wire.device.emulator import emulated
+from rig.emulator.emulated import emulated
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ
 

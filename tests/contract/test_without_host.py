@@ -5,7 +5,7 @@ import pytest
 from rig.bench import DriverChoice
 from rig.conformance import DriverContract, NotApplicable, last_output_v
 from rig.drivers import make_daq
-from rig.wire.device.emulator import emulated
+from rig.emulator.emulated import emulated
 from tests.rig.rigs import bench_with
 
 KILLED = "test_the_output_comes_to_0_v_without_the_host"

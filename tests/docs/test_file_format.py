@@ -9,9 +9,9 @@ import rig
 from identification import FrequencyResponseMatrix, LinearModes, NonlinearMode
 from identification.nonlinear.nonlinear_modes import STANDARD_ERRORS
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.plan import Plan
+from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
-from rig.models import files
+from rig.models.files import files
 from tests.docs.pages import ROOT
 
 SMALL = {"bench": "magnet-beam", "levels_v": [0.4]}

@@ -13,21 +13,21 @@ from controller.lock.rule import LockRule
 from controller.pll import PhaseLockedLoop
 from rig import errors as rig_errors
 from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
-from rig.campaigns.backbone import BackbonePlan
-from rig.campaigns.continuous_backbone import ContinuousBackbonePlan
+from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.known_plant import PlantFacts
-from rig.campaigns.multisine import MultisinePlan
-from rig.campaigns.response_controlled import ResponseControlledPlan
-from rig.campaigns.stepped_phase import SteppedPhasePlan
-from rig.campaigns.stepped_sine import SteppedSinePlan
-from rig.campaigns.sweep import SweepPlan
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.planning.plant import PlantFacts
+from rig.campaigns.response_controlled.plan import ResponseControlledPlan
+from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
+from rig.campaigns.stepped_sine.plan import SteppedSinePlan
+from rig.campaigns.sweep.plan import SweepPlan
 from rig.daq import Channel
 from rig.drivers.can import CanOptions
 from rig.drivers.serial import SerialOptions
 from rig.drivers.virtual.driver import Queue
-from rig.sequencer.segments import SettleRule
 from rig.tick.layout import DEVICE_SHIFT
+from rig.tick.sequencer.segments import SettleRule
 from rig.wire.can.link import CanLink
 from rig.wire.can.slcan import SlcanBus
 from simulators.layout import Flag

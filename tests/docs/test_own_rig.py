@@ -12,7 +12,7 @@ import pytest
 
 from rig.bench import load_bench
 from rig.drivers import make_daq
-from rig.models.files import load
+from rig.models.files.files import load
 from simulators.analysis import phase_resonance_backbone
 from tests.docs.pages import ROOT, blocks, write
 

@@ -13,7 +13,7 @@ from rig.wire.can.dbc import compile_text
 from rig.wire.can.definition import definition, shape_of
 from rig.wire.can.frames import Frame, frame_seconds
 from rig.wire.can.load import bus_load
-from rig.wire.can.protocol import Kind, protocol
+from rig.wire.can.protocol import FrameKind, protocol
 from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
 from tests.docs.pages import ROOT, blocks
 
@@ -107,7 +107,7 @@ def test_identifiers_lengths_and_largest_blocks_are_those_of_the_definition() ->
         base = int(identifier[:5], 16)
         for fd in (True, False):
             one = protocol(4, fd, 5)
-            assert one.identifiers[Kind(name), 0] == base + (5 if "node" in identifier else 0)
+            assert one.identifiers[FrameKind(name), 0] == base + (5 if "node" in identifier else 0)
             if layout:
                 known = one.layout.messages[name]
                 assert tuple(re.findall(r"`(\w+)`", layout)) == known.signals

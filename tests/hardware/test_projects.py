@@ -62,12 +62,12 @@ KILLED = """
 import os, signal
 from pathlib import Path
 
-from rig.campaigns.execution import Silent
+from rig.campaigns.running.execution import Silent
 from rig.campaigns.plans import load_plan
 
 def test_a_emulator_dies_in_mid_run(armed_rig, monkeypatch):
     children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
-    (emulator,) = (int(c) for c in children if b"rig.wire.device" in Path(f"/proc/{c}/cmdline").read_bytes())
+    (emulator,) = (int(c) for c in children if b"rig.emulator" in Path(f"/proc/{c}/cmdline").read_bytes())
     rows = []
 
     def advance(self, chunk, tick):
@@ -107,7 +107,7 @@ INTERRUPTED = """
 from pathlib import Path
 
 import numpy as np
-from rig.campaigns.execution import Silent
+from rig.campaigns.running.execution import Silent
 from rig.campaigns.plans import load_plan
 
 def test_a(armed_rig, monkeypatch):

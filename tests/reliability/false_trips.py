@@ -14,10 +14,10 @@ from joblib import Parallel, delayed
 from controller import AmplitudeLaw
 from rig.campaigns.plans import bench_of, load_plan, shipped_plans
 from rig.drivers.virtual import VirtualDAQ
-from rig.loop import Loop
-from rig.safety.following.kernels import ASTRAY_PERIODS
-from rig.safety.layout import EndReason
-from rig.session import TickSettings
+from rig.loop.loop import Loop
+from rig.tick.safety.following.kernels import ASTRAY_PERIODS
+from rig.tick.safety.layout import EndReason
+from rig.tick.tick import TickSettings
 from tests.rig.rigs import bench_with
 
 BEGIN, END = "<!-- begin of the count of false trips -->\n", "<!-- end of the count of false trips -->\n"

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import rig
 from rig.bench import Bench, load_bench
-from rig.campaigns.execution import Silent
+from rig.campaigns.running.execution import Silent
+from rig.emulator.emulated import emulated
 from rig.recording.reader import Recording
 from rig.tick.tick import Tick
-from rig.wire.device.emulator import emulated
-from tests.rig.test_runs import plan_with
+from tests.rig.campaigns.running.test_runs import plan_with
 
 __all__ = ["Soaked", "soak", "table"]
 

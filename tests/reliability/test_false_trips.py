@@ -2,8 +2,8 @@
 
 import pytest
 
-from rig.safety.following.kernels import ASTRAY_PERIODS
-from rig.safety.layout import EndReason
+from rig.tick.safety.following.kernels import ASTRAY_PERIODS
+from rig.tick.safety.layout import EndReason
 from tests.reliability.false_trips import SoundRun, held_level_plans, sound_run, table_of
 
 

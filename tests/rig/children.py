@@ -1,4 +1,4 @@
-"""A child process of `rig.child` that does what its argument says."""
+"""A child process of `rig.system.child` that does what its argument says."""
 
 import os
 import signal
@@ -6,7 +6,7 @@ import sys
 import time
 from pathlib import Path
 
-from rig.child import confine
+from rig.system.child import confine
 
 if __name__ == "__main__":
     what = sys.argv[1]

@@ -36,4 +36,4 @@ def lose(monkeypatch, gaps: Sequence[tuple[int, int]]) -> None:
         daq.lost = lost
         return daq
 
-    monkeypatch.setattr("rig.session.make_daq", make)
+    monkeypatch.setattr("rig.loop.session.make_daq", make)

@@ -4,8 +4,8 @@ from typing import Any
 
 from controller import AmplitudeLaw, PhaseLockedLoop, preset
 from rig.bench import Bench, load_bench
-from rig.sequencer.layout import OnFailure, SegmentKind
-from rig.sequencer.segments import Segment, SettleRule
+from rig.tick.sequencer.layout import OnFailure, SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
 
 SETTLE = SettleRule(longest_periods=300)

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from rig.bench import Bench
-from rig.configuration import Configured, validated
+from rig.bench.configuration import Configured, validated
 from rig.daq import DAQ, Capabilities
 from rig.errors import DaqDisconnected, DaqRefused
 

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from rig.bench import Bench
-from rig.configuration import Configured, explain, validated
+from rig.bench.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.kernels import exchange_block, fused
 from rig.drivers.virtual.loopback import loopback_of

@@ -3,9 +3,9 @@
 import numpy as np
 
 from rig.drivers.virtual.loopback import Loopback
-from rig.safety.kernels import is_over
 from rig.tick.kernels import tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
+from rig.tick.safety.kernels import is_over
 from simulators.kernels import sample
 from simulators.layout import RigArrays, RigState
 from vibrolock.compiled import kernel

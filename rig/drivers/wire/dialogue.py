@@ -16,7 +16,7 @@ from rig.wire.messages import (
     Samples,
     Status,
 )
-from rig.wire.words import NAME_WORDS, as_float, as_text
+from rig.wire.parameter_words import NAME_WORDS, as_float, as_text
 
 __all__ = ["ANSWER_S", "Dialogue", "why_not"]
 

@@ -8,7 +8,7 @@ from rig.bench import Bench
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqMismatch, DaqProtocol
 from rig.wire.messages import VERSION, Command, Parameter
-from rig.wire.words import as_double
+from rig.wire.parameter_words import as_double
 
 __all__ = ["DeviceFacts", "compare", "negotiate", "read_facts", "remarks_on"]
 

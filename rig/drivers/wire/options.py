@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from rig.configuration import Configured
+from rig.bench.configuration import Configured
 
 __all__ = ["WireOptions"]
 

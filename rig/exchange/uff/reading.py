@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rig.exchange.mat import ImportFailed
-from rig.text_files import read_bytes
+from rig.system.text_files import read_bytes
 
 __all__ = ["Dataset", "degree_of", "read_uff"]
 

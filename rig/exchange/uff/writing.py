@@ -14,8 +14,8 @@ import numpy as np
 
 from identification import Channel
 from rig.errors import RecordingError
-from rig.exchange.contents import Contents
 from rig.exchange.uff.codes import WIDTH, axis, channel_lines, degrees_of_freedom, evenly
+from rig.measurements.contents import Contents
 
 __all__ = ["write_uff"]
 

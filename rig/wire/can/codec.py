@@ -7,7 +7,7 @@ import numpy as np
 from rig.errors import DaqRefused
 from rig.wire.can.frames import Frame
 from rig.wire.can.groups import Blocks
-from rig.wire.can.protocol import Kind, Protocol
+from rig.wire.can.protocol import FrameKind, Protocol
 from rig.wire.can.streams import COUNT, StreamFrames, check_stream
 from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
 
@@ -34,9 +34,9 @@ class CanCodec:
         counters.update(dict.fromkeys(COUNTERS, 0))
         self._kinds = protocol.kinds
         self._identifiers = protocol.identifiers
-        self._command = protocol.packing(Kind.REQUEST)
-        self._beat = protocol.packing(Kind.HEARTBEAT)
-        self._index = protocol.packing(Kind.OUTPUT_INDEX)
+        self._command = protocol.packing(FrameKind.REQUEST)
+        self._beat = protocol.packing(FrameKind.HEARTBEAT)
+        self._index = protocol.packing(FrameKind.OUTPUT_INDEX)
         self._stream: Stream | None = None
         self._last_beat: Heartbeat | None = None
         self._flags_told = 0
@@ -47,7 +47,9 @@ class CanCodec:
         self._stream = stream
         self._flags, self._dropped = 0, 0
         self._reported = _NEVER  # group at which the receiver was last told its index
-        samples, outputs = (StreamFrames(self.protocol, kind, stream.block) for kind in (Kind.SAMPLES, Kind.OUTPUT))
+        samples, outputs = (
+            StreamFrames(self.protocol, kind, stream.block) for kind in (FrameKind.SAMPLES, FrameKind.OUTPUT)
+        )
         self._sent, self._received = (samples, outputs) if self._device else (outputs, samples)
         self._incoming = Blocks(self._counters, self._received)
         if self._device:
@@ -60,18 +62,18 @@ class CanCodec:
         if isinstance(message, Output):
             return self._encode_output(message)
         if isinstance(message, Request | Answer):
-            kind = Kind.REQUEST if isinstance(message, Request) else Kind.ANSWER
+            kind = FrameKind.REQUEST if isinstance(message, Request) else FrameKind.ANSWER
             return [Frame(self._identifiers[kind, 0], self._command.pack(*message))]
         if isinstance(message, Heartbeat):
             self._last_beat = message
             return [self._heartbeat(message)]
-        return [Frame(self._identifiers[Kind.EMERGENCY_STOP, 0], bytes((message.reason & 0xFF,)))]
+        return [Frame(self._identifiers[FrameKind.EMERGENCY_STOP, 0], bytes((message.reason & 0xFF,)))]
 
     def _heartbeat(self, beat: Heartbeat) -> Frame:
         dropped = min(beat.dropped, _LARGEST_DROPPED)
         data = self._beat.pack(beat.state, beat.flags & 0xFF, beat.boot & 0xFF, dropped, beat.samples & 0xFFFFFFFF)
         self._flags_told = beat.flags
-        return Frame(self._identifiers[Kind.HEARTBEAT, 0], data)
+        return Frame(self._identifiers[FrameKind.HEARTBEAT, 0], data)
 
     def _encode_samples(self, message: Samples) -> list[Frame]:
         frames = self._streaming().frames(message.first, message.counts, message.flags)
@@ -87,7 +89,7 @@ class CanCodec:
         if self._must_tell(message.first):
             self._reported = message.first // self._sent.block * self._sent.groups
             data = self._index.pack(message.first & 0xFFFFFFFF)
-            return [Frame(self._identifiers[Kind.OUTPUT_INDEX, 0], data), *frames]
+            return [Frame(self._identifiers[FrameKind.OUTPUT_INDEX, 0], data), *frames]
         return frames
 
     def _must_tell(self, first: int) -> bool:
@@ -102,9 +104,9 @@ class CanCodec:
             self._counters["foreign_frames"] += 1
             return None
         kind, number = known
-        if kind is Kind.EMERGENCY_STOP:  # of any length, and rather once too often than too seldom
+        if kind is FrameKind.EMERGENCY_STOP:  # of any length, and rather once too often than too seldom
             return EmergencyStop(frame.data[0] if frame.data else 0)
-        if kind is (Kind.OUTPUT if self._device else Kind.SAMPLES):
+        if kind is (FrameKind.OUTPUT if self._device else FrameKind.SAMPLES):
             return self._decode_stream(frame, number)
         try:
             return self._decode_command(kind, frame.data)
@@ -112,16 +114,16 @@ class CanCodec:
             self._counters["damaged_frames"] += 1
             return None
 
-    def _decode_command(self, kind: Kind, data: bytes) -> Message | None:
+    def _decode_command(self, kind: FrameKind, data: bytes) -> Message | None:
         if self._device:
-            if kind is Kind.REQUEST:
+            if kind is FrameKind.REQUEST:
                 return Request(*self._command.unpack(data))
-            if kind is Kind.OUTPUT_INDEX and self._stream is not None:
+            if kind is FrameKind.OUTPUT_INDEX and self._stream is not None:
                 self._incoming.mark(self._index.unpack(data)[0])
                 return None
-        elif kind is Kind.ANSWER:
+        elif kind is FrameKind.ANSWER:
             return Answer(*self._command.unpack(data))
-        elif kind is Kind.HEARTBEAT:
+        elif kind is FrameKind.HEARTBEAT:
             state, flags, boot, dropped, samples = self._beat.unpack(data)
             self._flags, self._dropped = flags, dropped
             if self._stream is not None and state != DeviceState.IDLE:

@@ -7,7 +7,7 @@ import cantools
 import numpy as np
 
 from rig.errors import ConfigurationError
-from rig.text_files import read_text
+from rig.system.text_files import read_text
 from rig.wire.can.layout import STRUCT_CODES, CompiledMessage, Layout
 
 __all__ = ["compile_layout", "compile_text"]

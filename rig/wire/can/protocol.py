@@ -11,10 +11,10 @@ from rig.wire.can.dbc import compile_layout, compile_text
 from rig.wire.can.definition import HIGHEST_NODE, NODE_MASK, Shape, definition, shape_of
 from rig.wire.can.layout import Layout
 
-__all__ = ["Kind", "Protocol", "protocol"]
+__all__ = ["FrameKind", "Protocol", "protocol"]
 
 
-class Kind(Enum):
+class FrameKind(Enum):
     """Messages that a bus carries; outputs and samples as many of one layout over classical CAN."""
 
     EMERGENCY_STOP = "EmergencyStop"
@@ -35,26 +35,26 @@ class Protocol:
     node: int
 
     @cached_property
-    def kinds(self) -> dict[int, tuple[Kind, int]]:
+    def kinds(self) -> dict[int, tuple[FrameKind, int]]:
         """What an identifier stands for: kind and number within its kind (sequence and part), by identifier."""
-        out: dict[int, tuple[Kind, int]] = {}
+        out: dict[int, tuple[FrameKind, int]] = {}
         for name, message in self.layout.messages.items():
             base, _, number = name.partition("_")
-            kind = Kind(base)
+            kind = FrameKind(base)
             out[self._shifted(kind, message.frame_id)] = (kind, int(number or 0))
         return out
 
     @cached_property
-    def identifiers(self) -> dict[tuple[Kind, int], int]:
+    def identifiers(self) -> dict[tuple[FrameKind, int], int]:
         """The identifier of a kind and number."""
         return {meaning: identifier for identifier, meaning in self.kinds.items()}
 
-    def packing(self, kind: Kind) -> Struct:
+    def packing(self, kind: FrameKind) -> Struct:
         """Packs the signals of a message without numbers."""
         return Struct(self.layout.messages[kind.value].format)
 
-    def _shifted(self, kind: Kind, frame_id: int) -> int:
-        return frame_id if kind is Kind.EMERGENCY_STOP else frame_id + self.node
+    def _shifted(self, kind: FrameKind, frame_id: int) -> int:
+        return frame_id if kind is FrameKind.EMERGENCY_STOP else frame_id + self.node
 
 
 def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None) -> Protocol:

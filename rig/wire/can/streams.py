@@ -7,7 +7,7 @@ import numpy as np
 from rig.errors import DaqMismatch, DaqRefused
 from rig.wire.can.definition import Shape
 from rig.wire.can.frames import Frame, padded_length
-from rig.wire.can.protocol import Kind, Protocol
+from rig.wire.can.protocol import FrameKind, Protocol
 from rig.wire.messages import Stream
 
 __all__ = ["COUNT", "Piece", "StreamFrames", "check_stream"]
@@ -47,8 +47,8 @@ class StreamFrames:
     Whole blocks go into the sequence numbers, so that a loss of a whole wrap cannot make one block of the frames of two.
     """
 
-    def __init__(self, protocol: Protocol, kind: Kind, block: int) -> None:
-        shape, outputs = protocol.shape, kind is Kind.OUTPUT
+    def __init__(self, protocol: Protocol, kind: FrameKind, block: int) -> None:
+        shape, outputs = protocol.shape, kind is FrameKind.OUTPUT
         self.fd, self.header = shape.fd, shape.header
         self.block = block
         self.n_channels = 1 if outputs else shape.n_channels

@@ -5,7 +5,7 @@ import pytest
 
 import rig
 from identification import best_linear_approximation, distortion_levels
-from rig.campaigns.multisine import MultisinePlan
+from rig.campaigns.multisine.plan import MultisinePlan
 from rig.errors import ConfigurationError
 from simulators.analysis import frequency_response
 from simulators.virtual_rig import VirtualRig

@@ -8,9 +8,9 @@ from rig.bench import Bench
 from rig.daq import LOST
 from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.wire import WireDAQ, WireOptions
+from rig.emulator import Device, Faults, VirtualPlant, Wiring
+from rig.emulator.description import described
 from rig.errors import DaqTimeout
-from rig.wire.device import Device, Faults, VirtualPlant, Wiring
-from rig.wire.device.description import described
 from rig.wire.link import Link
 from tests.reliability.faults.plant import BrokenRig
 from tests.reliability.faults.table import Fault

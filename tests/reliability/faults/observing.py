@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.runner import carry_out
+from rig.campaigns.running.runner import carry_out
 from rig.recording.journal import journal_path
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -89,7 +89,7 @@ def driver(make: Any, *given: Any) -> Iterator[list[Any]]:
         made.append(make(bench, seed, *given))
         return made[-1]
 
-    with patch("rig.session.make_daq", make_daq):
+    with patch("rig.loop.session.make_daq", make_daq):
         yield made
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 from rig.bench import Bench
-from rig.campaigns.plan import Plan
+from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
 from tests.rig.rigs import bench_with
 

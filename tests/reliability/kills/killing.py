@@ -14,9 +14,9 @@ import numpy as np
 
 import rig
 from rig.bench import Bench
+from rig.emulator.emulated import emulated
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
-from rig.wire.device.emulator import emulated
 from tests.reliability.kills.cases import Case
 from tests.reliability.kills.scene import plan
 from tests.rig.rigs import bench_with

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 import rig
-import rig.campaigns.runner as runner
+import rig.campaigns.running.runner as runner
 import rig.recording.store as store
 from rig.bench import Bench
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.output import forget_before
+from rig.campaigns.running.output_file import forget_before
+from rig.loop.worker.session import WorkerSession
 from rig.recording.journal import JournalWriter
-from rig.worker.session import WorkerSession
-from tests.rig.test_runs import plan_with
+from tests.rig.campaigns.running.test_runs import plan_with
 
 __all__ = ["plan"]
 

@@ -10,11 +10,11 @@ from random import Random
 import numpy as np
 
 from rig.bench import load_bench
-from rig.campaigns.lengths import check_length
+from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
-from rig.session import TickSettings
+from rig.tick.tick import TickSettings
 from simulators.shipped import specimen_table
 from tests.reliability.mutations.byte_mutations import BYTE_MUTATIONS
 from tests.reliability.mutations.judging import Verdict, judged
@@ -96,9 +96,9 @@ def _use_bench(path: Path) -> None:
 
 
 def _shipped() -> list[tuple[str, Path]]:
-    plans = sorted((RIG / "plans").rglob("*.toml"))
-    benches = sorted((RIG / "benches").glob("*.toml"))
-    named = [(f"plan {path.relative_to(RIG / 'plans').with_suffix('')}", path) for path in plans]
+    plans = sorted((RIG / "campaigns" / "shipped").rglob("*.toml"))
+    benches = sorted((RIG / "bench" / "shipped").glob("*.toml"))
+    named = [(f"plan {path.relative_to(RIG / 'campaigns' / 'shipped').with_suffix('')}", path) for path in plans]
     # Benches as often as plans, and every second one with its specimen written out.
     times = len(plans) // (2 * len(benches))
     return (

@@ -12,7 +12,7 @@ from identification import Channel, LinearModes
 from rig.errors import RigError
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
-from rig.models.files import load, save
+from rig.models.files.files import load, save
 from rig.recording.arrays import read_arrays
 from rig.recording.contents import JournalContents
 from rig.recording.integrity import VERIFIED

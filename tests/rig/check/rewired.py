@@ -119,7 +119,7 @@ class RewiredDAQ(DAQ):
 
 def rewire(patch: pytest.MonkeyPatch, rewiring: Rewiring | None, **differently: bool) -> None:
     """Have every bench that is opened from now on rewired."""
-    patch.setattr("rig.session.make_daq", lambda bench, seed: RewiredDAQ(bench, seed, rewiring, **differently))
+    patch.setattr("rig.loop.session.make_daq", lambda bench, seed: RewiredDAQ(bench, seed, rewiring, **differently))
 
 
 Column = Callable[[int, np.ndarray], np.ndarray]
@@ -142,4 +142,6 @@ class ExtraChannelDAQ(RewiredDAQ):
 
 def add_channel(patch: pytest.MonkeyPatch, column: Column, *, virtual: bool = True) -> None:
     """Have every bench that is opened from now on deliver its last channel from elsewhere."""
-    patch.setattr("rig.session.make_daq", lambda bench, seed: ExtraChannelDAQ(bench, seed, column, virtual=virtual))
+    patch.setattr(
+        "rig.loop.session.make_daq", lambda bench, seed: ExtraChannelDAQ(bench, seed, column, virtual=virtual)
+    )

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from rig.check.check import check
 from rig.check.findings import Finding
 from rig.check.report import say, summary
+from rig.check.run import check
 from rig.cli import main
 from rig.errors import RecordingError
 from rig.recording.reader import Recording

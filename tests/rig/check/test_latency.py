@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.check.check import check
+from rig.check.run import check
 from rig.conformance import with_loopback
 from rig.drivers.virtual.driver import VirtualDAQ
 from tests.rig.check.rewired import add_channel

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rig.check.check import check
-from rig.wire.device.emulator import emulated
+from rig.check.run import check
+from rig.emulator.emulated import emulated
 from tests.rig.rigs import bench_with
 
 SLOW = {"block": 800}  # fewer turns on the line: nothing of a check is in a hurry

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import freqs
 
-from rig.check.check import next_level, share_of_limits
 from rig.check.findings import graded
 from rig.check.responses import fit_mode
+from rig.check.run import next_level, share_of_limits
 from rig.check.silence import hum, silent_findings
 from rig.check.wiring import best_assignment, by_magnitude
 from rig.tick.layout import recorded_row
@@ -131,7 +131,7 @@ def test_lost_samples_do_not_hide_how_near_a_limit_the_others_were():
 def test_a_channel_of_which_nothing_was_seen_gives_no_higher_level(monkeypatch):
     bench = bench_with()
     unclear = SimpleNamespace(coherence=np.full(len(bench.channels), 0.9))
-    monkeypatch.setattr("rig.check.check.responses_in", lambda recorded: unclear)
+    monkeypatch.setattr("rig.check.run.responses_in", lambda recorded: unclear)
     inputs = np.zeros((100, len(bench.channels)))
     assert next_level(bench, recorded_with(bench, inputs), 0.01) == pytest.approx(0.04)  # four times, the most
     inputs[:, -1] = np.nan

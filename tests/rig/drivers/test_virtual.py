@@ -9,7 +9,7 @@ from rig.bench import Bench
 from rig.conformance import with_loopback
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
-from rig.loop import Loop
+from rig.loop.loop import Loop
 from tests.rig.rigs import bench_with, tick_for
 from tests.simulators.references import UNFILTERED
 

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from rig.daq import LOST, State
 from rig.drivers import make_daq
 from rig.drivers.wire import WireOptions
+from rig.emulator import Device, Faults, VirtualPlant
+from rig.emulator.description import described
 from rig.errors import (
     DaqDisconnected,
     DaqEmergencyStop,
@@ -22,9 +24,8 @@ from rig.errors import (
     DaqTimeout,
     DaqWatchdog,
 )
-from rig.session import LocalSession
-from rig.wire.device import Device, Faults, VirtualPlant
-from rig.wire.device.description import described
+from rig.loop.session import LocalSession
+from rig.loop.worker.probe import round_trips
 from rig.wire.messages import (
     ARM_KEY,
     Answer,
@@ -39,11 +40,10 @@ from rig.wire.messages import (
     Samples,
     Status,
 )
-from rig.wire.words import float_word
-from rig.worker.probe import round_trips
+from rig.wire.parameter_words import float_word
+from tests.rig.loop.worker.rigs import tone
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink
-from tests.rig.worker.rigs import tone
 
 BLOCKS = 60
 LATCHES = [(False, DaqWatchdog, "watchdog"), (True, DaqEmergencyStop, "emergency stop")]
@@ -329,7 +329,7 @@ def test_an_emergency_stop_between_start_and_the_first_block_is_not_cleared() ->
 def test_a_session_clears_what_its_device_had_latched_and_a_probe_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
     daq = latched_by(emergency=True)
     bench = bench_with()
-    monkeypatch.setattr("rig.worker.probe.make_daq", lambda *_: daq)
+    monkeypatch.setattr("rig.loop.worker.probe.make_daq", lambda *_: daq)
     facts = round_trips(bench, 0, 0.1)
     assert facts["latched"] == "the device's emergency stop had latched"
     assert "block_us" not in facts

@@ -18,7 +18,7 @@ from rig.cli import main
 from rig.exchange.export import write_contents
 from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import import_file
-from rig.models.files import load, save
+from rig.models.files.files import load, save
 
 
 @pytest.fixture

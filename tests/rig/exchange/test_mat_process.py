@@ -10,10 +10,10 @@ import scipy.sparse
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rig.child import ChildFailed
 from rig.exchange import mat
 from rig.exchange.mat import ImportFailed, read_mat
 from rig.exchange.mat_values import read_values, write_values
+from rig.system.child import ChildFailed
 
 THINGS = {
     "numbers": np.arange(12.0).reshape(3, 4),

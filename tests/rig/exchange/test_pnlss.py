@@ -11,7 +11,7 @@ from identification.linear.subspace import StateSpace
 from rig.errors import RecordingError
 from rig.exchange.export import export_file
 from rig.exchange.reading import ImportFailed, import_file
-from rig.models.files import load, save
+from rig.models.files.files import load, save
 
 FORCE, DRIVE, TIP = Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m")
 MAPPING = """

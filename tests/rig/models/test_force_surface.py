@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import FrequencyResponse
-from rig.models.files import load, save
+from rig.models.files.files import load, save
 
 OMEGA, ZETA, SHAPE, CUBIC = 2.0 * np.pi * 40.0, 0.004, 1.3, 3e8
 LEVELS_M = np.geomspace(5e-4, 2.4e-3, 20)

@@ -8,7 +8,7 @@ import pytest
 import rig
 from identification.prediction.exciter import PARAMETERS
 from rig.campaigns.plans import load_plan, plan_from
-from rig.models.files import load
+from rig.models.files.files import load
 from rig.recording.reader import Recording
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 import rig
 from identification import Features, FitProgress
 from rig.campaigns.plans import plan_from
-from rig.console import FitLines
-from rig.figures.pnlss import draw_pnlss
-from rig.models.files import load, save
-from rig.models.pnlss_request import PnlssOptions
+from rig.models.files.files import load, save
+from rig.models.files.pnlss_figure import draw_pnlss
+from rig.models.identify.pnlss_request import PnlssOptions
+from rig.show.progress import FitLines
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
 
@@ -36,7 +36,7 @@ QUICK = "--model pnlss --iterations 8 --outputs drive"
 @pytest.fixture(scope="session")
 def recordings(tmp_path_factory) -> Path:
     """A folder with the recordings."""
-    from tests.rig.test_runs import plan_with
+    from tests.rig.campaigns.running.test_runs import plan_with
 
     folder = tmp_path_factory.mktemp("pnlss")
     (folder / SWEEP_PLAN).write_text(
@@ -116,7 +116,7 @@ def test_ctrl_c_before_there_is_anything_leaves_nothing_behind(there, recordings
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("rig.models.identify_pnlss.identify_pnlss", stop)
+    monkeypatch.setattr("rig.models.identify.pnlss.identify_pnlss", stop)
     assert there(f"identify lines.h5 {QUICK} -o early.h5").status == 130
     assert not list(recordings.glob("early*"))
 

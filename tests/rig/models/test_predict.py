@@ -10,8 +10,8 @@ import pytest
 
 from identification import predict_sweep
 from rig.measurements import sweeps
-from rig.models.files import load, save
-from rig.models.identify import modes_in
+from rig.models.files.files import load, save
+from rig.models.identify.identify import modes_in
 from rig.recording.reader import Recording
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig

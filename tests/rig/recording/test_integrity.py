@@ -8,7 +8,6 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.child import ChildFailed
 from rig.errors import RecordingError
 from rig.recording import integrity
 from rig.recording.arrays import read_arrays, write_arrays
@@ -16,8 +15,9 @@ from rig.recording.journal import journal_path
 from rig.recording.layout import file_integrity
 from rig.recording.reader import Recording
 from rig.recording.store import continue_recording, finalise
-from rig.summary import summarise
-from rig.tables import print_summary
+from rig.show.summary import summarise
+from rig.show.tables import print_summary
+from rig.system.child import ChildFailed
 from tests.rig.recording.samples import fill, journal, without_digest
 
 GONE = "unverified: its digest is gone; another program has changed or rewritten it, or cut off its end"
@@ -165,7 +165,7 @@ def test_a_recording_whose_json_lacks_what_is_shown_is_refused_in_one_line(tmp_p
 @pytest.fixture
 def shown_model(tmp_path):
     from identification import FrequencyResponse
-    from rig.models.files import save
+    from rig.models.files.files import save
 
     path = tmp_path / "SHOWN.h5"
     hz = np.array([23.0, 24.0, 25.0])

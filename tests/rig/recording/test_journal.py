@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rig.errors import RecordingError
 from rig.recording import appending
-from rig.recording.blocks import LARGEST_PAYLOAD, Kind
+from rig.recording.blocks import LARGEST_PAYLOAD, BlockKind
 from rig.recording.contents import JournalContents
 from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path, read_journal
@@ -106,7 +106,7 @@ def test_a_large_array_becomes_blocks_that_a_reader_accepts(tmp_path):
         writer.part({})
         writer.rows(many)
         assert writer.n_rows == 100_000
-    sizes = [len(block.payload) for block in read_journal(tmp_path / "a.journal") if block.kind is Kind.ROWS]
+    sizes = [len(block.payload) for block in read_journal(tmp_path / "a.journal") if block.kind is BlockKind.ROWS]
     assert len(sizes) > 1
     assert max(sizes) <= LARGEST_PAYLOAD
     assert sum(sizes) == many.nbytes
@@ -516,7 +516,7 @@ def test_deeply_nested_json_is_a_bad_block_and_no_crash(tmp_path, original):
     deep = b'{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}"
     blocks = [(kind, payload) for kind, _, payload in blocks_by_hand(original)]
     path = tmp_path / "a.journal"
-    path.write_bytes(packed_by_hand([*blocks, (Kind.PART, deep)]))
+    path.write_bytes(packed_by_hand([*blocks, (BlockKind.PART, deep)]))
     found = read_journal(path)
     assert len(list(found)) == len(blocks) - 1
     assert "cannot be read" in found.tail.reason

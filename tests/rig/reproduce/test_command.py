@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rig.bench import load_bench
-from rig.models.files import load
-from rig.models.pnlss import IdentifiedPnlss
+from rig.models.files.files import load
+from rig.models.files.pnlss import IdentifiedPnlss
 from rig.reproduce.options import Options
 from rig.reproduce.specimens import specimen_of
 from rig.reproduce.steady import steady

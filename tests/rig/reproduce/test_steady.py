@@ -5,7 +5,7 @@ import numpy as np
 
 from identification import SteadyPrediction
 from rig.reproduce.steady import Steady
-from rig.reproduce.truths import Truth
+from rig.reproduce.true_responses import Truth
 
 
 def rising(**changes: Any) -> SteadyPrediction:

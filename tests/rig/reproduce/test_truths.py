@@ -6,7 +6,7 @@ import pytest
 from rig.bench import load_bench
 from rig.reproduce.options import Options
 from rig.reproduce.specimens import SPECIMENS
-from rig.reproduce.truths import truths
+from rig.reproduce.true_responses import truths
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
 

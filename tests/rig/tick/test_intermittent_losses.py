@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from rig.daq import LOST
-from rig.loop import Loop
-from rig.safety.layout import EndReason
+from rig.loop.loop import Loop
 from rig.tick.kernels import tick_block
+from rig.tick.safety.layout import EndReason
+from tests.rig.loop.worker.rigs import slow_bench, tone
 from tests.rig.lossy import LossyDAQ
-from tests.rig.worker.rigs import slow_bench, tone
 
 RATE_HZ = 1000
 

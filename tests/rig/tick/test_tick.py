@@ -7,10 +7,10 @@ import pytest
 
 from controller import AmplitudeLaw, preset
 from rig.errors import ConfigurationError
-from rig.sequencer.layout import SegmentKind
-from rig.sequencer.segments import Segment, SettleRule
 from rig.tick.kernels import tick_block
 from rig.tick.layout import ROW_COLUMNS
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
 from tests.rig.rigs import bench_with
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from rig.emulator.emulated import emulated
 from rig.tuning import tune
-from rig.wire.device.emulator import emulated
 from tests.rig.rigs import bench_with
 
 BLOCK, QUEUE = 10, 1

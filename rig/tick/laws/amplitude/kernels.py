@@ -14,9 +14,9 @@ from controller.layout import (
     RESPONSE,
     VOLTAGE,
 )
-from rig.safety.following.kernels import begin_to_follow
-from rig.sequencer.layout import LOOP_DRIVE, TONE
 from rig.tick.layout import TickArrays
+from rig.tick.safety.following.kernels import begin_to_follow
+from rig.tick.sequencer.layout import LOOP_DRIVE, TONE
 from vibrolock.compiled import Record, kernel
 
 SLOPE_FORGETS = 0.5  # rate at which a slope is forgotten, over that of the loop it is for

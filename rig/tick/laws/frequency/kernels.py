@@ -8,8 +8,8 @@ from controller.layout import (
     FREQUENCY_ERROR,
     SIGN,
 )
-from rig.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from rig.tick.layout import TickArrays
+from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from vibrolock.compiled import kernel
 
 

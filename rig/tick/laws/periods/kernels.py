@@ -8,13 +8,13 @@ from controller.layout import (
     VOLTAGE,
 )
 from controller.lock.kernels import next_lock_state
-from rig.safety.following.kernels import follow_level, see_frequency, silent_side
-from rig.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
-from rig.safety.layout import ARMED
-from rig.sequencer.kernels import judge_period
-from rig.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from rig.tick.laws.amplitude.kernels import controlled_size
 from rig.tick.layout import TickArrays
+from rig.tick.safety.following.kernels import follow_level, see_frequency, silent_side
+from rig.tick.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
+from rig.tick.safety.layout import ARMED
+from rig.tick.sequencer.kernels import judge_period
+from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from vibrolock.compiled import kernel
 
 

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 import numpy as np
 
 from rig.bench import Bench, DriverChoice, load_bench
+from rig.emulator import Device, Faults, VirtualPlant
+from rig.emulator.description import described
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.link import CanLink
-from rig.wire.device import Device, Faults, VirtualPlant
-from rig.wire.device.description import described
 
 
 def bench_on(interface: str, channel: str, block: int = 4, **options: object) -> Bench:

@@ -8,8 +8,8 @@ import pytest
 from rig.bench import load_bench
 from rig.drivers import make_daq
 from rig.drivers.serial import SerialDAQ
+from rig.emulator.emulated import emulated
 from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqRefused
-from rig.wire.device.emulator import emulated
 
 
 @pytest.fixture(scope="module")

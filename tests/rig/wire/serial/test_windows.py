@@ -8,7 +8,7 @@ import pytest
 WITHOUT = """
 import signal, sys
 import can, serial, serial.tools.list_ports  # which have code of their own for such a system
-import rig.bench, rig.drivers, rig.realtime
+import rig.bench, rig.drivers, rig.loop.doctor
 from tests.rig.rigs import bench_with
 for name in ("SIGHUP", "SIGUSR1", "SIGQUIT"):
     delattr(signal, name)
@@ -28,9 +28,9 @@ except DaqRefused as error:
 """
 EMULATING = """
 from rig.errors import DaqRefused
-from rig.wire.device.emulator import Emulator
-from rig.wire.device.process import run_emulator
-from rig.wire.device.settings import EmulatorSettings
+from rig.emulator.emulated import Emulator
+from rig.emulator.process import run_emulator
+from rig.emulator.settings import EmulatorSettings
 try:
     run_emulator(EmulatorSettings(wire="serial", bench=bench_with()), print)
 except DaqRefused as error:

@@ -1,0 +1,182 @@
+"""Arming: who has let something physical move. A virtual rig arms itself, any other bench is armed by a person."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from rig.arming.bench_memory import BenchMemory, fingerprint, memory_of, now, remember
+from rig.arming.run_facts import user_name
+from rig.bench import Bench
+from rig.bench.cross_checks import cautions as cautions_of_limits
+from rig.daq import Capabilities
+from rig.errors import NotArmed
+from rig.loop.session import Session
+
+__all__ = ["Arm", "ArmingRequest", "armed", "asked_once", "cautions_of", "unguarded_text"]
+
+CHECK = "check"
+
+
+@dataclass(frozen=True)
+class ArmingRequest:
+    """What a person is told before arming."""
+
+    bench: Bench
+    """The bench."""
+    what: str
+    """Kind of campaign that is to run."""
+    identity: dict[str, str]
+    """What stands behind the driver."""
+    memory: BenchMemory
+    """Last check and trip."""
+    cautions: tuple[str, ...]
+    """What speaks against it, one line each."""
+    unseen: tuple[str, ...] = ()
+    """Those of them that only a person who is shown them takes back: a trip, a device that has latched."""
+    unguarded: str = ""
+    """Why a person has to stand by, and no switch or bench may arm: the output outlives the host; empty where it does not."""
+
+    @property
+    def unguarded_refusal(self) -> str:
+        """The line with which a switch, or a bench that arms itself, is refused where it is ``unguarded``."""
+        return (
+            f"bench {self.bench.name}: {self.unguarded}; run at a terminal without --arm and type the bench's name, or test "
+            "such a stop and set [arming] hardware_emergency_stop = true"
+        )
+
+    def lines(self) -> list[str]:
+        """All of it for the terminal."""
+        bench, limits, check = self.bench, self.bench.limits, self.memory.check
+        device = ", ".join(f"{key} {value}" for key, value in self.identity.items()) or "unknown"
+        last = (
+            "never" if check is None else f"{_age_h(check.at):.1f} h ago, {_verdict(check.failed)} ({check.recording})"
+        )
+        return [
+            f"bench    {bench.name}: {bench.specimen.name}",
+            f"device   {bench.driver.name}: {device}",
+            f"limits   {limits.voltage_v:g} V, {limits.force_n:g} N, {limits.acceleration_m_s2:g} m/s^2, "
+            f"{1e3 * limits.displacement_m:g} mm, {limits.frequency_hz[0]:g} to {limits.frequency_hz[1]:g} Hz",
+            f"checked  {last}",
+            *(f"CAUTION  {caution}" for caution in self.cautions),
+        ]
+
+
+Arm = bool | Callable[[ArmingRequest], bool] | None
+"""A person's word: given beforehand, asked for by a callable, or neither."""
+
+
+def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]:
+    """How the bench was armed and by whom, for the record; a person who is asked also takes back a trip.
+
+    A rig whose driver says ``virtual`` arms itself. ``[arming] automated`` does where nothing speaks against it. A word given
+    beforehand, ``arm`` True, does where no trip is remembered and the device has not latched: nobody has seen those. Neither
+    does where the output would outlive the host and no hardware emergency stop is declared. Raises `NotArmed`, which says how
+    to arm, before anything has moved.
+    """
+    if session.capabilities.virtual:
+        return {"how": "virtual", "by": "", "at": now(), "cautions": []}
+    memory = memory_of(bench)
+    unseen = _unseen(memory, session.latched)
+    unguarded = unguarded_text(bench, session.capabilities)
+    cautions = (*unseen, *filter(None, [unguarded]), *cautions_of(bench, memory, what, session.identity))
+    how = _how(ArmingRequest(bench, what, session.identity, memory, cautions, unseen, unguarded), arm)
+    if memory.trip is not None and how == "person":
+        remember(bench, trip=None)
+    return {"how": how, "by": user_name(), "at": now(), "cautions": list(cautions)}
+
+
+def _how(request: ArmingRequest, arm: Arm) -> str:
+    bench = request.bench
+    checked = not request.cautions or not bench.arming.require_check
+    alone = not request.unseen and not request.unguarded
+    if bench.arming.automated and arm is not False and arm is not True and alone and checked:
+        return "automated"
+    if callable(arm):
+        if arm(request):
+            return "person"
+        raise NotArmed(f"bench {bench.name}: was not armed; nothing has moved")
+    if arm and alone:
+        return "switch"
+    if request.unseen:
+        raise NotArmed(
+            f"bench {bench.name}: something physical would move and nobody has seen that {'; '.join(request.unseen)}; run at a "
+            "terminal without --arm and type the bench's name, or ask with a callable (arm=ask from Python)"
+        )
+    if request.unguarded and (arm or bench.arming.automated):
+        raise NotArmed(request.unguarded_refusal)
+    against = f" ({'; '.join(request.cautions)})" if request.cautions else ""
+    switch = "" if request.unguarded else ", or give --arm (arm=True from Python)"
+    automated = "" if bench.arming.automated else ", or [arming] automated = true in a bench made for it"
+    raise NotArmed(
+        f"bench {bench.name}: something physical would move and nobody has armed it{against}; run on a terminal and type the "
+        f"bench's name{switch}{automated}"
+    )
+
+
+def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str]) -> tuple[str, ...]:
+    """What speaks against arming for ``what``: limits that do not fit the sensors, no check, or one that does not count.
+
+    A check itself needs neither: it moves the rig gently, and finds both.
+    """
+    check = memory.check
+    if what == CHECK:
+        return ()
+    out = list(cautions_of_limits(bench))
+    if check is None:
+        return (f"the bench was never checked: rig check --bench {bench.name}", *out)
+    if check.failed:
+        out.append(f"the last check failed: {', '.join(check.failed)}")
+    age_h = _age_h(check.at)
+    if age_h < 0.0:
+        out.append(f"the last check lies {-age_h:.1f} h ahead of the clock of this computer, so its age is not known")
+    if age_h > bench.arming.check_valid_h:
+        out.append(f"the last check is {age_h:.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
+    if check.fingerprint != fingerprint(bench, identity):
+        out.append("the last check was of other channels, another rate, another driver or another device")
+    return tuple(out)
+
+
+def unguarded_text(bench: Bench, capabilities: Capabilities) -> str:
+    """Why a hardware emergency stop is asked for, for a caution; empty where none is.
+
+    A switch on an input channel (``[emergency_stop]``) does not count: the host reads it, and it is the host that is gone.
+    """
+    if capabilities.safe_without_host or bench.arming.hardware_emergency_stop:
+        return ""
+    return (
+        f"driver {bench.driver.name} does not bring the output to 0 V by itself if this computer's process dies: keep a "
+        "hardware emergency stop within reach that cuts the amplifier"
+    )
+
+
+def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:
+    """What nobody has looked at yet: a trip, or a run without an end; what the device has latched."""
+    out: list[str] = []
+    if memory.trip is not None:
+        out.append(f"the last run tripped: {memory.trip.text}" if memory.trip.recording else memory.trip.text)
+    if latched:
+        out.append(latched)
+    return tuple(out)
+
+
+def asked_once(arm: Arm) -> Arm:
+    """The same word for several parts of one recording: a person is asked before the first only, and after a trip again."""
+    if not callable(arm):
+        return arm
+    answers: list[bool] = []
+
+    def ask(request: ArmingRequest) -> bool:
+        if not answers or request.unseen:
+            answers.append(arm(request))
+        return answers[-1]
+
+    return ask
+
+
+def _verdict(failed: tuple[str, ...]) -> str:
+    return f"failed: {', '.join(failed)}" if failed else "passed"
+
+
+def _age_h(at: str) -> float:
+    return (datetime.now(UTC) - datetime.fromisoformat(at)).total_seconds() / 3600.0

@@ -1,0 +1,135 @@
+"""What is remembered of a bench from run to run: its last check, and a trip after which a person has to look.
+
+One small JSON file a bench in the user's state folder (``$XDG_STATE_HOME/vibrolock/benches``), replaced whole. Nothing is kept
+of virtual rigs.
+"""
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rig.bench import Bench
+from rig.errors import RecordingError
+from rig.system.text_files import read_text
+from rig.system.whole_file import whole_file
+
+__all__ = [
+    "BenchMemory",
+    "RememberedCheck",
+    "RememberedTrip",
+    "fingerprint",
+    "memory_of",
+    "memory_path",
+    "now",
+    "remember",
+]
+
+LARGEST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class RememberedCheck:
+    """The last check of a bench."""
+
+    at: str
+    """When it ended, ISO 8601 with time zone."""
+    failed: tuple[str, ...]
+    """Names of the findings that failed; none where it passed."""
+    recording: str
+    """Path of its recording."""
+    fingerprint: str
+    """`fingerprint` of the bench as it was."""
+
+
+@dataclass(frozen=True)
+class RememberedTrip:
+    """A trip that nobody has looked at yet."""
+
+    at: str
+    """When, ISO 8601 with time zone."""
+    text: str
+    """What tripped."""
+    recording: str
+    """Path of the recording; empty where it is not a run that tripped, but a file that cannot be read."""
+
+
+@dataclass(frozen=True)
+class BenchMemory:
+    """All that is remembered of a bench."""
+
+    check: RememberedCheck | None = None
+    """Its last check."""
+    trip: RememberedTrip | None = None
+    """The trip that the next run needs a person for."""
+
+
+def memory_path(bench: Bench) -> Path:
+    """The file of a bench, by its name."""
+    base = os.environ.get("XDG_STATE_HOME", "")
+    folder = Path(base) if base and Path(base).is_absolute() else Path.home() / ".local" / "state"
+    readable = re.sub(r"[^A-Za-z0-9_.-]+", "-", bench.name).strip(".-")
+    if readable != bench.name:
+        readable += "-" + hashlib.sha256(bench.name.encode()).hexdigest()[:8]
+    return folder / "vibrolock" / "benches" / f"{readable}.json"
+
+
+def fingerprint(bench: Bench, identity: Mapping[str, str]) -> str:
+    """Of what a check depends on: channels, emergency stop, driver, rate, range, and which device it was.
+
+    ``identity`` is what the driver says of the device, of which ``serial_number`` counts, if it has one. The port may change,
+    the wiring may not.
+    """
+    kept = {"channels", "sample_rate_hz", "output_range_v", "emergency_stop"}
+    table = bench.model_dump(mode="json", include=kept)
+    device = {"driver": bench.driver.name, "serial_number": identity.get("serial_number", "")}
+    text = json.dumps({**table, **device}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def memory_of(bench: Bench) -> BenchMemory:
+    """What is remembered; a file that cannot be read counts as a trip, for it may have held one."""
+    path = memory_path(bench)
+    try:
+        if not path.exists():
+            return BenchMemory()
+        table = json.loads(read_text(path, LARGEST_BYTES, RecordingError))
+        check, trip = table["check"], table["trip"]
+        for found in (check, trip):
+            if found is not None:
+                _check_time(found["at"])
+        return BenchMemory(
+            None if check is None else RememberedCheck(**{**check, "failed": tuple(check["failed"])}),
+            None if trip is None else RememberedTrip(**trip),
+        )
+    except (OSError, ValueError, KeyError, TypeError, RecordingError, RecursionError) as error:
+        text = f"{path} cannot be read, it may have held a trip ({type(error).__name__}: {error})"
+        return BenchMemory(trip=RememberedTrip(now(), text, ""))
+
+
+def _check_time(at: str) -> None:
+    """Raise `ValueError` or `TypeError` for what is no moment, or one of an unknown time zone."""
+    if datetime.fromisoformat(at).tzinfo is None:
+        raise ValueError(f"at = {at!r}: has no time zone")
+
+
+def remember(bench: Bench, **changes: Any) -> None:
+    """Replace ``check`` or ``trip`` of what is remembered; `RecordingError` where it cannot be written."""
+    path = memory_path(bench)
+    memory = replace(memory_of(bench), **changes)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{path.parent}: cannot be made ({error.strerror})") from None
+    with whole_file(path) as part:
+        part.write_text(json.dumps(asdict(memory), indent=2), encoding="utf-8")
+
+
+def now() -> str:
+    """The present time, ISO 8601."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

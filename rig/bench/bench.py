@@ -1,0 +1,251 @@
+"""What a bench is: driver, rate, channels, limits and the facts known of the specimen; read from TOML."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from rig.bench.channels import Channel
+from rig.bench.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
+from rig.bench.cross_checks import refuse
+from rig.errors import ConfigurationError
+from rig.text.printable import shown
+
+__all__ = [
+    "Arming",
+    "Bench",
+    "DriverChoice",
+    "EmergencyStop",
+    "Limits",
+    "SpecimenFacts",
+    "load_bench",
+    "shipped_benches",
+]
+
+HIGHEST_PART = 0.45  # of the sample rate; a phase-locked loop keeps to a quarter of its own accord
+
+
+class DriverChoice(Configured):
+    """Which driver stands between the loop and the rig."""
+
+    name: str = Field(min_length=1)
+    """Name of the driver's entry point, for instance ``virtual``."""
+    options: dict[str, Any] = Field(default_factory=dict)
+    """What this driver wants to know; the driver checks it."""
+
+
+class Limits(Configured):
+    """What the bench may be asked for. A voltage is clamped to its limit; anything else beyond its limit trips."""
+
+    voltage_v: float = Field(gt=0, le=100)
+    """Largest output amplitude, V."""
+    force_n: float = Field(gt=0)
+    """Largest instantaneous force, N."""
+    acceleration_m_s2: float = Field(gt=0)
+    """Largest instantaneous acceleration of any drive or response channel, m/s^2."""
+    displacement_m: float = Field(gt=0)
+    """Largest displacement of any drive or response channel, m; by integrating its acceleration twice, without its mean."""
+    frequency_hz: tuple[float, float]
+    """Lowest and highest frequency of the oscillator, Hz."""
+    slew_v_per_s: float = Field(100.0, gt=0)
+    """Largest rate of change of the output amplitude, V/s."""
+    overload_fraction: float = Field(0.98, gt=0, le=1)
+    """Part of a channel's range from which on a reading counts as overload."""
+    overload_s: float = Field(0.002, ge=0, le=10)
+    """Time of uninterrupted overload that trips, s."""
+    stuck_s: float = Field(0.5, gt=0, le=3600)
+    """Time without any change of a reading, at a held level, that trips, s."""
+    lost_s: float = Field(0.05, gt=0, le=10)
+    """Time without any sample from the device, as samples lost on their way, that trips, s."""
+    ramp_down_s: float = Field(0.5, gt=0, le=60)
+    """Time of the ramp to 0 V that ends every run, s."""
+
+    @field_validator("frequency_hz")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not 0 < value[0] < value[1]:
+            raise ValueError(f"[{value[0]:g}, {value[1]:g}]: allowed is two positive frequencies, the lower one first")
+        return value
+
+
+class SpecimenFacts(Configured):
+    """What is known of the specimen before the test."""
+
+    name: str
+    """Name, for files and figures."""
+    linear_frequency_hz: float = Field(gt=0)
+    """Frequency of the mode under test at low level, Hz."""
+    drive_mode_shape: float | None = Field(None)
+    """Mass-normalised shape of this mode at the drive channel, kg^-1/2; from a modal test. Damping needs it."""
+
+    @field_validator("drive_mode_shape")
+    @classmethod
+    def _not_zero(cls, value: float | None) -> float | None:
+        if value == 0.0:
+            raise ValueError("0: a mode cannot be driven at its node, allowed is any other number")
+        return value
+
+
+class Arming(Configured):
+    """Who may arm a bench on which something physical moves."""
+
+    automated: bool = False
+    """Whether the bench arms itself: one that nobody stands beside, made for it."""
+    check_valid_h: float = Field(24.0, gt=0, le=8760)
+    """Age up to which a check counts, h."""
+    require_check: bool = True
+    """Whether an automated bench needs a check that passed, of the same channels and driver."""
+    hardware_emergency_stop: bool = False
+    """Whether there is an emergency stop that cuts the amplifier without the computer, and a person has tested it; wanted by
+    drivers that are not `rig.daq.Capabilities.safe_without_host`."""
+
+
+class EmergencyStop(Configured):
+    """A switch on an input channel that brings the output to 0 V at once."""
+
+    channel: str = Field(min_length=1)
+    """Name of a channel with role ``monitor``."""
+    above_v: float | None = Field(None, ge=-100, le=100)
+    """Pressed where the channel reads more than this, V."""
+    below_v: float | None = Field(None, ge=-100, le=100)
+    """Pressed where the channel reads less than this, V: a switch that opens, or a cable that breaks, stops too."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.above_v is None) == (self.below_v is None):
+            raise ValueError("above_v, below_v: allowed is exactly one of the two")
+        return self
+
+
+class Bench(Configured):
+    """A rig as a laboratory has it."""
+
+    name: str = Field(min_length=1)
+    """Name, used in plan names and files."""
+    description: str = ""
+    """What it is, and where its numbers come from."""
+    driver: DriverChoice
+    """The driver and its options."""
+    sample_rate_hz: float = Field(gt=0, le=1e6)
+    """Rate of the loop, Hz."""
+    block: int = Field(1, ge=1, le=65536)
+    """Samples swapped a call."""
+    output_range_v: float = Field(10.0, gt=0, le=100)
+    """Range of the output converter, V."""
+    channels: tuple[Channel, ...] = Field(min_length=2)
+    """The input channels, in the device's order."""
+    limits: Limits
+    """What the bench may be asked for."""
+    specimen: SpecimenFacts
+    """What is known of the specimen."""
+    arming: Arming = Field(default_factory=Arming)
+    """Who may arm it; a virtual rig arms itself."""
+    emergency_stop: EmergencyStop | None = None
+    """A switch that stops, where there is one."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        names = [channel.name for channel in self.channels]
+        for role in ("force", "drive"):
+            count = sum(channel.role == role for channel in self.channels)
+            if count != 1:
+                raise ValueError(f"channels: {count} with role {role!r}, allowed is exactly 1")
+        doubled = sorted({name for name in names if names.count(name) > 1})
+        if doubled:
+            raise ValueError(f"channels: the name {doubled[0]!r} is used twice")
+        if self.limits.voltage_v > self.output_range_v:
+            raise ValueError(
+                f"limits.voltage_v = {self.limits.voltage_v:g}: allowed is up to output_range_v = {self.output_range_v:g}"
+            )
+        if self.limits.frequency_hz[1] > HIGHEST_PART * self.sample_rate_hz:
+            raise ValueError(
+                f"limits.frequency_hz = {list(self.limits.frequency_hz)}: allowed is up to {HIGHEST_PART:g} of "
+                f"sample_rate_hz, {HIGHEST_PART * self.sample_rate_hz:g} Hz"
+            )
+        stop = self.emergency_stop
+        if stop is not None and stop.channel not in {
+            channel.name for channel in self.channels if channel.role == "monitor"
+        }:
+            raise ValueError(
+                f"emergency_stop.channel = {stop.channel!r}: allowed is the name of a channel with role 'monitor'"
+            )
+        for channel in self.channels:
+            limit = self.limits.force_n if channel.role == "force" else self.limits.acceleration_m_s2
+            if channel.role != "monitor" and limit > channel.range_in_unit:
+                raise ValueError(
+                    f"limits: {limit:g} {channel.unit} is beyond the range of channel {channel.name!r}, "
+                    f"allowed is up to {channel.range_in_unit:g} {channel.unit}"
+                )
+        return self
+
+    def index_of(self, role: str) -> int:
+        """Index of the first channel with a role."""
+        return next(index for index, channel in enumerate(self.channels) if channel.role == role)
+
+    @property
+    def response_ratios(self) -> dict[str, float]:
+        """How far a channel moves for one metre at the drive point, in the mode under test, where its shapes are known.
+
+        By name; the drive channel itself has 1.
+        """
+        drive, own = self.specimen.drive_mode_shape, self.channels[self.index_of("drive")].name
+        shapes = {channel.name: channel.mode_shape for channel in self.channels if channel.mode_shape is not None}
+        ratios = {} if drive is None else {name: abs(shape / drive) for name, shape in shapes.items()}
+        return {own: 1.0, **ratios}
+
+
+def _folder() -> Path:
+    return Path(str(resources.files("rig.bench"))) / "shipped"
+
+
+def shipped_benches() -> list[str]:
+    """Names of the benches that come with the product."""
+    return shipped_names(_folder())
+
+
+def load_bench(name_or_path: str | Path) -> Bench:
+    """A shipped bench by its name, or a bench from a TOML file.
+
+    ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file beside it; what else
+    stands there changes it key by key. Another ``driver.name`` than the base's begins with no ``driver.options``.
+
+    Raises `ConfigurationError` for what is no bench, and for one that must not run as it is (`rig.bench.cross_checks`).
+    """
+    bench = validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
+    try:
+        refuse(bench)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{name_or_path}: {error}") from None
+    return bench
+
+
+def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, Any]:
+    """The table of a bench on top of those it starts from; ``over`` are the files that start from this one."""
+    path = find_toml(name_or_path, _folder(), "bench")
+    table = read_toml(path)
+    base = table.pop("base", None)
+    if base is None:
+        return table
+    if isinstance(base, str) and base.endswith(".toml"):
+        if path.resolve() in over:
+            raise ConfigurationError(f"{name_or_path}: base = {base!r}: the files start from each other")
+        return _changed(_with_base(path.parent / base, (*over, path.resolve())), table)
+    if base not in shipped_benches():
+        allowed = ", ".join(shipped_benches())
+        raise ConfigurationError(
+            f"{name_or_path}: base = {shown(base)}: allowed is {allowed}, or a .toml file beside this one"
+        )
+    return _changed(_with_base(base, over), table)
+
+
+def _changed(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+    """The base with what stands in ``table``; options of a driver that gives way to another go with it."""
+    driver, other = base.get("driver"), table.get("driver")
+    if (
+        isinstance(driver, dict)
+        and isinstance(other, dict)
+        and other.get("name", driver.get("name")) != driver.get("name")
+    ):
+        base = {**base, "driver": {}}
+    return merged(base, table)

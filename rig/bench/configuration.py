@@ -1,0 +1,156 @@
+"""Benches and plans from TOML files: read, validated, and refused in one clear line."""
+
+import json
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from rig.bench.vetting import objection_to
+from rig.errors import ConfigurationError
+from rig.system.text_files import read_text
+from rig.text.printable import shown
+
+__all__ = ["Configured", "explain", "find_toml", "merged", "read_toml", "shipped_names", "validated"]
+
+LARGEST_TOML_BYTES = 1_000_000
+MOST_DOTS = 100  # between two commas of a line: keys with many parts take the parser a time that goes with their square
+MOST_FAULTS = 5  # that one line names
+FEW_NAMES = 10  # that one line lists
+
+
+class Configured(BaseModel):
+    """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """``base`` with ``changes``: tables key by key, anything else replaced whole."""
+    out = dict(base)
+    for key, value in changes.items():
+        old = base.get(key)
+        out[key] = merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return out
+
+
+def shipped_names(folder: Path) -> list[str]:
+    """Names of the TOML files below a folder, without their ending."""
+    return sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.toml"))
+
+
+def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:
+    """The path of a shipped file of ``folder`` by its name, or the path itself where it ends on .toml."""
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        return path
+    names = shipped_names(folder)
+    if str(name_or_path) not in names:
+        allowed = ", ".join(names)
+        if len(names) > FEW_NAMES:
+            nearest = get_close_matches(str(name_or_path)[:100], names, n=3, cutoff=0.0)
+            allowed = f"one of those that `rig list` shows, such as {', '.join(nearest)},"
+        raise ConfigurationError(
+            f"{what} = {shown(str(name_or_path))}: there is no such {what}; allowed is {allowed} or a .toml file"
+        )
+    return folder / f"{name_or_path}.toml"
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table in a TOML file of up to 1 MB.
+
+    Raises `ConfigurationError`, which names the file and the line or key, where it cannot be read or holds what no table may
+    hold (`rig.bench.vetting`).
+    """
+    text = read_text(path, LARGEST_TOML_BYTES)
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > MOST_DOTS and any(part.count(".") > MOST_DOTS for part in line.split(",")):
+            raise ConfigurationError(f"{path}: line {number}: a key has more than {MOST_DOTS} parts, allowed are fewer")
+    try:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise ConfigurationError(f"{path}: is nested too deeply for a TOML file of ours") from None
+    except ValueError as error:  # also a number of more digits than Python reads
+        raise ConfigurationError(f"{path}: is not TOML: {error}") from None
+    _refuse_absurd(table, str(path))
+    return table
+
+
+def _refuse_absurd(table: Any, source: str) -> None:
+    if (fault := objection_to(table)) is not None:
+        raise ConfigurationError(f"{source}: {fault}")
+
+
+def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
+    """A model from a table; every bad value is named with its path, itself and what is allowed."""
+    _refuse_absurd(table, source)
+    try:
+        if model.model_config.get("strict"):
+            return model.model_validate(table)
+        # By way of JSON, whose strict mode takes a list for a tuple and 1 for 1.0, but no text or truth for a number.
+        return model.model_validate_json(json.dumps(table, default=str), strict=True)
+    except ValidationError as error:
+        raise ConfigurationError(f"{source}: {explain(error, model)}") from None
+    except (ArithmeticError, MemoryError) as error:
+        why = f"{type(error).__name__}: {error}"
+        raise ConfigurationError(
+            f"{source}: cannot be computed with, a number is far too large or small ({why})"
+        ) from None
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """The faults of a validation error in one line, a few of them where there are many."""
+    count = error.error_count()
+    details = [dict(detail) for detail in error.errors(include_url=False)[: 4 * MOST_FAULTS]]
+    keys = _keys(model)
+    faults = [_fault(detail, keys) for detail in details if not _follows(detail, details)][:MOST_FAULTS]
+    more = [f"and {count - len(faults)} more"] if count > len(details) or len(faults) == MOST_FAULTS < count else []
+    return "; ".join(faults + more)
+
+
+def _follows(detail: dict[str, Any], details: list[dict[str, Any]]) -> bool:
+    """Whether a list is too short only because its items are at fault."""
+    inside = (other for other in details if other["loc"][: len(detail["loc"])] == detail["loc"] and other is not detail)
+    return detail["type"] == "too_short" and any(inside)
+
+
+def _fault(detail: dict[str, Any], keys: set[str]) -> str:
+    path = ""
+    for part in detail["loc"]:
+        if isinstance(part, int):
+            path += f"[{part}]"
+        elif part in keys or (part == detail["loc"][-1] and detail["type"] != "value_error"):
+            # Else it is the kind of a part, which stands in no path.
+            path += f".{part}" if path else str(part)
+    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if detail["type"] == "extra_forbidden":
+        close = get_close_matches(str(detail["loc"][-1])[:100], sorted(keys), n=1)
+        return f"{path}: unknown key" + (f", did you mean {close[0]}?" if close else "")
+    if detail["type"] == "missing":
+        return f"{path}: is missing"
+    if detail["type"] == "value_error":
+        return f"{path}: {message}" if path else message
+    if detail["type"].startswith("union_tag"):
+        of, allowed = (
+            detail["ctx"]["discriminator"].strip("'"),
+            detail["ctx"].get("expected_tags", "one of those listed"),
+        )
+        tag = detail["ctx"].get("tag")
+        return f"{path}.{of} = {shown(tag)}: allowed is {allowed}" if tag is not None else f"{path}.{of}: is missing"
+    if detail["type"] in ("too_short", "too_long"):
+        bound, count = ("least", "min_length") if detail["type"] == "too_short" else ("most", "max_length")
+        message = f"at {bound} {detail['ctx'][count]} of them"
+    return f"{path} = {shown(detail['input'])}: allowed is {message}".replace("a valid tuple", "a list")
+
+
+def _keys(model: Any) -> set[str]:
+    """All keys that a model and the models inside it know."""
+    if isinstance(model, type) and issubclass(model, BaseModel):
+        fields = model.model_fields
+        return set(fields).union(*(_keys(field.annotation) for field in fields.values()))
+    return set().union(*(_keys(inner) for inner in get_args(model)))

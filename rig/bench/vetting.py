@@ -1,0 +1,82 @@
+"""What no table of a user's may hold, whatever it describes: refused before a model reads it.
+
+So no model has to fear a number whose square overflows, a text that moves the cursor, or a table without a bottom.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+from unicodedata import category
+
+from rig.text.printable import shown
+
+__all__ = ["DEEPEST", "LARGEST", "SMALLEST", "objection_to"]
+
+DEEPEST = 16
+"""Tables and lists within each other."""
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes of a number other than 0, in any SI unit: no quantity of a vibration test lies outside, a slip of the keyboard does."""
+LARGEST_INTEGER = 2**63 - 1
+LONGEST_KEY = 200
+LONGEST_TEXT = 10_000
+
+
+def objection_to(table: Any) -> str | None:
+    """What is wrong with the first value that is not allowed, with its path; None for a table as it should be."""
+    for path, depth, value in _values(table):
+        fault = _fault(value) if depth <= DEEPEST else f"is nested too deeply: allowed are up to {DEEPEST} levels"
+        if fault is not None:
+            return f"{path} {fault}".strip()
+    return None
+
+
+def _values(table: Any) -> Iterator[tuple[str, int, Any]]:
+    """Path, depth and value of everything in a table, without recursion; nothing below what is too deep."""
+    left: list[tuple[str, int, Any]] = [("", 0, table)]
+    while left:
+        path, depth, value = left.pop()
+        yield path, depth, value
+        if depth > DEEPEST:
+            continue
+        if isinstance(value, dict):
+            items = [(f"{path}.{key}" if path else str(key), depth + 1, item) for key, item in value.items()]
+        elif isinstance(value, list | tuple):
+            items = [(f"{path}[{index}]", depth + 1, item) for index, item in enumerate(value)]
+        else:
+            continue
+        left += reversed(items)
+
+
+def _fault(value: Any) -> str | None:
+    """What is wrong with one value."""
+    if isinstance(value, dict):
+        wrong = next((key for key in value if not isinstance(key, str) or not _is_a_key(key)), None)
+        what = f"a printable name of up to {LONGEST_KEY} characters"
+        return None if wrong is None else f"holds the key {shown(wrong)}: allowed is {what}"
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        return f"= a number of {value.bit_length()} bits: allowed is up to {LARGEST_INTEGER}"
+    if isinstance(value, float) and not (value == 0.0 or SMALLEST <= abs(value) <= LARGEST):
+        if value != value or abs(value) == float("inf"):
+            return f"= {value!r}: allowed is a finite number"
+        return f"= {value!r}: allowed is 0, or a size from {SMALLEST:g} to {LARGEST:g}"
+    if isinstance(value, str):
+        return _fault_of_text(value)
+    return None
+
+
+def _is_a_key(key: str) -> bool:
+    return len(key) <= LONGEST_KEY and not _moves_the_cursor(key)
+
+
+def _fault_of_text(text: str) -> str | None:
+    if len(text) > LONGEST_TEXT:
+        return f"= {shown(text)}: allowed are up to {LONGEST_TEXT} characters"
+    if not text.isprintable() and _moves_the_cursor("".join(text.split())):
+        return f"= {shown(text)}: holds a control character, allowed is printable text"
+    return None
+
+
+def _moves_the_cursor(text: str) -> bool:
+    """Whether a text holds control characters, or half of a character."""
+    return any(category(one) in ("Cc", "Cs") for one in text)

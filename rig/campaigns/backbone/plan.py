@@ -1,0 +1,128 @@
+"""The backbone campaign: step through levels at phase resonance, settle, record whole periods at each."""
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from rig.bench import Bench
+from rig.campaigns.planning.drift import with_first_repeated
+from rig.campaigns.planning.locked import SettledPlan
+from rig.campaigns.planning.plan import Target
+from rig.tick.sequencer.layout import OnFailure, SegmentKind
+from rig.tick.sequencer.segments import Segment
+
+__all__ = ["BackbonePlan"]
+
+
+class BackbonePlan(SettledPlan):
+    """Phase-resonant vibrations at a series of levels.
+
+    The levels are amplitudes of the output voltage (``levels_v``, the paper's way), or of force or response, held by the
+    controller's loops. Every point is approached by a half-cosine ramp, settled by the
+    rule in ``settle``, and recorded over whole periods.
+    """
+
+    kind: Literal["backbone"] = "backbone"
+    """Kind of campaign."""
+    direction: Literal["up", "down", "up-down"] = "up"
+    """Order of the levels."""
+    repeat_first: bool = False
+    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
+    ramp_periods: float = Field(20.0, ge=1, le=1e5)
+    """Length of the ramp between two levels, periods."""
+    record_periods: int = Field(50, ge=4, le=1_000_000)
+    """Periods that are recorded and evaluated at each level."""
+    evaluation: Literal["settled", "slow-flow"] = "settled"
+    """Whether a point is settled and then recorded, or taken from the ramp to it and what follows, by the slow flow: nothing is
+    waited for."""
+    accepted_frequency_std: float = Field(1e-3, gt=0, le=1)
+    """Largest standard error of the modal frequency, relative, with which a point of the slow flow is accepted."""
+    accepted_damping_std: float = Field(0.1, gt=0, le=1)
+    """Largest standard error of the damping, relative, with which a point of the slow flow is accepted."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels, ways and repeats."""
+        return {**super().counts, "direction": 2 if self.direction == "up-down" else 1}
+
+    @property
+    def evaluates_approach(self) -> bool:
+        """Whether the ramp is evaluated with the rest: by the slow flow."""
+        return self.evaluation == "slow-flow"
+
+    def targets(self) -> tuple[Target, ...]:
+        """All points in the order of measurement."""
+        rising = sorted(self.levels)
+        falling = rising[::-1]
+        passes: dict[str, list[tuple[float, Literal["up", "down"]]]] = {
+            "up": [(level, "up") for level in rising],
+            "down": [(level, "down") for level in falling],
+            "up-down": [(level, "up") for level in rising] + [(level, "down") for level in falling[1:]],
+        }
+        targets = tuple(
+            Target(number=number, level=level, direction=direction, repeat=repeat)
+            for number, (repeat, level, direction) in enumerate(
+                (repeat, level, direction)
+                for repeat in range(1, self.repeats + 1)
+                for level, direction in passes[self.direction]
+            )
+        )
+        return with_first_repeated(targets) if self.repeat_first else targets
+
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+        """The segments that measure all points but those ``done`` already.
+
+        A point whose predecessor is done is approached from its predecessor's level, so that it is reached from the
+        recorded direction.
+        """
+        failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
+        targets = self.targets()
+        out = self.start_segments()
+        at: float | None = None
+        for target in targets:
+            if target.number in done:
+                continue
+            before = self._approach(targets, target)
+            if before is not None and before != at:
+                out.append(Segment(SegmentKind.RAMP, -1, before, self.ramp_periods))
+                out.append(Segment(SegmentKind.HOLD, -1, before, self._hold_periods))
+            number, level = target.number, target.level
+            at, first = level, at is None and before is None
+            if self.evaluation == "slow-flow":
+                out += self._short_point(target, failure, first)
+                continue
+            out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods))
+            out.append(Segment(SegmentKind.SETTLE, number, level, self.settle.longest_periods, failure, lost))
+            out.append(Segment(SegmentKind.RECORD, number, level, self.record_periods + 1.0, failure, lost))
+        return tuple(out)
+
+    def check(self, bench: Bench) -> None:
+        """Refuse, before anything moves, what the bench or the known plant cannot do."""
+        super().check(bench)
+        if self.evaluation == "slow-flow":
+            self._check_slow_flow(bench)
+
+    def _short_point(self, target: Target, failure: OnFailure, first: bool) -> list[Segment]:
+        """The ramp to a point and the time at it, both evaluated; before the first the lock is gained at its level."""
+        number, level = target.number, target.level
+        geometric = self.levels_key != "levels_v"
+        ramp = Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, geometric=geometric)
+        waits = SegmentKind.START if self.levels_key == "levels_v" else SegmentKind.HOLD  # others have had their start
+        out = [replace(ramp, point=-1), replace(ramp, kind=waits, point=-1, periods=self._hold_periods)]
+        # A ramp from a level to itself: judged by what it shows, not by the settle rule.
+        held = replace(ramp, kind=SegmentKind.LEVEL_SWEEP, periods=self.record_periods)
+        return [*(out if first else ()), ramp, held]
+
+    @property
+    def _hold_periods(self) -> float:
+        return float(2 * self.settle.average_periods + self.settle.settled_periods)
+
+    @staticmethod
+    def _approach(targets: tuple[Target, ...], target: Target) -> float | None:
+        """Level to come from: the one before, where that lies on the same way; None to come from rest."""
+        if target.number == 0:
+            return None
+        before = targets[target.number - 1]
+        rises = target.level > before.level
+        return before.level if rises == (target.direction == "up") else None

@@ -1,0 +1,159 @@
+"""From the recorded rows of a backbone's point to its result, and from the results to a backbone in memory."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from identification import (
+    Backbone,
+    IdentificationError,
+    ShortPoint,
+    SlowFlow,
+    nonlinear_mode,
+    short_point,
+)
+from rig.bench import Bench
+from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.evaluation.alien_force import alien_force
+from rig.campaigns.evaluation.objections import alien_objection, first_of, phase_objection, std_objection
+from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record, of_a_vibration
+from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
+from rig.campaigns.evaluation.settled_quality import settled_objection, settled_quality
+from rig.campaigns.evaluation.vibrations import (
+    channels_from,
+    head,
+    not_evaluated,
+    recorded_vibration,
+    vibration_from,
+    within_periods,
+)
+from rig.campaigns.planning.drift import of_the_result
+from rig.campaigns.planning.plan import Column, Target
+
+__all__ = ["BACKBONE_COLUMNS", "backbone_of", "measure_backbone_point"]
+
+NEAR = 0.1  # in the logarithm of the amplitude, of what a point of the slow flow is made
+
+BACKBONE_COLUMNS = (
+    Column("force_n", "force", "N", ".4f", plain=True),
+    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
+    Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
+    Column("phase_error_deg", "phase error", "deg", ".2f"),
+    *PURITY_COLUMNS,
+)
+
+
+def measure_backbone_point(
+    bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray, settling: np.void
+) -> dict[str, Any]:
+    """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment.
+
+    A point whose recorded fundamental is too far from the wanted phase is kept, marked as not accepted. By the slow flow the
+    rows begin with the ramp to the point.
+    """
+    if plan.evaluation == "slow-flow":
+        return _short_point(bench, plan, target, rows)
+    rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
+    try:
+        vibration = recorded_vibration(
+            bench, rows, plan.harmonics, phase_lag_target_deg=plan.controller.phase_lag_deg + 180.0
+        )
+        mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
+    except (IdentificationError, ArithmeticError) as error:
+        return not_evaluated(plan, target, error, settled=True)
+    found = settled_quality(vibration, bench, rows)
+    reason = settled_objection(plan, bench, vibration, found)
+    damping = float(mode.damping_ratio[0])
+    return {
+        **head(plan, target),
+        "settled": True,
+        "accepted": not reason,
+        "reason": reason,
+        "force_n": vibration.force_n,
+        "frequency_hz": vibration.frequency_hz,
+        "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
+        "damping_ratio": damping if math.isfinite(damping) else None,
+        "amplitude_m": vibration.amplitude_m,
+        **found,
+        **of_a_record(bench, vibration, rows, settling),
+    }
+
+
+def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> dict[str, Any]:
+    """A point from the ramp to it and what follows, settled or not."""
+    try:
+        flow = recorded_flow(bench, rows, plan.harmonics)
+        found = short_point(flow, start_s=_arrival_s(flow))
+        vibration = found.vibration
+    except (IdentificationError, ArithmeticError) as error:
+        return not_evaluated(plan, target, error, settled=False)
+    error_deg = (plan.controller.phase_lag_deg + 180.0 - found.phase_lag_deg + 180.0) % 360.0 - 180.0
+    alien = alien_force(bench, [rows])
+    reason = _short_objection(plan, found, error_deg, alien)
+    reason = reason or next((why for why, at in flagged(bench, rows, flow).items() if at.any()), "")
+    turned = np.unwrap(rows["theta_rad"].astype(float))
+    grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz
+    return {
+        **head(plan, target),
+        "settled": abs(error_deg) <= plan.settle.phase_deg and abs(grown) <= plan.settle.amplitude,
+        "accepted": not reason,
+        "reason": reason,
+        "force_n": vibration.force_n,
+        "frequency_hz": vibration.frequency_hz,
+        "modal_frequency_hz": found.modal_frequency_hz,
+        "modal_frequency_std_hz": found.modal_frequency_std_hz,
+        "damping_ratio": found.damping_ratio,
+        "damping_ratio_std": found.damping_ratio_std,
+        "amplitude_m": vibration.amplitude_m,
+        "phase_error_deg": error_deg,
+        "growth_1_s": found.growth_1_s,
+        "measured_force_n": found.force_n,
+        "alien_force": alien,
+        "periods_in_all": float(turned[-1] - turned[0]) / (2.0 * math.pi),
+        **of_a_vibration(bench, vibration, rows, held=False),
+    }
+
+
+def _arrival_s(flow: SlowFlow) -> float:
+    """When the amplitude came near to where it ended, for good."""
+    away = np.abs(np.log(flow.amplitude_m / flow.amplitude_m[-1])) > NEAR
+    last = int(np.flatnonzero(away)[-1]) + 1 if away.any() else 0
+    return float(flow.time_s[min(last, flow.time_s.size - 1)])
+
+
+def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, alien: float) -> str:
+    """Why a point of the slow flow is not accepted; empty where it is."""
+    frequency = found.modal_frequency_std_hz / found.modal_frequency_hz
+    damping = found.damping_ratio_std / abs(found.damping_ratio)
+    return first_of(
+        (
+            phase_objection(error_deg, plan.accepted_phase_error_deg),
+            std_objection(frequency, plan.accepted_frequency_std, damping, plan.accepted_damping_std),
+            alien_objection(alien, plan.accepted_alien_force),
+        )
+    )
+
+
+def backbone_of(
+    points: Iterable[Mapping[str, Any]],
+    channels: Sequence[Mapping[str, Any]],
+    specimen: str,
+    drive_mode_shape: float | None,
+    phase_lag_target_deg: float,
+) -> Backbone:
+    """The accepted points of a recording as measurements; raises `IdentificationError` where there is none."""
+    accepted = [point for point in of_the_result(points) if point["accepted"]]
+    if not accepted:
+        raise IdentificationError("points: none of the recording was accepted")
+    kinds = channels_from(channels)
+    vibrations = tuple(vibration_from(point, kinds, phase_lag_target_deg) for point in accepted)
+    return Backbone(
+        vibrations,
+        specimen,
+        drive_mode_shape,
+        tuple(point["direction"] for point in accepted),
+        tuple(point["repeat"] for point in accepted),
+    )

@@ -1,0 +1,51 @@
+"""The slow flow of recorded rows, and which of its instants are of use."""
+
+import numpy as np
+
+from identification import SlowFlow, slow_flow
+from rig.bench import Bench
+from rig.campaigns.evaluation.gaps import bridged
+from rig.campaigns.evaluation.vibrations import channels_of
+from rig.campaigns.planning.plant import PlantFacts
+from rig.tick.layout import FREQUENCY_CLAMPED, SAMPLE_LOST, SATURATED, SENSOR_AT_RANGE
+
+__all__ = ["AT_VOLTAGE_LIMIT", "flagged", "recorded_flow"]
+
+AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
+
+HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far an instant looks to either side
+
+
+def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFacts | None = None) -> SlowFlow:
+    """The slow flow of recorded rows, the channels' skew taken out, and with a known plant the share of its other modes.
+
+    Raises `identification.IdentificationError` where there is none to be seen.
+    """
+    return slow_flow(
+        rows["theta_rad"].astype(float),
+        bridged(rows).T,
+        channels_of(bench),
+        sample_rate_hz=bench.sample_rate_hz,
+        drive_mode_shape=bench.specimen.drive_mode_shape or 0.0,
+        harmonics=harmonics,
+        skew_samples=[channel.skew_samples for channel in bench.channels],
+        residual_m_n=0.0 if plant is None else plant.residual_m_n,
+    )
+
+
+def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndarray]:
+    """By reason, bool[n]: instants within whose window output, frequency or a sensor stood at a limit, or samples were lost."""
+    half = HALF_WINDOW_PERIODS / flow.frequency_hz
+    first, end = (
+        np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size) for side in (-1, 1)
+    )
+    out = {}
+    for reason, bit in (
+        (AT_VOLTAGE_LIMIT, SATURATED),
+        ("the frequency stood at an end of its window", FREQUENCY_CLAMPED),
+        ("a sensor was near its range", SENSOR_AT_RANGE),
+        ("samples were lost on their way", SAMPLE_LOST),
+    ):
+        count = np.concatenate([[0], np.cumsum((rows["flags"] & bit) != 0)])
+        out[reason] = count[end.astype(int)] > count[first.astype(int)]
+    return out

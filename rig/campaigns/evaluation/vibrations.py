@@ -1,0 +1,203 @@
+"""What the evaluation of all campaigns shares: head of a point, mark of a failed one, periodic vibrations, quality."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from identification import Channel, PeriodicVibration, periodic_vibration
+from rig.bench import Bench
+from rig.campaigns.evaluation.gaps import lost_rows
+from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
+from rig.tick.safety.layout import POLARITY_HINT
+from rig.tick.sequencer.layout import Outcome
+
+__all__ = [
+    "VOLTAGE",
+    "as_complex",
+    "as_pairs",
+    "channels_from",
+    "channels_of",
+    "failed_point",
+    "frequency_scatter",
+    "head",
+    "not_evaluated",
+    "quantisation_warnings",
+    "recorded_vibration",
+    "skew_turn",
+    "vibration_from",
+    "within_periods",
+]
+
+VOLTAGE = Channel("voltage", "monitor", "V")
+"""The output on the converter, as a channel beside the inputs."""
+
+WHY = {
+    Outcome.NOT_SETTLED: "not settled within {longest:g} periods",
+    Outcome.DISTURBED: "the settle rule was broken while recording",
+    Outcome.LOST_LOCK: "phase lock lost",
+    Outcome.UNREACHABLE: "out of reach: the output stood at its voltage limit",
+    Outcome.OUTSIDE_WINDOW: "the frequency stood at an end of its window: another mode, or a resonance outside",
+    Outcome.NOT_LOCKED: "the phase error stayed that of a lost lock",
+    Outcome.INTERRUPTED: "interrupted",
+}
+
+POLARITY_DEG = 60.0  # a phase error that large is no matter of patience
+FEW_BITS = 20.0  # below, quantisation may move the damping by a percent, without noise to dither it
+
+
+def head(plan: Plan, target: Target) -> dict[str, Any]:
+    """What every point begins with: where it is in the plan."""
+    point: dict[str, Any] = {
+        "number": target.number,
+        "level": target.level,
+        "level_unit": plan.level_unit,
+        "direction": target.direction,
+        "repeat": target.repeat,
+    }
+    if target.frequency_hz is not None:
+        point["asked_frequency_hz"] = target.frequency_hz
+    if target.phase_lag_deg is not None:
+        point["asked_phase_lag_deg"] = target.phase_lag_deg
+    if target.realisation is not None:
+        point["realisation"] = target.realisation
+    if target.repeats_first:
+        point["repeats_first"] = True
+    return point
+
+
+def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> dict[str, Any]:
+    """The mark of a point whose rows tell of no vibration."""
+    return {**head(plan, target), "settled": settled, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+
+
+def failed_point(
+    plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False, locked: bool = False
+) -> dict[str, Any]:
+    """The mark of a point that was not measured, with the reason; it holds no data.
+
+    ``at_start``: for want of a lock there. ``locked``: a lock had been gained before, so no polarity is wrong.
+    """
+    code = Outcome(int(outcome["outcome"]))
+    error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
+    why = WHY.get(code, code.name.lower()).format(longest=plan.settle_rule.longest_periods)
+    if at_start:
+        why = f"no lock at the start voltage: {why}"
+    if target.frequency_hz is not None:
+        why = f"at {target.frequency_hz:.6g} Hz: {why}"
+    if not math.isfinite(error) and code in (Outcome.NOT_SETTLED, Outcome.DISTURBED):
+        why += ": force or drive signal is too small for its phase to be read"
+    if math.isfinite(error) and code is not Outcome.INTERRUPTED:
+        phase = "" if isinstance(plan, OpenLoopPlan) else f"averaged phase error {error:.2f} deg, "
+        why += f" ({phase}amplitude drift {100.0 * drift:.2g} %)"
+    if not locked and (code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG):
+        why += f"; {POLARITY_HINT}"
+    return {
+        **head(plan, target),
+        "settled": False,
+        "accepted": False,
+        "quality": code.name.lower().replace("_", "-"),
+        "reason": why,
+        "settle_periods": float(outcome["periods"]),
+    }
+
+
+def recorded_vibration(
+    bench: Bench, rows: np.ndarray, harmonics: int, phase_lag_target_deg: float = 90.0
+) -> PeriodicVibration:
+    """The periodic vibration in recorded rows, the channels' skew taken out.
+
+    Lost rows take no part. Raises `identification.IdentificationError` where there is none to be seen.
+    """
+    vibration = periodic_vibration(
+        rows["theta_rad"].astype(float),
+        rows["inputs"].astype(float).T,
+        channels_of(bench),
+        sample_rate_hz=bench.sample_rate_hz,
+        harmonics=harmonics,
+        lost=lost_rows(rows),
+        resolution=[channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels],
+        phase_lag_target_deg=phase_lag_target_deg,
+    )
+    return _without_skew(vibration, bench)
+
+
+def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:
+    """A recording's table of channels as measurements know them."""
+    return tuple(Channel(row["name"], row["role"], row["unit"]) for row in rows)
+
+
+def vibration_from(
+    point: Mapping[str, Any], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
+) -> PeriodicVibration:
+    """The vibration that a recorded point holds."""
+    return PeriodicVibration(
+        channels,
+        point["frequency_hz"],
+        as_complex(point["harmonics"]),
+        point["periods"],
+        np.asarray(point["residual_rms"], float),
+        None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
+        None if point.get("drift") is None else as_complex(point["drift"]),
+        phase_lag_target_deg=phase_lag_target_deg,
+        warnings=tuple(point["warnings"]),
+    )
+
+
+def within_periods(theta_rad: np.ndarray, periods: int) -> slice:
+    """The rows of the first so many periods, and one sample more."""
+    turned = np.unwrap(theta_rad.astype(float))
+    return slice(0, int(np.searchsorted(turned - turned[0], 2.0 * math.pi * periods)) + 1)
+
+
+def frequency_scatter(theta_rad: np.ndarray) -> float:
+    """Standard deviation of the frequency of single periods, relative to its mean."""
+    turned = np.unwrap(theta_rad.astype(float))
+    turns = (turned - turned[0]) / (2.0 * math.pi)
+    ends = np.interp(np.arange(int(turns[-1]) + 1), turns, np.arange(turns.size))
+    lengths = np.diff(ends)
+    return float(lengths.std() / lengths.mean()) if lengths.size > 1 else 0.0
+
+
+def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[str]:
+    """A remark for each of force and drive whose fundamental is only some bits of its converter high."""
+    out = []
+    for channel, harmonics in zip(bench.channels, vibration.harmonics, strict=True):
+        bits = abs(harmonics[1] * channel.sensitivity_v_per_unit) / channel.resolution_v
+        if channel.role in ("force", "drive") and bits < FEW_BITS:
+            out.append(
+                f"channel {channel.name}: an amplitude of {bits:.1f} bits; quantisation is not in the error bounds"
+            )
+    return out
+
+
+def _without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
+    """The vibration with every channel's harmonics turned forward by its skew: ``Y_h exp(i h Omega tau)``."""
+    orders = np.arange(vibration.harmonics.shape[1])
+    return replace(vibration, harmonics=vibration.harmonics * skew_turn(bench, vibration.frequency_hz * orders))
+
+
+def skew_turn(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:
+    """Factors complex[n_channels, n] ``exp(2 pi i f tau)`` that take each channel's skew tau out of amplitudes at f."""
+    delay_s = np.array([channel.skew_samples for channel in bench.channels]) / bench.sample_rate_hz
+    return np.asarray(np.exp(2j * math.pi * np.outer(delay_s, frequency_hz)))
+
+
+def channels_of(bench: Bench) -> tuple[Channel, ...]:
+    """The bench's channels as measurements know them."""
+    return tuple(
+        Channel(c.name, cast(Literal["force", "drive", "response", "monitor"], c.role), c.unit) for c in bench.channels
+    )
+
+
+def as_pairs(values: np.ndarray) -> Any:
+    """Complex numbers as [real, imaginary]."""
+    return np.stack([values.real, values.imag], axis=-1).tolist()
+
+
+def as_complex(pairs: Any) -> np.ndarray:
+    """The inverse of `as_pairs`."""
+    array = np.asarray(pairs, float)
+    return np.asarray(array[..., 0] + 1j * array[..., 1])

@@ -1,0 +1,145 @@
+"""The multisine campaign in open loop: periodic random-phase signals, realisation by realisation, in whole periods."""
+
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from identification import IdentificationError, MultisineDesign
+from rig.bench import Bench
+from rig.campaigns.planning.plan import OpenLoopPlan, Target
+from rig.errors import ConfigurationError
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Excitation, Segment
+
+__all__ = ["MultisinePlan"]
+
+LARGEST_WAVEFORMS = 100_000_000  # samples of all realisations, that are held in memory
+
+
+class MultisinePlan(OpenLoopPlan):
+    """Multisines at given RMS voltages, several realisations of random phases at each.
+
+    Every realisation begins from rest, is played for ``transient_periods`` that are thrown away, and recorded for ``periods``.
+    """
+
+    kind: Literal["multisine"] = "multisine"
+    """Kind of campaign."""
+    levels_rms_v: tuple[float, ...] = Field(min_length=1)
+    """RMS of the output voltage, V; every level is gone through in turn."""
+    lowest_hz: float = Field(gt=0)
+    """Lowest excited frequency, Hz."""
+    highest_hz: float = Field(gt=0)
+    """Highest excited frequency, Hz."""
+    resolution_hz: float = Field(gt=0)
+    """Distance of neighbouring lines, Hz; a period lasts its inverse and must be a whole number of samples."""
+    grid: Literal["full", "odd", "odd-random"] = "full"
+    """Which lines of the band are excited: all, the odd multiples of the resolution, or these but for a random few, on which
+    odd distortion is heard. Even distortion is heard on even lines that are not excited."""
+    detection_group: int = Field(4, ge=2, le=1000)
+    """Odd lines of a group, of which ``odd-random`` leaves out one, chosen by ``phase_seed``."""
+    realisations: int = Field(5, ge=1, le=1000)
+    """Number of realisations at each level."""
+    periods: int = Field(4, ge=1, le=100_000)
+    """Periods that are recorded of each."""
+    transient_periods: int = Field(2, ge=0, le=10_000)
+    """Periods that are played before."""
+    phase_seed: int = Field(0, ge=0)
+    """Seed of the phases; realisation k of a seed is always the same signal, at every level."""
+    silent_s: float = Field(0.0, ge=0, le=3600)
+    """Time at 0 V that is recorded before the first realisation, for the noise, s."""
+    ramp_s: float = Field(0.5, gt=0, le=60)
+    """Length of the ramps to the level and down from it, s."""
+    accepted_change: float = Field(0.05, gt=0, le=1)
+    """Largest difference of force or drive between the first recorded period and the mean of the others, RMS in the band,
+    relative, with which a realisation is accepted: a transient or a disturbance."""
+
+    @model_validator(mode="after")
+    def _each_level_once(self) -> Self:
+        before: set[float] = set()
+        for index, level in enumerate(self.levels_rms_v):
+            if level in before:
+                raise ValueError(f"levels_rms_v[{index}] = {level:g}: allowed is each level once; see realisations")
+            before.add(level)
+        return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels and realisations."""
+        return {"levels_rms_v": len(self.levels_rms_v), "realisations": self.realisations}
+
+    def design(self, sample_rate_hz: float) -> MultisineDesign:
+        """The multisine of unit RMS; `ConfigurationError` where it cannot be."""
+        try:
+            return MultisineDesign.with_resolution(
+                sample_rate_hz=sample_rate_hz,
+                resolution_hz=self.resolution_hz,
+                lowest_hz=self.lowest_hz,
+                highest_hz=self.highest_hz,
+                grid=self.grid,
+                detection_group=self.detection_group,
+                grid_seed=self.phase_seed,
+            )
+        except IdentificationError as error:
+            raise ConfigurationError(str(error)) from None
+
+    @property
+    def level_unit(self) -> str:
+        """The levels are RMS voltages."""
+        return "V RMS"
+
+    def targets(self) -> tuple[Target, ...]:
+        """Every realisation at the first level, then at the next."""
+        return tuple(
+            Target(number=number, level=level, realisation=realisation)
+            for number, (level, realisation) in enumerate(
+                (level, realisation) for level in self.levels_rms_v for realisation in range(self.realisations)
+            )
+        )
+
+    def waveforms(self, sample_rate_hz: float) -> np.ndarray:
+        """One period of every realisation, of unit peak: float64[realisations, period]."""
+        design = self.design(sample_rate_hz)
+        return np.array([design.unit_peak(self.phase_seed, index) for index in range(self.realisations)])
+
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+        """The segments that play all realisations but those ``done`` already; their level is the waveform's peak."""
+        design = self.design(sample_rate_hz)
+        ramp = self.ramp_s / design.period_s
+        recorded = self.periods + 1.0 / design.period_samples  # one sample to be sure of the last period
+        out: list[Segment] = []
+        if self.silent_s and not done:  # a ramp from 0 V to 0 V: at a held level a quiet channel would count as stuck
+            silent = Excitation(design.resolution_hz, waveform=0)
+            out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.silent_s / design.period_s, excitation=silent))
+        # Of each realisation once: it takes a Fourier transform.
+        crest_factors = [design.crest_factor(self.phase_seed, index) for index in range(self.realisations)]
+        for target in self.targets():
+            if target.number in done:
+                continue
+            index, number = target.realisation or 0, target.number
+            peak_v = target.level * crest_factors[index]
+            played = Excitation(design.resolution_hz, waveform=index)
+            out.append(Segment(SegmentKind.RAMP, number, peak_v, ramp, excitation=played))
+            if self.transient_periods:
+                out.append(Segment(SegmentKind.HOLD, number, peak_v, float(self.transient_periods), excitation=played))
+            out.append(Segment(SegmentKind.RECORD, number, peak_v, recorded, excitation=played))
+            out.append(Segment(SegmentKind.RAMP, -1, 0.0, ramp, excitation=played))
+        return tuple(out)
+
+    def check(self, bench: Bench) -> None:
+        """Refuse bands, periods and peaks beyond what the bench allows."""
+        self.check_frequencies(bench, lowest_hz=self.lowest_hz, highest_hz=self.highest_hz)
+        design = self.design(bench.sample_rate_hz)
+        most = LARGEST_WAVEFORMS // design.period_samples
+        if self.realisations > most:
+            raise ConfigurationError(
+                f"realisations = {self.realisations}: allowed is up to {most} of {design.period_samples} samples, "
+                f"that of resolution_hz = {self.resolution_hz:g} Hz"
+            )
+        crest = max(design.crest_factor(self.phase_seed, index) for index in range(self.realisations))
+        for index, level in enumerate(self.levels_rms_v):
+            if not 0.0 < level * crest <= bench.limits.voltage_v:
+                raise ConfigurationError(
+                    f"levels_rms_v[{index}] = {level:g} V: peaks reach {level * crest:.3g} V, the bench {bench.name} allows "
+                    f"above 0 and up to {bench.limits.voltage_v:g} V"
+                )

@@ -1,0 +1,145 @@
+"""From the recorded rows of a multisine's realisation to its result, and from recordings to spectra in memory."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from identification import IdentificationError, PeriodicSpectra, periodic_spectra
+from rig.bench import Bench
+from rig.campaigns.evaluation.gaps import lost_rows, rms_of
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, head, skew_turn
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.planning.plan import Column, Target
+from rig.daq import Channel
+
+__all__ = ["MULTISINE_COLUMNS", "measure_multisine_point", "spectra_of", "turned_periods"]
+
+MULTISINE_COLUMNS = (
+    Column("realisation", "realisation", "", ".0f"),
+    Column("force_rms_n", "force", "N RMS", ".4f", plain=True),
+    Column("drive_rms_m_s2", "drive", "m/s^2 RMS", ".4f", plain=True),
+    Column("voltage_peak_v", "peak", "V", ".3f"),
+    Column("change", "change over the periods", "%", ".3f", 100.0),
+)
+
+_LINES = 50
+"""Lines over which noise is taken to be even."""
+
+
+def measure_multisine_point(
+    bench: Bench, plan: MultisinePlan, target: Target, rows: np.ndarray, settling: np.void
+) -> dict[str, Any]:
+    """The result of a recorded realisation, with its own quality."""
+    point = head(plan, target)
+    try:
+        spectra = spectra_of(bench, plan, {target.realisation or 0: rows})
+    except (IdentificationError, ArithmeticError) as error:
+        return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+    roles = {channel.role: channel.name for channel in bench.channels}
+    periods = spectra.spectra.shape[1]
+    still = next((c.name for c, column in _watched(bench, rows) if not np.ptp(column)), "")
+    change = max(_change(spectra, roles[role]) for role in ("force", "drive")) if periods > 1 else math.nan
+    reason = f"channel {still} does not change at all: sensor, cable or supply is dead" if still else ""
+    if not reason and change > plan.accepted_change:
+        reason = (
+            f"force or drive of the first period differs by {100.0 * change:.1f} % from the others beyond noise, accepted "
+            f"up to {100.0 * plan.accepted_change:g} %: more transient_periods, or less disturbance"
+        )
+    return {
+        **point,
+        "settled": not reason if periods > 1 else None,
+        "accepted": not reason,
+        "reason": reason,
+        "force_rms_n": spectra.rms(roles["force"]),
+        "drive_rms_m_s2": spectra.rms(roles["drive"]),
+        "channel_rms": rms_of(rows),
+        "voltage_rms_v": spectra.rms(VOLTAGE.name),
+        "voltage_peak_v": float(np.abs(rows["output_v"]).max()),
+        "change": None if math.isnan(change) else change,
+        "periods": plan.periods,
+        "warnings": _warnings(plan.periods, periods),
+    }
+
+
+def _watched(bench: Bench, rows: np.ndarray) -> list[tuple[Channel, np.ndarray]]:
+    """Force and drive with what was read of them, but for lost samples."""
+    readings = rows["inputs"][~lost_rows(rows)]
+    return [(c, readings[:, i]) for i, c in enumerate(bench.channels) if c.role in ("force", "drive")]
+
+
+def _warnings(planned: int, periods: int) -> list[str]:
+    """What is to be said of the periods that were used, of those planned."""
+    left_out = [f"{planned - periods} of {planned} periods are left out"] if periods < planned else []
+    return [*left_out, *(["one period only: neither noise nor a transient can be told"] if periods == 1 else [])]
+
+
+def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
+    """Spectra of recorded rows, by the number of the realisation; every period is turned to begin where the signal does.
+
+    The channels' skew is taken out. Periods in which samples were lost are left out.
+    """
+    design = plan.design(bench.sample_rate_hz)
+    channels = len(bench.channels) + 1
+    turned = [turned_periods(bench, plan, index, rows).reshape(channels, -1) for index, rows in records.items()]
+    shortest = min(record.shape[1] for record in turned)  # all realisations with as many periods as the poorest has
+    turned = [record[:, :shortest] for record in turned]
+    spectra = periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
+    without_skew = spectra.spectra.copy()
+    without_skew[:, :, :-1] *= skew_turn(bench, spectra.frequency_hz)
+    return replace(spectra, spectra=without_skew)
+
+
+def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarray) -> np.ndarray:
+    """float[n_channels + 1, n_periods, n]: whole periods of realisation ``index``, each beginning where the signal does.
+
+    The output comes last. Periods in which samples were lost are left out; the channels' skew is still in them. Raises
+    `identification.IdentificationError` where the record is too short, or no period is left.
+    """
+    design = plan.design(bench.sample_rate_hz)
+    size = design.period_samples
+    if rows.size < plan.periods * size:
+        raise IdentificationError(f"record: has {rows.size} samples, needs {plan.periods * size}")
+    rows = rows[: plan.periods * size]
+    begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
+    signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
+    periods = signals.reshape(signals.shape[0], plan.periods, size)
+    whole = ~lost_rows(rows).reshape(plan.periods, size).any(axis=1)
+    if not whole.any():
+        raise IdentificationError("record: samples were lost on their way in every period")
+    return np.asarray(np.roll(periods[:, whole], begun, axis=2))
+
+
+def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:
+    """By how many samples the one period of ``output`` lies behind the beginning of the ``period`` it plays."""
+    match = np.fft.irfft(np.conj(np.fft.rfft(output)) * np.fft.rfft(period), period.size)
+    return int(np.argmax(match))
+
+
+def _change(spectra: PeriodicSpectra, name: str) -> float:
+    """Difference between the first period and the mean of the others beyond noise, RMS over the band, relative.
+
+    0 where there is nothing in the others: a channel that stands still.
+    """
+    periods = spectra.spectra[0, :, spectra.index(name)]
+    count, others = periods.shape[0], periods[1:].mean(axis=0)
+    difference = periods[0] - others
+    if count > 2:  # the others among themselves
+        noise = np.sum(np.abs(periods[1:] - others) ** 2) / (count - 2) * count / (count - 1)
+    else:
+        noise = _rough_power(difference)
+    beyond = max(float(np.linalg.norm(difference) ** 2 - noise), 0.0)
+    size = float(np.linalg.norm(others))
+    return math.sqrt(beyond) / size if size > 0.0 else 0.0
+
+
+def _rough_power(difference: np.ndarray) -> float:
+    """Power of what differs from line to line, as noise does and a decaying vibration away from its resonance does not."""
+    if difference.size < 2 * _LINES:
+        return 0.0
+    bends = np.abs(difference[1:-1] - 0.5 * (difference[:-2] + difference[2:])) ** 2
+    used = bends[: bends.size // _LINES * _LINES].reshape(-1, _LINES)
+    # A power of two degrees of freedom has its median at log 2 of its mean; the bend of noise has 3/2 of its power.
+    return float(np.mean(np.median(used, axis=1)) / (1.5 * math.log(2.0)) * difference.size)

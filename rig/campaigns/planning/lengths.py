@@ -1,0 +1,66 @@
+"""How long a plan may take, and how much of it is held in memory: absurd lengths are refused before anything moves."""
+
+from collections import defaultdict
+
+from rig.bench import Bench
+from rig.campaigns.planning.plan import Plan
+from rig.errors import ConfigurationError
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Segment
+
+__all__ = ["LONGEST_DAYS", "MOST_ROWS", "check_length"]
+
+LONGEST_DAYS = 100.0
+"""Of a whole plan whose every point takes all the time it may have to settle."""
+MOST_ROWS = 100_000_000
+"""Samples of one record, which is held in memory until it is evaluated: five hours at 5000 samples/s."""
+_DAY_S = 86400.0
+_KEYS = {
+    SegmentKind.RAMP: ("ramp_periods", "level_ramp_periods", "approach_periods", "ramp_s", "silent_s"),
+    SegmentKind.SETTLE: ("settle.longest_periods",),
+    SegmentKind.RECORD: ("record_periods", "periods"),
+    SegmentKind.HOLD: ("hold_periods", "start_periods", "lock_periods", "end_periods", "transient_periods"),
+    SegmentKind.SWEEP: ("rate_hz_per_s", "rate_octaves_per_min"),
+    SegmentKind.LEVEL_SWEEP: ("sweep_periods", "record_periods"),
+    SegmentKind.START: ("start_periods",),
+}
+"""Keys that the length of a segment comes from, of which a plan has one or some."""
+
+
+def check_length(plan: Plan, bench: Bench) -> None:
+    """Raise `ConfigurationError`, which names the keys, for a record beyond `MOST_ROWS` or a plan beyond `LONGEST_DAYS`."""
+    took: dict[SegmentKind, float] = defaultdict(float)
+    for segment in plan.segments(bench.sample_rate_hz):
+        duration_s = _duration_s(plan, bench, segment)
+        took[segment.kind] += duration_s
+        rows = duration_s * bench.sample_rate_hz
+        if rows > MOST_ROWS and segment.kind in (SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP):
+            raise ConfigurationError(
+                f"{_keys(plan, segment.kind)}: up to {rows:.3g} samples of one record at {bench.sample_rate_hz:g} samples/s, "
+                f"allowed are up to {MOST_ROWS:g}"
+            )
+    days = sum(took.values()) / _DAY_S
+    if days > LONGEST_DAYS:
+        longest = max(took, key=lambda kind: took[kind])
+        raise ConfigurationError(
+            f"{_keys(plan, longest)}: the plan may take {days:.3g} days, {took[longest] / _DAY_S:.3g} of them by this; allowed "
+            f"are up to {LONGEST_DAYS:g} days, with every point as long as it may take"
+        )
+
+
+def _duration_s(plan: Plan, bench: Bench, segment: Segment) -> float:
+    """How long a segment takes at the most, at the lowest frequency that it may have, s."""
+    if segment.kind is SegmentKind.SWEEP:
+        return float(getattr(plan, "duration_s", 0.0))
+    lowest_hz = bench.limits.frequency_hz[0]
+    if segment.excitation is not None:
+        lowest_hz = segment.excitation.frequency_hz
+    elif (window := getattr(plan.law, "frequency_window_hz", None)) is not None:
+        lowest_hz = window[0]
+    return segment.periods / lowest_hz
+
+
+def _keys(plan: Plan, kind: SegmentKind) -> str:
+    known = {*type(plan).model_fields, "settle.longest_periods"}
+    given = [key for key in _KEYS[kind] if key in known and getattr(plan, key, 1) is not None]
+    return ", ".join(given) or kind.name.lower()

@@ -1,0 +1,147 @@
+"""Levels of a plan: volts, newtons or metres, and how a loop is brought in before it holds them."""
+
+import math
+from dataclasses import replace
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from controller import AmplitudeLaw
+from rig.bench import Bench
+from rig.bench.configuration import Configured
+from rig.errors import ConfigurationError
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Excitation, Segment
+
+__all__ = ["LEVELS", "Levels"]
+
+START_RAMP_PERIODS = 10.0
+
+LEVELS = {
+    "levels_v": (AmplitudeLaw.VOLTAGE, "V"),
+    "levels_n": (AmplitudeLaw.FORCE, "N"),
+    "levels_rms_n": (AmplitudeLaw.FORCE_RMS, "N RMS"),
+    "levels_m": (AmplitudeLaw.RESPONSE, "m"),
+}
+"""What each key's levels are, and their unit."""
+
+
+class Levels(Configured):
+    """Levels in exactly one of four quantities; those that a loop holds may begin with a voltage, ``start_v``."""
+
+    levels_v: tuple[float, ...] | None = None
+    """Levels as amplitude of the output voltage, V peak."""
+    levels_n: tuple[float, ...] | None = None
+    """Levels as amplitude of the fundamental force, N peak."""
+    levels_rms_n: tuple[float, ...] | None = None
+    """Levels as root mean square of the force, all harmonics together, N."""
+    levels_m: tuple[float, ...] | None = None
+    """Levels as amplitude of the drive point's fundamental displacement, m peak."""
+    start_v: float | None = Field(None, gt=0)
+    """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""
+    start_periods: float = Field(40.0, ge=1, le=1e5)
+    """Time at ``start_v``, for the lock to be gained, periods; a little longer while one is in doubt. Without any at its end
+    (the frequency at an end of its window for 20 periods, or the phase far off for all of 100), the run ends."""
+
+    @model_validator(mode="after")
+    def _levels_make_sense(self) -> Self:
+        given = [name for name in LEVELS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"{', '.join(LEVELS)}: exactly one of them is to be given")
+        if not self.levels:
+            raise ValueError(f"{given[0]} = []: at least one level is needed")
+        for index, level in enumerate(self.levels):
+            if not level > 0.0:
+                raise ValueError(f"{given[0]}[{index}] = {level:g}: allowed is above 0")
+        if len(set(self.levels)) != len(self.levels):
+            raise ValueError(f"{given[0]}: a level is given twice; use repeats to measure levels again")
+        return self
+
+    @property
+    def level_count(self) -> dict[str, int]:
+        """Number of levels by their key, of any key that is given."""
+        return {name: len(getattr(self, name)) for name in LEVELS if getattr(self, name) is not None}
+
+    @property
+    def levels_key(self) -> str:
+        """Name of the key that the levels were given by."""
+        return next(name for name in LEVELS if getattr(self, name) is not None)
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """The levels, in V, N or m."""
+        return tuple(getattr(self, self.levels_key))
+
+    @property
+    def amplitude_law(self) -> AmplitudeLaw:
+        """What the levels are."""
+        return LEVELS[self.levels_key][0]
+
+    @property
+    def level_unit(self) -> str:
+        """``V``, ``N``, ``N RMS`` or ``m``."""
+        return LEVELS[self.levels_key][1]
+
+    def start_segments(self, lag_deg: float | None = None, excitation: Excitation | None = None) -> list[Segment]:
+        """Set the rig in motion at ``start_v``; nothing where there is none or the levels are volts."""
+        if self.start_v is None or self.amplitude_law is AmplitudeLaw.VOLTAGE:
+            return []
+        ramp = Segment(
+            SegmentKind.RAMP,
+            -1,
+            self.start_v,
+            START_RAMP_PERIODS,
+            excitation=excitation,
+            amplitude_law=AmplitudeLaw.VOLTAGE,
+            lag_deg=lag_deg,
+        )
+        kind = SegmentKind.START if excitation is None else SegmentKind.HOLD
+        return [ramp, replace(ramp, kind=kind, periods=self.start_periods)]
+
+    def ratios_to_drive(self, bench: Bench) -> dict[str, float]:
+        """How far each channel moves for one metre at the drive point, as far as known: by the bench's mode shapes."""
+        return bench.response_ratios
+
+    def check_levels(self, bench: Bench, band_hz: tuple[float, float] | None = None) -> None:
+        """Refuse a level beyond the bench's limit, and levels of a logarithmic loop without a voltage to begin with.
+
+        A displacement is checked at every channel whose motion in the mode under test is known, where the band that is
+        passed through, if any is given, holds that mode.
+        """
+        limits = bench.limits
+        largest = {"V": limits.voltage_v, "N": limits.force_n, "N RMS": limits.force_n, "m": limits.displacement_m}
+        for index, level in enumerate(self.levels):
+            if level > largest[self.level_unit]:
+                raise ConfigurationError(
+                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: the bench {bench.name} allows up to "
+                    f"{largest[self.level_unit]:g} {self.level_unit}"
+                )
+        if band_hz is None or band_hz[0] <= bench.specimen.linear_frequency_hz <= band_hz[1]:
+            self._check_channels(bench)
+        if self.start_v is not None and self.start_v > limits.voltage_v:
+            raise ConfigurationError(
+                f"start_v = {self.start_v:g} V: the bench {bench.name} allows up to {limits.voltage_v:g} V"
+            )
+        loops = getattr(self, "controller", None)
+        linear = self.amplitude_law is AmplitudeLaw.VOLTAGE or (
+            self.amplitude_law is not AmplitudeLaw.RESPONSE and getattr(loops, "force_loop", "linear") == "linear"
+        )
+        if self.start_v is None and not linear:
+            raise ConfigurationError(f"start_v: levels by {self.levels_key} of this loop need a voltage to begin with")
+
+    def _check_channels(self, bench: Bench) -> None:
+        """Refuse levels in metres that take a channel beyond its limits when the linear mode is passed."""
+        if self.level_unit != "m":
+            return
+        omega = 2.0 * math.pi * bench.specimen.linear_frequency_hz
+        ratios = self.ratios_to_drive(bench)
+        name = max(ratios, key=lambda channel: ratios[channel])
+        for index, level in enumerate(self.levels):
+            moved = level * ratios[name]
+            for key, unit, value in (("displacement_m", "m", moved), ("acceleration_m_s2", "m/s^2", moved * omega**2)):
+                if value > getattr(bench.limits, key):
+                    raise ConfigurationError(
+                        f"{self.levels_key}[{index}] = {level:g} m: means {value:.3g} {unit} at channel {name!r}, which moves "
+                        f"{ratios[name]:.3g} times as far as the drive point; "
+                        f"the bench {bench.name} allows limits.{key} = {getattr(bench.limits, key):g}"
+                    )

@@ -1,0 +1,99 @@
+"""What all campaigns under a phase lock share: what they may know of the plant, what they check, what they accept."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from controller import PhaseLockedLoop
+from rig.bench import Bench
+from rig.campaigns.planning.plan import Plan
+from rig.campaigns.planning.plant import KnownPlant
+from rig.errors import ConfigurationError
+from rig.tick.sequencer.segments import SettleRule
+
+__all__ = ["LockedPlan", "SettledPlan"]
+
+
+class LockedPlan(KnownPlant, Plan):
+    """Base of the plans whose frequency follows a phase lag."""
+
+    controller: PhaseLockedLoop
+    """The phase-locked loop, and the loops that hold levels in newtons or metres."""
+    repeats: int = Field(1, ge=1, le=1000)
+    """How many times all points are passed through."""
+    harmonics: int = Field(7, ge=1, le=50)
+    """Highest harmonic that is evaluated."""
+    accepted_alien_force: float = Field(0.1, gt=0, le=1)
+    """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted: another mode, a loop
+    that swings."""
+    on_failure: Literal["skip", "stop"] = "skip"
+    """What follows when a point fails: what comes next, or a ramp-down and the end."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels and repeats."""
+        return {**self.level_count, "repeats": self.repeats}
+
+    @property
+    def law(self) -> PhaseLockedLoop:
+        """The phase-locked loop."""
+        return self.controller
+
+    @property
+    def asked_lags_deg(self) -> tuple[float, ...]:
+        """Every lag that is held, of the acceleration behind the force, deg."""
+        return (self.controller.phase_lag_deg,)
+
+    def check(self, bench: Bench) -> None:
+        """Refuse, before anything moves, what the bench or the known plant cannot do."""
+        self.check_levels(bench)
+        self.check_plant(bench, self.controller, self.asked_lags_deg)
+        self._check_loop(bench)
+
+    def _check_loop(self, bench: Bench) -> None:
+        """Refuse a window without the tested mode or beyond the bench's limits, and harmonics beyond the sample rate."""
+        window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz
+        linear = bench.specimen.linear_frequency_hz
+        if not window[0] < linear < window[1]:
+            raise ConfigurationError(
+                f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
+                f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
+            )
+        highest = int(bench.sample_rate_hz / window[1] / 2.0) - 2
+        if self.harmonics > highest:
+            raise ConfigurationError(
+                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s"
+            )
+        if window[0] < allowed[0] or window[1] > allowed[1]:
+            raise ConfigurationError(
+                f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"
+            )
+
+    def _check_slow_flow(self, bench: Bench) -> None:
+        """Refuse a bench without the mode shape that the slow flow needs."""
+        if bench.specimen.drive_mode_shape is None:
+            raise ConfigurationError(
+                f"specimen.drive_mode_shape of the bench {bench.name} is missing: the slow flow needs it"
+            )
+
+
+class SettledPlan(LockedPlan):
+    """Base of the plans whose points are settled and then recorded."""
+
+    settle: SettleRule = SettleRule()
+    """When a point counts as settled."""
+    accepted_phase_error_deg: float = Field(3.0, gt=0, le=180)
+    """Largest phase error of the recorded fundamental with which a point is accepted, deg."""
+    accepted_frequency_scatter: float = Field(1e-3, gt=0, le=1)
+    """Largest scatter of the frequency from period to period, relative, with which a point is accepted: a loop that hunts
+    has not settled, whatever its averages say."""
+    accepted_drift: float = Field(0.05, gt=0, le=1)
+    """Largest change of the fundamental of force or drive over a record, relative, in amplitude and phase together, with
+    which a point is accepted: the detector's filter hides what happens late in a record."""
+    on_lost_lock: Literal["skip", "stop"] = "stop"
+    """What follows when a lock is lost where it is held: ``stop`` trips, ``skip`` seeks it again at the next point."""
+
+    @property
+    def settle_rule(self) -> SettleRule:
+        """When a point counts as settled."""
+        return self.settle

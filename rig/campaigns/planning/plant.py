@@ -1,0 +1,214 @@
+"""What a plan may know of the plant, and what is refused on that ground before anything moves."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pydantic import Field, PositiveFloat
+
+from controller import AmplitudeLaw, PhaseLockedLoop
+from controller.tuning import (
+    LARGEST_AT_HALF,
+    ComplexResponseLaw,
+    ControlLoop,
+    ForceLaw,
+    FrequencyErrorLaw,
+    LogForceLaw,
+    LogResponseLaw,
+    PhaseLaw,
+    PlantModel,
+    closed_loop_poles,
+    gains_at_half,
+    unstable_poles,
+)
+from controller.tuning.laws import AmplitudeLaw as AmplitudeGains
+from rig.bench import Bench
+from rig.bench.configuration import Configured
+from rig.campaigns.planning.levels import Levels
+from rig.campaigns.planning.levels_on_plant import MORE_DAMPING, check_motion, check_voltage, lags_text
+from rig.errors import ConfigurationError
+
+__all__ = ["KnownPlant", "PlantFacts", "control_loop"]
+
+CLOSEST_DEG = 0.5  # lags that are checked on the plant: a few hundred at the most, each takes milliseconds
+
+
+class PlantFacts(Configured):
+    """Exciter and structure near the mode, from voltage to force and acceleration, as ``rig tune`` has measured them.
+
+    See `controller.tuning.PlantModel`: force per volt is ``1/(alpha + beta Y)`` with the structure's accelerance Y.
+    """
+
+    frequency_rad_s: float = Field(gt=0)
+    """Angular frequency of the mode of the structure alone, rad/s."""
+    damping_ratio: float = Field(gt=0, lt=1)
+    """Its damping ratio."""
+    drive_shape: float = Field(gt=0)
+    """Its mass-normalised shape at the drive point, kg^-1/2."""
+    residual_per_kg: tuple[float, float]
+    """Accelerance of the other modes, 1/kg: a constant, and the factor of (s/centre)^2."""
+    force_v_n: tuple[float, float, float, float]
+    """alpha, V/N: coefficients of (s/centre)^0 to ^3."""
+    acceleration_v_s2_m: tuple[float, float, float, float]
+    """beta, V s^2/m: coefficients of (s/centre)^-2 to ^1."""
+    centre_rad_s: float = Field(gt=0)
+    """Angular frequency that s is divided by, rad/s."""
+    band_hz: tuple[float, float]
+    """Band that was fitted, Hz."""
+    fit_error: float = Field(ge=0)
+    """Relative error of the fit, root mean square."""
+    sample_rate_hz: float = Field(gt=0)
+    """Sample rate of the loop, Hz."""
+    latency_samples: float = Field(ge=0)
+    """Samples from an output to the input that shows it."""
+    response_ratios: dict[str, PositiveFloat] = Field(default_factory=dict)
+    """How far each response channel moves for one metre at the drive point, at resonance, by its name. They take the place of
+    the bench's mode shapes where levels are checked."""
+
+    @property
+    def residual_m_n(self) -> float:
+        """Receptance of the other modes at the drive point, at the mode's frequency, m/N."""
+        constant, square = self.residual_per_kg
+        return -(constant - square * (self.frequency_rad_s / self.centre_rad_s) ** 2) / self.frequency_rad_s**2
+
+    @property
+    def model(self) -> PlantModel:
+        """The plant."""
+        return PlantModel(**self.model_dump(exclude={"response_ratios"}))
+
+
+class KnownPlant(Levels):
+    """Levels of a plan that may know its plant."""
+
+    plant: PlantFacts | None = None
+    """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the bench's limits are
+    refused."""
+
+    @property
+    def known_plant(self) -> PlantModel | None:
+        """Exciter and structure, where the plan knows them."""
+        return None if self.plant is None else self.plant.model
+
+    def ratios_to_drive(self, bench: Bench) -> dict[str, float]:
+        """How far each channel moves for one metre at the drive point: as measured, else by the bench's mode shapes."""
+        measured = {} if self.plant is None else self.plant.response_ratios
+        names = [channel.name for channel in bench.channels if channel.role == "response"]
+        for name in measured:
+            if name not in names:
+                raise ConfigurationError(
+                    f"plant.response_ratios.{name}: allowed is a response channel of the bench {bench.name}: "
+                    f"{', '.join(names) or 'it has none'}"
+                )
+        return bench.response_ratios | measured
+
+    def check_plant(self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float]) -> None:
+        """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels out of its reach."""
+        if self.plant is None:
+            return
+        plant, lags_deg = self.plant.model, _apart(lags_deg)
+        try:
+            # What a sign detector sees cannot be linearised.
+            if law.detector != "sign":
+                loops = self._loops(plant, law, lags_deg, bench)
+                _check_quickness(loops)
+                _check_stability(loops)
+            check_voltage(self, plant, lags_deg, bench)
+            check_motion(self, plant, lags_deg, bench, self.ratios_to_drive(bench))
+        except ValueError as error:
+            raise ConfigurationError(f"plant: {error}") from None
+
+    def _loops(
+        self, plant: PlantModel, law: PhaseLockedLoop, lags_deg: Sequence[float], bench: Bench
+    ) -> list[ControlLoop]:
+        """The loop at each lag; where the force at rest is used, which cannot be linearised, only the loops inside it."""
+        amplitude_law = self.amplitude_law
+        if law.rest_low_pass_rad_s > 0.0 and amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
+            through = law.force_loop == "through-response"
+            amplitude_law = AmplitudeLaw.RESPONSE if through else AmplitudeLaw.VOLTAGE
+        shape = bench.specimen.drive_mode_shape
+        return [
+            control_loop(plant, law.model_copy(update={"phase_lag_deg": lag}), amplitude_law, shape) for lag in lags_deg
+        ]
+
+
+def _apart(lags_deg: Sequence[float]) -> list[float]:
+    """The lags without those that lie so near to the one before that the loop is the same; the last is among them."""
+    *rising, last = sorted(lags_deg)
+    out: list[float] = []
+    for lag in rising:
+        if not out or lag - out[-1] >= CLOSEST_DEG:
+            out.append(lag)
+    return [*out, last]
+
+
+def _check_quickness(loops: Sequence[ControlLoop]) -> None:
+    """Refuse a loop that would have to act within a period or two, where no demodulator has anything to go by."""
+    found = [(gain, name, loop) for loop in loops for name, gain in gains_at_half(loop).items()]
+    gain, name, loop = max(found, key=lambda entry: entry[0])
+    if gain > LARGEST_AT_HALF:
+        hertz = loop.omega_rad_s / 2.0 / math.pi
+        raise ConfigurationError(
+            f"controller: the {name} is too quick on the known plant ([plant], {hertz:.2f} Hz){lags_text([loop.lag_deg])}: "
+            f"its gain at {0.5 * hertz:.4g} Hz, half the locked frequency, is {gain:.3g}, allowed is {LARGEST_AT_HALF:g}: "
+            f"demodulated signals cannot follow changes within two periods; its gains are about "
+            f"{gain / LARGEST_AT_HALF:.2g} times too large"
+        )
+
+
+def _check_stability(loops: Sequence[ControlLoop]) -> None:
+    unstable = [loop for loop in loops if unstable_poles(loop) > 0]
+    if not unstable:
+        return
+    growth = [max((float(pole.real) for pole in closed_loop_poles(loop)), default=0.0) for loop in unstable]
+    worst = unstable[growth.index(max(growth))]
+    enough = next((part for part in MORE_DAMPING if _steady(unstable, part)), None)
+    damping = 100.0 * worst.plant.damping_ratio
+    raise ConfigurationError(
+        f"controller: these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
+        f"{damping:.3g} % damping)"
+        + lags_text([loop.lag_deg for loop in unstable])
+        + (f", growing at {max(growth):.3g} 1/s" if max(growth) > 0.0 else "")
+        + ("" if enough is None else f"; with {enough * damping:.3g} % they would be stable")
+        + "; rig tune finds gains, without [plant] nothing is checked"
+    )
+
+
+def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
+    """Whether all the loops are stable with so many times the damping; not where a lag is none of that plant's."""
+    damped = (replace(loop, plant=loop.plant.at(damping_ratio=part * loop.plant.damping_ratio)) for loop in loops)
+    try:
+        return not any(map(unstable_poles, damped))
+    except ValueError:
+        return False
+
+
+def control_loop(
+    plant: PlantModel, law: PhaseLockedLoop, amplitude_law: AmplitudeLaw, bench_shape: float | None
+) -> ControlLoop:
+    """The linearised loop that a configured law makes with a plant, its lag and its gains as they are.
+
+    The frequency-error law takes the mode shape of ``law``, or else that of the bench, whatever the plant's own is.
+    """
+    kp, ki = law.proportional_and_integral()
+    if law.frequency_law == "frequency-error":
+        shape = law.drive_mode_shape or bench_shape or plant.drive_shape
+        frequency: PhaseLaw | FrequencyErrorLaw = FrequencyErrorLaw(ki, kp, (shape / plant.drive_shape) ** 2)
+    else:
+        frequency = PhaseLaw(kp, ki)
+    gains = _amplitude_gains(law, amplitude_law)
+    return ControlLoop(plant, law.low_pass_rad_s, frequency, gains, law.phase_lag_deg)
+
+
+def _amplitude_gains(law: PhaseLockedLoop, amplitude_law: AmplitudeLaw) -> AmplitudeGains | None:
+    if amplitude_law is AmplitudeLaw.VOLTAGE:
+        return None
+    if amplitude_law is not AmplitudeLaw.RESPONSE and law.force_loop == "linear":
+        return ForceLaw(law.k3, law.k4)
+    if amplitude_law is not AmplitudeLaw.RESPONSE and law.force_loop == "logarithmic":
+        return LogForceLaw(law.force_proportional, law.force_integral_per_s)
+    gain = law.response_integral_per_s
+    proportional = gain / -complex(*law.plant_pole_rad_s) if law.plant_pole_rad_s else 0.0 + 0.0j
+    if law.response_loop == "amplitude":
+        return LogResponseLaw(proportional.real, gain)
+    force = 0.0 if amplitude_law is AmplitudeLaw.RESPONSE else law.reference_integral_per_s
+    return ComplexResponseLaw(proportional, gain, force, law.low_pass_rad_s)

@@ -1,0 +1,144 @@
+"""The response-controlled campaign: the drive point's displacement is held while the phase lag is stepped through resonance."""
+
+from collections.abc import Sequence
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from controller import AmplitudeLaw
+from rig.bench import Bench
+from rig.campaigns.planning.locked import SettledPlan
+from rig.campaigns.planning.plan import Target
+from rig.errors import ConfigurationError
+from rig.tick.sequencer.layout import OnFailure, SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule
+
+__all__ = ["ResponseControlledPlan"]
+
+LEAST_SINE_LAG_DEG = 5.0
+
+
+class ResponseControlledPlan(SettledPlan):
+    """Vibrations at given displacements of the drive point and given phase lags, from below resonance to above.
+
+    Where the displacement is held, a nonlinear structure answers as a linear one: no folds, no jumps, one frequency at each
+    lag. Points are given by their lag, not by their frequency, so that they stay about a resonance that moves with the level.
+    """
+
+    kind: Literal["response-controlled"] = "response-controlled"
+    """Kind of campaign."""
+    phase_lags_deg: tuple[float, ...]
+    """Lags of the drive-point acceleration behind the force, deg; -90 is phase resonance."""
+    direction: Literal["up", "down", "up-down"] = "up"
+    """Order of the lags at each level; up: rising frequency."""
+    level_ramp_periods: float = Field(40.0, ge=1, le=1e5)
+    """Length of the ramp from one level to the next, back to the first lag, periods."""
+    ramp_periods: float = Field(10.0, ge=1, le=1e5)
+    """Length of the ramp from one lag to the next, periods."""
+    record_periods: int = Field(20, ge=4, le=1_000_000)
+    """Periods that are recorded and evaluated at each point."""
+    settle: SettleRule = SettleRule(settled_periods=10)
+    """When a point counts as settled: displacement, force and lag."""
+    accepted_level_error: float = Field(0.01, gt=0, le=1)
+    """Largest deviation of the recorded displacement from its level, relative, with which a point is accepted."""
+
+    @model_validator(mode="after")
+    def _lags_and_levels_make_sense(self) -> Self:
+        if self.levels_m is None:
+            raise ValueError(f"{self.levels_key}: allowed is levels_m, for the displacement is held")
+        if not self.phase_lags_deg:
+            raise ValueError("phase_lags_deg = []: at least one lag is needed")
+        low, high = LEAST_SINE_LAG_DEG - 180.0, -LEAST_SINE_LAG_DEG
+        for index, lag in enumerate(self.phase_lags_deg):
+            if not low <= lag <= high:
+                raise ValueError(f"phase_lags_deg[{index}] = {lag:g}: allowed is {low:g} to {high:g}")
+        if len(set(self.phase_lags_deg)) != len(self.phase_lags_deg):
+            raise ValueError("phase_lags_deg: a lag is given twice; use repeats to measure points again")
+        return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels, lags, ways and repeats."""
+        ways = 2 if self.direction == "up-down" else 1
+        return {**super().counts, "phase_lags_deg": len(self.phase_lags_deg), "direction": ways}
+
+    @property
+    def asked_lags_deg(self) -> tuple[float, ...]:
+        """Every lag that is held, deg."""
+        return tuple(sorted(self.phase_lags_deg))
+
+    def targets(self) -> tuple[Target, ...]:
+        """All points: at each level, the lowest first, all lags; in both directions one way after the other."""
+        rising = sorted(self.phase_lags_deg)
+        ways: dict[str, list[tuple[float, Literal["up", "down"]]]] = {
+            "up": [(lag, "up") for lag in rising],
+            "down": [(lag, "down") for lag in rising[::-1]],
+        }
+        ways["up-down"] = ways["up"] + ways["down"][1:]
+        return tuple(
+            Target(number=number, level=level, direction=direction, repeat=repeat, phase_lag_deg=lag)
+            for number, (repeat, level, lag, direction) in enumerate(
+                (repeat, level, lag, direction)
+                for repeat in range(1, self.repeats + 1)
+                for level in sorted(self.levels)
+                for lag, direction in ways[self.direction]
+            )
+        )
+
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+        """The segments that measure all points but those ``done`` already.
+
+        A point whose predecessor is done is approached from its predecessor's lag, so that it is reached from the
+        recorded direction.
+        """
+        targets = self.targets()
+        left = [target for target in targets if target.number not in done]
+        out = self.start_segments() if left else []
+        at: Target | None = None
+        for target in left:
+            before = self._approach(targets, target)
+            if before is not None and before != at:
+                out.append(self._ramp(at, before, -1))
+                out.append(self._segment(SegmentKind.HOLD, before, -1, float(self.settle.shortest_periods)))
+                at = before
+            out.append(self._ramp(at, target, target.number))
+            out.append(self._segment(SegmentKind.SETTLE, target, target.number, self.settle.longest_periods))
+            out.append(self._segment(SegmentKind.RECORD, target, target.number, self.record_periods + 1.0))
+            at = target
+        return tuple(out)
+
+    def check(self, bench: Bench) -> None:
+        """Refuse, before anything moves, what the bench or the known plant cannot do."""
+        if self.controller.detector == "sign":
+            raise ConfigurationError(
+                'controller.detector = "sign": allowed is two-phase or adaptive, at lags other than -90'
+            )
+        super().check(bench)
+
+    def _ramp(self, at: Target | None, target: Target, number: int) -> Segment:
+        """The ramp to a point: along the lags, or to another level."""
+        on_the_way = at is not None and (at.level, at.repeat) == (target.level, target.repeat)
+        return self._segment(
+            SegmentKind.RAMP, target, number, self.ramp_periods if on_the_way else self.level_ramp_periods
+        )
+
+    def _segment(self, kind: SegmentKind, target: Target, number: int, periods: float) -> Segment:
+        failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
+        return Segment(
+            kind,
+            number,
+            target.level,
+            periods,
+            failure,
+            lost,
+            amplitude_law=AmplitudeLaw.RESPONSE,
+            lag_deg=target.phase_lag_deg,
+            geometric=True,
+        )
+
+    @staticmethod
+    def _approach(targets: Sequence[Target], target: Target) -> Target | None:
+        """The point to come from: the one before, where it belongs to the same way through the same level."""
+        before = targets[target.number - 1] if target.number else None
+        same_way = before is not None and (before.level, before.repeat) == (target.level, target.repeat)
+        return before if same_way else None

@@ -1,0 +1,150 @@
+"""What a trip was likely caused by, from what was measured before it, and what to do."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from rig.bench import Bench
+from rig.campaigns.planning.locked import LockedPlan
+from rig.campaigns.planning.plan import Plan
+from rig.campaigns.running.margins import LIMITS, margin_before
+from rig.campaigns.running.trips import TrippedAt
+from rig.tick.safety.layout import POLARITY_HINT, EndReason
+
+__all__ = ["Advice", "Before", "Trip", "advice_on"]
+
+CLEAR = 0.7  # of a limit: a level that is expected there, in proportion to one before, is too high
+ROOM = 0.9  # of a limit: where a level is proposed that in proportion should fit
+AT_AN_END = 0.01  # of a frequency window's width
+
+BESIDE_THE_LEVEL = {
+    EndReason.NON_FINITE_INPUT: ("the device delivered no number", "look at device and driver, then `rig check`"),
+    EndReason.NON_FINITE_OUTPUT: (
+        "the control law left all bounds",
+        "look at the gains of the controller, or have them made by `rig tune`",
+    ),
+    EndReason.DRIVER_FAILED: ("device, wire or driver, not the level", "see that `rig doctor --daq BENCH` answers"),
+    EndReason.SAMPLES_LOST: ("wire or computer were too slow, not the level", "see `rig doctor --daq BENCH`"),
+    EndReason.PLANT_CONTRADICTED: (
+        "amplifier or a sensor of force or drive has another gain or polarity than when [plant] was measured",
+        "look at the amplifier's gain and at both sensors, then `rig check`; after a change of the rig, `rig tune` anew",
+    ),
+    EndReason.EMERGENCY_STOP: ("somebody pressed the stop, or its cable is broken", "ask who, and release it"),
+}
+"""Likely cause and what to do for what has nothing to do with levels and locks."""
+
+
+class Trip(NamedTuple):
+    """What stopped a run, as the guard has kept it."""
+
+    reason: EndReason
+    """The first cause."""
+    channel: int
+    """Index of the channel, -1 for none."""
+    frequency_hz: float
+    """Frequency of the oscillator at the end, Hz."""
+
+
+class Before(NamedTuple):
+    """What the run had come to before it tripped."""
+
+    points: Sequence[Mapping[str, Any]]
+    """Points that were recorded, accepted or not."""
+    locked: bool
+    """Whether a lock was gained at any time."""
+    first: bool
+    """Whether it tripped at its first point."""
+
+
+class Advice(NamedTuple):
+    """Two half sentences for a person who stands before a rig that has tripped."""
+
+    likely_cause: str
+    """What it most likely was."""
+    what_to_do: str
+    """What comes first."""
+
+
+def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before: Before) -> Advice:
+    """Likely cause and remedy of a trip at a level, from what had been measured before."""
+    if trip.reason in BESIDE_THE_LEVEL:
+        return Advice(*BESIDE_THE_LEVEL[trip.reason])
+    if trip.reason is EndReason.SENSOR_STUCK:
+        return Advice(
+            f"sensor, cable or supply of channel {_name(bench, trip)} is dead, or the level is below one bit of its converter",
+            "look at the channel, then `rig check`; raise the level if it is alive",
+        )
+    if trip.reason is EndReason.LEVEL_NOT_FOLLOWED:
+        return Advice(
+            f"sensor or cable of channel {_name(bench, trip)} has failed, or the amplifier does not put out what it is told",
+            "look at both, then `rig check`",
+        )
+    if isinstance(plan, LockedPlan) and not (before.locked or before.points):
+        return Advice(
+            f"no lock was ever gained in this run: {POLARITY_HINT}",
+            "look at the polarity of force and drive (`rig check` tells it) and at controller.frequency_window_hz",
+        )
+    if trip.reason in LIMITS or trip.reason is EndReason.SENSOR_OVERLOAD:
+        return _on_a_limit(trip, bench, plan, at, before)
+    if trip.reason in (EndReason.LOST_LOCK, EndReason.FREQUENCY_LIMIT):
+        return _on_a_lock(trip, bench, plan, at)
+    return Advice("not known; the line above says what was seen", "find out why before the level is tried again")
+
+
+def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before: Before) -> Advice:
+    """By the share of the limit that the points before had reached, in proportion to their level."""
+    name, unit = _name(bench, trip), plan.level_unit if at is None else at.level_unit
+    margin = margin_before(bench, trip.reason, trip.channel, unit, before.points)
+    raised = _what_may_be_raised(trip, bench)
+    what = "the level" if at is None else f"the level {at.text}"
+    if margin is None:
+        polarity = ", or polarity or sensitivity of a sensor is wrong" if before.first else ""
+        then = "; `rig check` tells polarity and sensitivity" if before.first else ""
+        return Advice(f"{what} is too high{polarity}", f"lower {_key(plan, at)}, or {raised}{then}")
+    reached = f"{100.0 * margin.share:.2g} % of {margin.key} on channel {name}"
+    had = f"the point before, {margin.level:.4g} {unit}, had reached {reached}"
+    if at is None or margin.share * max(at.level / margin.level, 1.0) >= CLEAR:
+        below = ROOM * margin.level / margin.share
+        bound = f" below {below:.2g} {unit}" if at is None or below < at.level else ""
+        return Advice(f"{had}: {what} is too high", f"lower {_key(plan, at)}{bound}, or {raised}")
+    return Advice(
+        f"{had}: {what} alone does not explain it. A jump to another response, a knock, or a sensor that reads wrong",
+        f"look at the sensors of force, drive and channel {name}, and at what else moved it; then take smaller steps",
+    )
+
+
+def _on_a_lock(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None) -> Advice:
+    """A lock that was gained and then lost: at an end of the window, or within it."""
+    window = getattr(plan.law, "frequency_window_hz", None)
+    low, high = bench.limits.frequency_hz if window is None else window
+    key = "limits.frequency_hz of the bench" if window is None else "controller.frequency_window_hz"
+    from_end = min(abs(trip.frequency_hz - low), abs(trip.frequency_hz - high))
+    where = "" if at is None else f" at {at.text}"
+    if from_end <= AT_AN_END * (high - low):
+        return Advice(
+            f"the resonance{where} lies beyond {key} = [{low:g}, {high:g}]",
+            "widen it if rig and specimen bear it, or lower the levels",
+        )
+    return Advice(
+        f"a lock that had been gained broke{where} at {trip.frequency_hz:.4g} Hz, within its window: a knock, a step of the "
+        "level that is too large, or the end of this resonance",
+        'smaller steps or longer ramps of the level, gains by `rig tune`, or on_lost_lock = "skip"',
+    )
+
+
+def _what_may_be_raised(trip: Trip, bench: Bench) -> str:
+    if trip.reason in LIMITS:
+        key = LIMITS[trip.reason]
+        now = f"limits.{key} = {getattr(bench.limits, key):g}"
+        return f"raise {now} of the bench if specimen and rig bear it, in a run of its own"
+    return f"take a less sensitive sensor for channel {_name(bench, trip)}"
+
+
+def _key(plan: Plan, at: TrippedAt | None) -> str:
+    """Key of the plan that the level stands under."""
+    if at is not None and at.start:
+        return "start_v"
+    return str(getattr(plan, "levels_key", "levels_rms_v" if plan.level_unit == "V RMS" else "the levels"))
+
+
+def _name(bench: Bench, trip: Trip) -> str:
+    return bench.channels[trip.channel].name if trip.channel >= 0 else "-"

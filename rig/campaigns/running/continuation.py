@@ -1,0 +1,147 @@
+"""What is left to do of a recording: by its plan, or by a changed one that takes the place of the plan in force.
+
+A point is known by what it physically is, not by where it stands in a plan. It keeps its number in the recording for good;
+points that only a changed plan asks for are numbered on behind all others.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from pathlib import Path
+from typing import Any
+
+from rig.bench import Bench
+from rig.bench.configuration import validated
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.planning.lengths import check_length
+from rig.campaigns.planning.plan import Plan, Target
+from rig.campaigns.plans import bench_of, plan_from
+from rig.errors import ConfigurationError
+from rig.recording.reader import Recording
+
+__all__ = ["Continuation", "changed_keys", "identities", "numbered", "what_is_left"]
+
+Identity = tuple[object, ...]
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """How a recording goes on."""
+
+    plan: Plan
+    """The plan to follow."""
+    bench: Bench
+    """The bench of the recording."""
+    numbers: tuple[int, ...]
+    """Number in the recording of each of the plan's targets."""
+    done: frozenset[int]
+    """The targets, by their place in the plan, that were accepted already."""
+    changed: bool
+    """Whether the plan is another one than that in force."""
+
+    @property
+    def to_measure(self) -> tuple[Target, ...]:
+        """The targets that are not done."""
+        return tuple(target for place, target in enumerate(self.plan.targets()) if place not in self.done)
+
+    def information(self) -> dict[str, Any]:
+        """What a part says of a plan that comes into force with it; nothing where it is the one before."""
+        return {"plan": self.plan.model_dump(mode="json"), "numbers": list(self.numbers)} if self.changed else {}
+
+
+def what_is_left(recording: Recording, change: Plan | None = None, source: str | Path = "") -> Continuation:
+    """How a recording goes on, by the plan in force or by a ``change`` of it, read from ``source``.
+
+    Raises `ConfigurationError` where the changed plan cannot follow on the one in force, or does not fit the bench.
+    """
+    name = recording.path.name
+    plans = [(plan_from(dict(said.plan), f"{name}: plan"), said.numbers) for said in recording.plans]
+    bench = validated(Bench, recording.configuration["bench"], f"{name}: bench")
+    plan, numbers = plans[-1]
+    changed = change is not None and change != plan
+    if change is not None and changed:
+        _check(change, source, plan, bench, name)
+        plan, numbers = change, numbered(plans, change)
+    numbers = tuple(range(len(plan.targets())) if numbers is None else numbers)
+    accepted = {point["number"] for point in recording.points if point["accepted"]}
+    done = frozenset(place for place, number in enumerate(numbers) if number in accepted)
+    return Continuation(plan, bench, numbers, done, changed)
+
+
+def identities(plan: Plan) -> tuple[Identity, ...]:
+    """What each of a plan's targets physically is, numbers to nine digits; the last entry tells equal ones apart."""
+    common = _rounded(attrgetter(path)(plan) for path in KINDS[plan.kind].identity)
+    seen: Counter[Identity] = Counter()
+    out = []
+    for target in plan.targets():
+        what = (*common, *_rounded(target.model_dump(exclude={"number"}).values()))
+        out.append((*what, seen[what]))
+        seen[what] += 1
+    return tuple(out)
+
+
+def _rounded(values: Iterable[Any]) -> Identity:
+    return tuple(f"{value + 0.0:.9g}" if isinstance(value, float) else value for value in values)
+
+
+def numbered(plans: Sequence[tuple[Plan, Sequence[int] | None]], change: Plan) -> tuple[int, ...]:
+    """The number of each target of a changed plan: its old one where any plan before has asked for it, else a new one.
+
+    ``plans``: those so far, with the numbers of their targets (``None``: 0, 1, 2 and so on).
+    """
+    known: dict[Identity, int] = {}
+    for plan, numbers in plans:
+        for place, identity in enumerate(identities(plan)):
+            known.setdefault(identity, place if numbers is None else numbers[place])
+    following = 1 + max(known.values(), default=-1)
+    out = []
+    for identity in identities(change):
+        if identity not in known:
+            known[identity] = following
+            following += 1
+        out.append(known[identity])
+    return tuple(out)
+
+
+def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: str) -> None:
+    """Refuse a plan that cannot take the place of the one before, or that the bench cannot carry out."""
+    head = f"{source}: " if str(source) else ""
+    if change.kind != before.kind:
+        raise ConfigurationError(
+            f"{head}kind = {change.kind!r}: allowed is {before.kind!r}, the kind of {name}; "
+            "a test of another kind is recorded in a file of its own"
+        )
+    if change.level_unit != before.level_unit:
+        raise ConfigurationError(
+            f"{head}levels in {change.level_unit}: allowed are levels in {before.level_unit}, as in {name}; "
+            "others are recorded in a file of their own"
+        )
+    for path in KINDS[change.kind].fixed:
+        new, old = attrgetter(path)(change), attrgetter(path)(before)
+        if new != old:
+            raise ConfigurationError(f"{head}{path} = {new!r}: allowed is {old!r}, with which {name} was begun")
+    if change.bench != before.bench or change.bench.endswith(".toml"):
+        named = bench_of(change, source)
+        if (named.name, named.specimen.name) != (bench.name, bench.specimen.name):
+            raise ConfigurationError(
+                f"{head}bench = {change.bench!r}, specimen {named.specimen.name}: allowed is {bench.name!r}, specimen "
+                f"{bench.specimen.name}, on which {name} was begun"
+            )
+    try:
+        change.check(bench)
+        check_length(change, bench)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{head}{error}") from None
+
+
+def changed_keys(before: dict[str, Any], after: dict[str, Any], path: str = "") -> list[str]:
+    """Dotted paths of the keys in which two tables differ, in alphabetical order."""
+    out = []
+    for key in sorted({*before, *after}):
+        old, new = before.get(key), after.get(key)
+        if isinstance(old, dict) and isinstance(new, dict):
+            out += changed_keys(old, new, f"{path}{key}.")
+        elif old != new:
+            out.append(f"{path}{key}")
+    return out

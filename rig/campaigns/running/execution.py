@@ -1,0 +1,344 @@
+"""Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from controller import LockState
+from rig.bench import Bench
+from rig.campaigns.evaluation.measured_together import round_at
+from rig.campaigns.evaluation.plausibility import with_plausibility
+from rig.campaigns.evaluation.quality import what_was_skipped
+from rig.campaigns.evaluation.vibrations import failed_point
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.planning.plan import Plan
+from rig.campaigns.running.advice import Before, Trip, advice_on
+from rig.campaigns.running.device_remarks import flag_names, with_device_remarks
+from rig.campaigns.running.evaluations import Evaluations
+from rig.campaigns.running.kept_rows import KeptRows
+from rig.campaigns.running.trips import tripped_at
+from rig.errors import RecordingError
+from rig.loop.loop import LoopStatistics, RunningLoop
+from rig.recording.journal import JournalWriter
+from rig.system.stop_signals import asking, held
+from rig.tick.safety.layout import TEXT, EndReason, GuardMode
+from rig.tick.safety.limits import describe_end, end_reason_of
+from rig.tick.sequencer.layout import Outcome, SegmentKind
+from rig.tick.tick import Tick
+
+__all__ = ["Execution", "Progress", "Silent", "nothing_left"]
+
+EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
+NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
+UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED, Outcome.NOT_SETTLED}
+OVER = {
+    Outcome.DONE,
+    Outcome.NOT_SETTLED,
+    Outcome.DISTURBED,
+    Outcome.LOST_LOCK,
+    Outcome.UNREACHABLE,
+    Outcome.OUTSIDE_WINDOW,
+    Outcome.NOT_LOCKED,
+}
+
+
+class Progress(Protocol):
+    """Whoever wants to watch a run."""
+
+    def point(self, point: dict[str, Any], number: int, total: int) -> None:
+        """A point is done, measured or failed; ``number`` of ``total``."""
+
+    def advance(self, rows: np.ndarray, tick: Tick) -> None:
+        """A chunk of telemetry has come in."""
+
+    def remark(self, text: str) -> None:
+        """The driver has something to say about the bench."""
+
+
+class Silent:
+    """Watches and says nothing."""
+
+    def point(self, point: dict[str, Any], number: int, total: int) -> None:
+        """Nothing."""
+
+    def advance(self, rows: np.ndarray, tick: Tick) -> None:
+        """Nothing."""
+
+    def remark(self, text: str) -> None:
+        """Nothing."""
+
+
+class Execution:
+    """One part of a recording: the loop, what is written of it, and the points that come out."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        bench: Bench,
+        loop: RunningLoop,
+        journal: JournalWriter,
+        progress: Progress,
+        done: frozenset[int] = frozenset(),
+        numbers: Sequence[int] | None = None,
+        before: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
+        self.journal, self.progress = journal, progress
+        self.measure = KINDS[plan.kind].measure
+        self.in_one_go = KINDS[plan.kind].in_one_go
+        self.targets = plan.targets()
+        self.measured_before = done
+        self.numbers = range(len(self.targets)) if numbers is None else numbers
+        self.known = list(before)
+        self.done = len(done)
+        self.finished = self.done
+        self.accepted = self.done
+        self.reported: dict[int, dict[str, Any]] = {}
+        self.next_segment = 0
+        self.locked = any(point["accepted"] for point in before)
+        self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
+        self.kept = KeptRows(loop.tick.row_dtype)
+        self.evaluations = Evaluations()
+        self.write_error: RecordingError | None = None
+        self.failure: BaseException | None = None
+
+    def go(self, information: Mapping[str, Any]) -> None:
+        """Run to the end of the plan or of what can be done of it; raises only what could not be recorded.
+
+        ``information`` is what is said of the part before its first row.
+        """
+        flags = {"points_done": self.finished, "device_flags": flag_names(self.loop.counters)}
+        self._write(self.journal.part, {**information, **flags})
+        for remark in self.loop.remarks:
+            self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
+            self._attempt(self.progress.remark, remark)
+        with held():  # from the last sample to the end in the journal
+            with asking(self.loop.request_stop):
+                try:
+                    for rows in self.loop.run():
+                        self._take(rows)
+                except BaseException as error:  # also what interrupted the loop: its end is recorded all the same
+                    self.failure = self.failure or error
+                    self.loop.bring_down()
+            self._report_rest()
+            self._attempt(self._mark_interrupted)
+            self._report_rest()
+            self._attempt(self._mark_unlocked)
+            self.evaluations.close()
+            self._write(self.journal.end, self._end())
+        if self.failure is not None:
+            raise self.failure
+        if self.write_error is not None:
+            raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
+
+    def _take(self, rows: np.ndarray) -> None:
+        """Record and evaluate a chunk."""
+        self._write(self.journal.rows, rows)
+        self._attempt(self._note_changes, rows)
+        self._attempt(self._collect, rows)
+        self._attempt(self.progress.advance, rows, self.tick)
+
+    def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
+        """Do what is not the loop; where it fails, the rig is ramped down first and the failure raised at the end."""
+        if self.failure is None:
+            self._anyway(step, *arguments)
+
+    def _anyway(self, step: Callable[..., Any], *arguments: Any) -> Any:
+        """The same after a failure; returns what the step does, or None where it fails."""
+        try:
+            return step(*arguments)
+        except BaseException as error:  # whatever it is: a driven rig is brought down before anything is said
+            self.failure = self.failure or error
+            self.loop.request_stop()
+            return None
+
+    def _write(self, method: Any, what: Any) -> None:
+        """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""
+        if self.write_error is not None:
+            return
+        try:
+            method(what)
+        except RecordingError as error:
+            self.write_error = error
+            self.loop.request_stop()
+
+    def _note_changes(self, rows: np.ndarray) -> None:
+        """Every change of lock state and guard becomes an event, with its sample."""
+        first = self.tick.sample - rows.size
+        events: list[dict[str, Any]] = []
+        for name, kind in (("lock", LockState), ("guard", GuardMode)):
+            values = np.concatenate([[self.last[name]], rows[name]])
+            for index in np.flatnonzero(np.diff(values.astype(int))):
+                state = kind(int(rows[name][index])).name.lower()
+                self.locked = self.locked or state == "locked"
+                events.append({"sample": first + int(index), "what": name, "state": state})
+            self.last[name] = int(rows[name][-1])
+        for event in sorted(events, key=lambda event: event["sample"]):
+            self._write(self.journal.event, event)
+
+    def _collect(self, rows: np.ndarray) -> None:
+        """Keep the rows of the point under way, and have the points evaluated that are over."""
+        self.kept.add(self.tick.sample - rows.size, rows)
+        outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
+        while self.next_segment < segments.size:
+            if self.in_one_go and int(segments[self.next_segment]["point"]) >= 0:
+                if not self._finish_round():
+                    break
+                continue
+            entry, kind = outcomes[self.next_segment], int(segments[self.next_segment]["kind"])
+            code = Outcome(int(entry["outcome"]))
+            if code not in OVER and code is not Outcome.SKIPPED:
+                break
+            number = int(segments[self.next_segment]["point"])
+            if number >= 0 and code is not Outcome.SKIPPED:
+                target = self.targets[number]
+                if code is not Outcome.DONE:
+                    self.evaluations.known(failed_point(self.plan, target, entry, locked=self.locked))
+                elif kind in EVALUATED:
+                    settling = outcomes[self.next_segment - 1].copy()
+                    rows = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
+                    self.evaluations.ask(self._measured, first, rows, target, settling)
+            self.next_segment += 1
+        self.kept.drop_before(self._first_needed())
+        while self.evaluations if self.loop.waits else self.evaluations.ready():
+            for point in self.evaluations.take():
+                self._report(point)
+
+    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[dict[str, Any]]:
+        """The points that come out of rows which begin with sample ``first``."""
+        found = self.measure(self.bench, self.plan, target, rows, *told)
+        points = [
+            with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
+        ]
+        return [{**point, "first_sample": first, "end_sample": first + rows.size} for point in points]
+
+    def _report_rest(self) -> None:
+        """Wait for the points that are still being worked out, also after a failure elsewhere or in one of them."""
+        while self.evaluations:
+            for point in self._anyway(self.evaluations.take) or ():
+                self._anyway(self._report, point)
+
+    def _begin(self, segment: int) -> int:
+        """First sample of the rows that a segment is evaluated with."""
+        points = self.tick.arrays.segments["point"]
+        if self.plan.evaluates_approach:
+            while segment > 0 and points[segment - 1] == points[segment]:
+                segment -= 1
+        return int(self.tick.outcomes[segment]["first_sample"])
+
+    def _first_needed(self) -> int:
+        outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
+        index = self.next_segment
+        if index >= outcomes.size:
+            return self.tick.sample
+        running = int(outcomes[index]["outcome"]) == Outcome.RUNNING
+        of_a_point = int(segments[index]["point"]) >= 0
+        if self.in_one_go and of_a_point:
+            return self._begin(index) if int(outcomes[index]["outcome"]) != Outcome.PENDING else self.tick.sample
+        if self.plan.evaluates_approach and of_a_point:
+            approached = index > 0 and segments[index - 1]["point"] == segments[index]["point"]
+            return self._begin(index) if running or approached else self.tick.sample
+        records = int(segments[index]["kind"]) in EVALUATED
+        return self._begin(index) if records and running else self.tick.sample
+
+    def _finish_round(self, *, cut_short: bool = False) -> bool:
+        """Evaluate the points that are measured in one go, once all their segments are over or none will follow."""
+        numbers = self.plan.together(int(self.tick.arrays.segments[self.next_segment]["point"]))
+        found = round_at(self.tick, self.next_segment, numbers, cut_short=cut_short)
+        if found is None:
+            return False
+        first, passages = found.first_sample, found.passages
+        rows = self.kept.take(first, first + passages[-1].end)
+        targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
+        ended = self._why() if found.ended_early else ""
+        self.evaluations.ask(self._measured, first, rows, targets, passages, ended)
+        self.next_segment = found.end_segment
+        return True
+
+    def _report(self, point: dict[str, Any]) -> None:
+        """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
+        point = with_plausibility(self.bench, self.plan, point, self.known)
+        quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
+        point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
+        self.known.append(point)
+        self._write(self.journal.point, point)
+        self.reported[point["number"]] = point
+        self.finished += 1
+        self.accepted += 1 if point["accepted"] else 0
+        self.progress.point(point, self.finished, len(self.targets))
+
+    def _mark_unlocked(self) -> None:
+        """Without a lock at the start voltage all that is left of the plan has failed, and for that reason."""
+        if EndReason(int(self.tick.guard["reason"][0])) not in NO_LOCK:
+            return
+        entry = next(one for one in self.tick.outcomes[::-1] if int(one["outcome"]) in UNLOCKED)
+        for target in self.targets:
+            left = target.number not in self.measured_before
+            if left and self.numbers[target.number] not in self.reported:
+                self._report(failed_point(self.plan, target, entry, at_start=True))
+
+    def _mark_interrupted(self) -> None:
+        if self.in_one_go:
+            index, segments = self.next_segment, self.tick.arrays.segments
+            if index < segments.size and int(segments[index]["point"]) >= 0:
+                self._finish_round(cut_short=True)
+            return
+        for segment, entry in zip(self.tick.arrays.segments, self.tick.outcomes, strict=True):
+            if int(entry["outcome"]) == Outcome.INTERRUPTED and int(segment["point"]) >= 0:
+                number = int(segment["point"])
+                self._report(failed_point(self.plan, self.targets[number], entry, locked=self.locked))
+
+    def _end(self) -> dict[str, Any]:
+        reason = EndReason(int(self.tick.guard["reason"][0]))
+        if self.loop.failure is not None and not reason.is_trip:
+            reason = end_reason_of(self.loop.failure)  # it failed once the output was down, when it was stopped
+        return {
+            "completed": reason is EndReason.COMPLETED and self.accepted == len(self.targets) and self.failure is None,
+            "reason": reason.name.lower(),
+            "text": self._why(),
+            "tripped": reason.is_trip,
+            **(self._trip(reason) if reason.is_trip else {}),
+            "skipped": what_was_skipped(self.reported.values(), len(self.targets) - self.done),
+            "loop": self.loop.report,
+            "counters": self.loop.counters,
+        }
+
+    def _trip(self, reason: EndReason) -> dict[str, Any]:
+        """Where in the plan it tripped, what the cause most likely was, and what to do."""
+        at = tripped_at(self.tick, self.plan, self.targets)
+        frequency_hz = float(self.tick.arrays.loop["omega"][0]) / (2.0 * math.pi)
+        trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
+        recorded = [point for point in self.known if "harmonics" in point or point["accepted"]]
+        points = [point for point in recorded if point.get("quality") != "implausible"]
+        first = not points and (self.in_one_go or len(self.reported) <= 1)
+        advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
+        return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}
+
+    def _why(self) -> str:
+        """Why the output was brought down, in one sentence."""
+        reason = EndReason(int(self.tick.guard["reason"][0]))
+        if self.loop.failure is not None:
+            down = "" if reason.is_trip else f"{TEXT[reason]}, but the driver failed at the end: "
+            return f"{down}{self.loop.failure}"
+        if self.failure is not None and not self.loop.cause:
+            return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
+        return (
+            self.loop.cause
+            if self.loop.cause and reason == EndReason.STOP_REQUESTED
+            else describe_end(self.tick.guard, self.bench)
+        )
+
+
+def nothing_left(bench: Bench) -> dict[str, Any]:
+    """The end of a part in which nothing moved, for all that the plan asks for had been measured before."""
+    return {
+        "completed": True,
+        "reason": EndReason.COMPLETED.name.lower(),
+        "text": "nothing was left to measure",
+        "tripped": False,
+        "skipped": "",
+        "loop": LoopStatistics(bench.sample_rate_hz).report(0),
+        "counters": {},
+    }

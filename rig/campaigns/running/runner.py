@@ -1,0 +1,242 @@
+"""The runner: carries out a plan on a bench and records it. Every way out brings the output to 0 V."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import vibrolock
+from rig.arming.arming import Arm, armed
+from rig.arming.bench_memory import RememberedTrip, now, remember
+from rig.arming.run_facts import About, calibration_remarks
+from rig.bench import Bench
+from rig.bench.user_code import imported_code, refuse_code
+from rig.campaigns.planning.lengths import check_length
+from rig.campaigns.planning.plan import Plan
+from rig.campaigns.running.continuation import what_is_left
+from rig.campaigns.running.execution import Execution, Progress, Silent, nothing_left
+from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
+from rig.campaigns.running.trips import refuse_tripped
+from rig.errors import RigError
+from rig.loop.loop import RunningLoop
+from rig.loop.session import Session, open_session
+from rig.recording.header import Column, Header
+from rig.recording.journal import JournalWriter, journal_path
+from rig.recording.reader import Recording
+from rig.recording.store import continue_recording, finalise
+from rig.system.stop_signals import ended_in_order, held
+from rig.tick.layout import ROW_COLUMNS, recorded_row
+from rig.tick.safety.layout import EndReason
+from rig.tick.safety.limits import describe_end
+from rig.tick.sequencer.segments import Segment
+from rig.tick.tick import TickSettings
+
+__all__ = ["carry_out", "take_up"]
+
+
+@ended_in_order()
+def carry_out(
+    plan: Plan,
+    bench: Bench,
+    output: Path,
+    *,
+    seed: int = 0,
+    realtime: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+    arm: Arm = None,
+    about: About | None = None,
+) -> Recording:
+    """Carry out a plan from its beginning and record it in the HDF5 file ``output``.
+
+    Raises `ConfigurationError` before anything is started where plan and bench do not fit, `RecordingError` where the
+    file exists or cannot be written, `rig.errors.DaqError` where the driver cannot be started. A run that ends early
+    raises nothing: the recording's last part says how it ended. Where something physical would move it must be armed
+    (`rig.arming.arming`), else `rig.errors.NotArmed`; ``about`` is recorded with the part.
+    """
+    plan.check(bench)
+    check_length(plan, bench)
+    progress = progress or Silent()
+    _put_back(output, progress)
+    make_way(output, overwrite)
+    with open_session(bench, seed, realtime=realtime) as session:
+        facts = _facts(plan, bench, session, arm, about, progress)
+        header = Header(
+            kind=plan.kind,
+            configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
+            channels=[channel.model_dump(mode="json") for channel in bench.channels],
+            row_dtype=recorded_row(len(bench.channels)),
+            columns=[Column(**column) for column in ROW_COLUMNS],
+            software_version=vibrolock.__version__,
+            started=datetime.now(UTC).isoformat(timespec="seconds"),
+            seed=seed,
+        )
+        settings = _settings(plan, bench, plan.segments(bench.sample_rate_hz))
+        with (
+            set_aside(output),
+            _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
+            _started(session, settings, output) as loop,
+        ):
+            execution = Execution(plan, bench, loop, journal, progress)
+            execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
+    return _whole(output, progress)
+
+
+@ended_in_order()
+def take_up(
+    output: Path,
+    *,
+    change: Plan | None = None,
+    source: str | Path = "",
+    seed: int | None = None,
+    realtime: bool = False,
+    progress: Progress | None = None,
+    arm: Arm = None,
+    about: About | None = None,
+    retry_tripped: bool = False,
+    trust_code: bool = False,
+) -> Recording:
+    """Finish a run that was interrupted: finished points stay, the others are measured in a further part of the file.
+
+    Points that had failed are tried again. A ``change`` of the plan, read from ``source``, takes the place of the one in
+    force with that part: what it asks for and was accepted before is not measured again. ``seed`` draws the noise of the
+    part. A recording that is complete and asked for nothing new is returned as it is.
+
+    Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before, or that asks for a level
+    that tripped or a higher one, unless ``retry_tripped``, or for a bench with functions of the user's own, unless
+    ``trust_code``: whoever wrote the recording has named the module that is imported.
+    """
+    progress = progress or Silent()
+    _put_back(output, progress)
+    with Recording(output) as recording:
+        for number, part in enumerate(recording.parts):
+            if part.dropped_reason:
+                progress.remark(
+                    f"part {number}: {part.dropped_reason}; points whose results are missing are measured again"
+                )
+        left = what_is_left(recording, change, source)
+        # A further part draws its own noise: the same seed again would repeat the first part's.
+        drawn = (recording.seed or 0) + len(recording.parts) if seed is None else seed
+        information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
+        finished = recording.complete and not left.changed
+        before = recording.points
+        if not retry_tripped:
+            refuse_tripped(recording, left.plan, left.to_measure)
+    plan, bench = left.plan, left.bench
+    segments = plan.segments(bench.sample_rate_hz, left.done)
+    if segments and not trust_code:
+        refuse_code(bench, output.name)
+    if segments:
+        with open_session(bench, drawn, realtime=realtime) as session:
+            facts = _facts(plan, bench, session, arm, about, progress)
+            columns = [Column(**column) for column in ROW_COLUMNS]
+            rows = recorded_row(len(bench.channels))
+            with (
+                _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
+                _started(session, _settings(plan, bench, segments), output) as loop,
+            ):
+                execution = Execution(plan, bench, loop, journal, progress, left.done, left.numbers, before)
+                execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
+    elif not finished:
+        with continue_recording(output) as journal:
+            journal.part({**information, "points_done": len(left.done), "device_flags": []})
+            journal.end(nothing_left(bench))
+    return _whole(output, progress) if journal_path(output).exists() else Recording(output)
+
+
+def _put_back(output: Path, progress: Progress) -> None:
+    if told := put_back(output):
+        progress.remark(told)
+
+
+def _whole(output: Path, progress: Progress) -> Recording:
+    """The recording, its journal turned into its file; a signal meanwhile ends the program as soon as nothing can be lost."""
+    with held() as signals:
+        damaged = finalise(journal_path(output), output, signals.check)
+        forget_before(output)
+        if damaged is not None:
+            progress.remark(
+                f"the journal was damaged and is kept as {damaged.name}; `rig show {output}` says what was lost"
+            )
+        signals.check(recorded=output)
+    return Recording(output)
+
+
+def _facts(
+    plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress
+) -> dict[str, Any]:
+    """Arm the bench; who did, who runs the test on what, and what stands behind the driver."""
+    about = about or About()
+    facts = {
+        **about.facts(),
+        "armed": armed(bench, session, about.purpose or plan.kind, arm),
+        "device": session.identity,
+        "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
+        "code": imported_code(bench),
+    }
+    for remark in facts["remarks"]:
+        progress.remark(remark)
+    return facts
+
+
+def _lead(loop: RunningLoop) -> float:
+    """Samples from an output to the input that shows it."""
+    record = loop.tick.arrays.loop
+    return float(record["lead_whole"][0] + record["lead_fraction"][0])
+
+
+@contextmanager
+def _unless_empty(journal: JournalWriter) -> Iterator[JournalWriter]:
+    """A journal that is removed at the end where no part was begun in it, for nothing has run."""
+    try:
+        with journal:
+            yield journal
+    finally:
+        if journal.n_parts == 0:
+            journal.path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _started(session: Session, settings: TickSettings, output: Path) -> Iterator[RunningLoop]:
+    """A loop that was started. Of something physical it is remembered that it runs, and then that it tripped, if it did.
+
+    So a campaign that never comes to its end, or cannot write any more, leaves a word for the person who arms the next.
+    """
+    if session.capabilities.virtual:
+        yield session.start(settings)
+        return
+    bench, at = settings.bench, now()
+    text = f"a run into {output.absolute()} was under way at {at} and its end was never noted"
+    remember(bench, trip=RememberedTrip(at, text, ""))
+    try:
+        loop = session.start(settings)
+    except RigError:  # nothing but 0 V was put out
+        remember(bench, trip=None)
+        raise
+    try:
+        yield loop
+    finally:
+        _remember_end(bench, loop, output)
+
+
+def _remember_end(bench: Bench, loop: RunningLoop, output: Path) -> None:
+    """A trip, or a driver that failed at any time, is remembered; an orderly end takes back the word of a run under way."""
+    reason = EndReason(int(loop.tick.guard["reason"][0]))
+    if loop.failure is not None or reason.is_trip:
+        text = str(loop.failure) if loop.failure is not None else describe_end(loop.tick.guard, bench)
+        remember(bench, trip=RememberedTrip(now(), text, str(output.absolute())))
+    elif reason is not EndReason.NONE:
+        remember(bench, trip=None)
+
+
+def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:
+    return TickSettings(
+        bench,
+        plan.law,
+        plan.amplitude_law,
+        plan.settle_rule,
+        segments,
+        plan.waveforms(bench.sample_rate_hz),
+        plan.known_plant,
+    )

@@ -1,0 +1,98 @@
+"""At which level a run tripped, and what asks for it again."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rig.campaigns.planning.plan import Plan, Target
+from rig.errors import ConfigurationError
+from rig.recording.parts import Part
+from rig.recording.reader import Recording
+from rig.tick.sequencer.layout import Outcome
+from rig.tick.tick import Tick
+
+__all__ = ["TrippedAt", "refuse_tripped", "tripped_at"]
+
+NEVER_BEGUN = {Outcome.PENDING, Outcome.SKIPPED}
+ALMOST = 1.0 - 1e-9  # the last bits of a number make no other level
+
+
+class TrippedAt(NamedTuple):
+    """Where in a plan a run tripped."""
+
+    level: float
+    """The level."""
+    level_unit: str
+    """Its unit."""
+    start: bool
+    """Whether it is the voltage that sets the rig in motion (``start_v``), not a level of the plan."""
+
+    @property
+    def text(self) -> str:
+        """The level with its unit."""
+        return f"{self.level:.4g} {self.level_unit}{' at the start' if self.start else ''}"
+
+
+def tripped_at(tick: Tick, plan: Plan, targets: Sequence[Target]) -> TrippedAt | None:
+    """The level that was held, or on the way to which it was, when the output was brought down; None before the first."""
+    segments, codes = tick.arrays.segments, [Outcome(int(code)) for code in tick.outcomes["outcome"]]
+    index = max((i for i, code in enumerate(codes) if code not in NEVER_BEGUN), default=-1)
+    if index < 0:
+        return None
+    by_law = int(segments[index]["amplitude_law"]) == int(plan.amplitude_law)
+    level = float(segments[index]["level"])
+    if int(segments[index]["point"]) < 0 and level > 0.0:
+        return TrippedAt(level, plan.level_unit, start=False) if by_law else TrippedAt(level, "V", start=True)
+    points = segments["point"][: index + 1]
+    if not (points >= 0).any():
+        return None
+    number = int(points[np.flatnonzero(points >= 0)[-1]])
+    levels = [target.level for target in targets if target.number in plan.together(number)]
+    return TrippedAt(max(levels), plan.level_unit, start=False)
+
+
+def refuse_tripped(recording: Recording, plan: Plan, left: Sequence[Target]) -> None:
+    """Raise `ConfigurationError` where what is ``left`` to measure asks for a level that tripped, or a higher one.
+
+    A trip is forgotten once a point at its level, or a higher one, was accepted in a later part. One before the first level
+    is not met by any plan.
+    """
+    if not left:
+        return
+    for number, part in enumerate(recording.parts):
+        if part.end is None or not part.end["tripped"]:
+            continue
+        at = _said(part)
+        if at is not None and (_reached_since(recording.parts[number + 1 :], at) or not _asks_for(plan, left, at)):
+            continue
+        head = f"{recording.path.name}: the run tripped{'' if at is None else f' at {at.text}'} ({part.end['text']})"
+        lower = "" if at is None else f"--plan with levels below {at.text}, or "
+        if at is not None and at.start:
+            lower = f"--plan with start_v below {at.level:g}, or "
+        raise ConfigurationError(f"{head}; to go on: {lower}--retry-tripped (retry_tripped=True) to try it again")
+
+
+def _said(part: Part) -> TrippedAt | None:
+    """Where a part tripped; in files of earlier versions, where its last point failed."""
+    end = part.end or {}
+    if "tripped_at" in end:
+        return None if end["tripped_at"] is None else TrippedAt(**end["tripped_at"])
+    failed = [point for point in part.points if not point["accepted"]]
+    return TrippedAt(failed[-1]["level"], failed[-1]["level_unit"], start=False) if failed else None
+
+
+def _reached_since(parts: Sequence[Part], at: TrippedAt) -> bool:
+    """Whether a point at such a level, or a higher one, was accepted later; after a start, any."""
+    return any(_is_beyond(point, at) for part in parts for point in part.points if point["accepted"])
+
+
+def _is_beyond(point: Mapping[str, Any], at: TrippedAt) -> bool:
+    return at.start or (point["level_unit"] == at.level_unit and point["level"] >= ALMOST * at.level)
+
+
+def _asks_for(plan: Plan, left: Sequence[Target], at: TrippedAt) -> bool:
+    if at.start:
+        start_v = getattr(plan, "start_v", None)
+        return start_v is None or start_v >= ALMOST * at.level
+    return plan.level_unit != at.level_unit or any(target.level >= ALMOST * at.level for target in left)

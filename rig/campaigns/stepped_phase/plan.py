@@ -1,0 +1,169 @@
+"""The stepped-phase campaign: at a constant level through phase lags on both sides of resonance, unstable branches too."""
+
+import math
+from dataclasses import replace
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from rig.campaigns.planning.drift import with_first_repeated
+from rig.campaigns.planning.locked import SettledPlan
+from rig.campaigns.planning.plan import Target
+from rig.tick.sequencer.layout import OnFailure, SegmentKind
+from rig.tick.sequencer.segments import Segment
+
+__all__ = ["SteppedPhasePlan"]
+
+LAGS_DEG = (-175.0, -5.0)  # between, the force feeds the vibration, and a lag tells frequencies apart
+
+
+class SteppedPhasePlan(SettledPlan):
+    """Frequency responses at constant level, stepped through the phase instead of the frequency.
+
+    The frequency follows the phase lag that the plan asks for, so that over a fold of the response, where one frequency
+    has three vibrations, every lag still has one. Each level is approached from ``start_v`` at the first lag.
+    """
+
+    kind: Literal["stepped-phase"] = "stepped-phase"
+    """Kind of campaign."""
+    phase_lags_deg: tuple[float, ...] | None = Field(None, min_length=1)
+    """Lags of the drive-point acceleration behind the force, deg; these or ``start_deg`` and ``stop_deg``."""
+    start_deg: float | None = None
+    """Lowest lag, deg; -90 is phase resonance, lower ones lie below it in frequency."""
+    stop_deg: float | None = None
+    """Highest lag, deg."""
+    step_deg: float = Field(10.0, gt=0, le=90)
+    """Distance of neighbouring lags, deg; the last step may be shorter."""
+    direction: Literal["up", "down", "up-down"] = "up"
+    """Whether the lag rises, falls, or rises and falls."""
+    repeat_first: bool = False
+    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
+    approach_deg: float | None = None
+    """Lag at which a level is reached before the first lag is stepped to, deg; the first lag if not given."""
+    approach_periods: float = Field(40.0, ge=1, le=1e5)
+    """Length of the ramp to a level, periods."""
+    ramp_periods: float = Field(10.0, ge=1, le=1e5)
+    """Length of the ramp from one lag to the next, periods."""
+    record_periods: int = Field(20, ge=4, le=1_000_000)
+    """Periods that are recorded and evaluated at each point."""
+    accepted_level_error: float = Field(0.01, gt=0, le=1)
+    """Largest relative error of the held force or response over the record with which a point is accepted."""
+
+    @model_validator(mode="after")
+    def _lags_make_sense(self) -> Self:
+        given = [name for name in ("start_deg", "stop_deg") if getattr(self, name) is not None]
+        if (self.phase_lags_deg is not None) == bool(given) or len(given) == 1:
+            raise ValueError("phase_lags_deg, or start_deg and stop_deg: exactly one of the two is to be given")
+        low, high = LAGS_DEG
+        named = [(name, getattr(self, name)) for name in (*given, "approach_deg")]
+        named += [(f"phase_lags_deg[{index}]", lag) for index, lag in enumerate(self.phase_lags_deg or ())]
+        for name, lag in named:
+            if lag is not None and not low <= lag <= high:
+                raise ValueError(f"{name} = {lag:g}: allowed is {low:g} to {high:g}")
+        if self.start_deg is not None and self.stop_deg is not None and not self.start_deg < self.stop_deg:
+            raise ValueError(
+                f"stop_deg = {self.stop_deg:g}: allowed is above start_deg; direction says which way to go"
+            )
+        if len(set(self.lags)) != len(self.lags):
+            raise ValueError("phase_lags_deg: a lag is given twice; use repeats to measure lags again")
+        if self.controller.phase_lag_deg != -90.0:
+            raise ValueError(
+                f"controller.phase_lag_deg = {self.controller.phase_lag_deg:g}: the plan gives the lags, leave it out"
+            )
+        if self.controller.detector == "sign" and self.lags != (-90.0,):
+            raise ValueError(
+                'controller.detector = "sign": it knows phase resonance only, allowed is two-phase or adaptive'
+            )
+        return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels, lags, ways and repeats."""
+        if self.start_deg is None or self.stop_deg is None:
+            lags = {"phase_lags_deg": len(self.phase_lags_deg or ())}
+        else:
+            lags = {"step_deg": max(1, math.ceil(min(1e9, (self.stop_deg - self.start_deg) / self.step_deg)) + 1)}
+        return {**super().counts, **lags, "direction": 2 if self.direction == "up-down" else 1}
+
+    @property
+    def asked_lags_deg(self) -> tuple[float, ...]:
+        """Every lag that is held, deg."""
+        return self.lags if self.approach_deg is None else tuple(sorted({*self.lags, self.approach_deg}))
+
+    @property
+    def lags(self) -> tuple[float, ...]:
+        """All lags, rising, deg."""
+        if self.start_deg is None or self.stop_deg is None:
+            return tuple(sorted(self.phase_lags_deg or ()))
+        steps = np.arange(self.start_deg, self.stop_deg - 1e-6 * self.step_deg, self.step_deg)
+        return (*(float(lag) for lag in steps), self.stop_deg)
+
+    def targets(self) -> tuple[Target, ...]:
+        """All points: every lag at the first level, then at the next."""
+        rising, falling = [(lag, "up") for lag in self.lags], [(lag, "down") for lag in self.lags[::-1]]
+        way = {"up": rising, "down": falling, "up-down": rising + falling[1:]}[self.direction]
+        passes = [(level, repeat) for level in self.levels for repeat in range(1, self.repeats + 1)]
+        targets = tuple(
+            Target.model_validate(
+                {"number": number, "level": level, "direction": to, "repeat": repeat, "phase_lag_deg": lag}
+            )
+            for number, (level, repeat, lag, to) in enumerate((*one, *point) for one in passes for point in way)
+        )
+        return with_first_repeated(targets) if self.repeat_first else targets
+
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+        """The segments that measure all points but those ``done`` already.
+
+        A point whose predecessor is done is stepped to from its predecessor's lag, so that it is reached from the recorded
+        direction.
+        """
+        failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
+        out: list[Segment] = []
+        at: int | None = None
+        before: Target | None = None
+        for target in self.targets():
+            origin = before if before is not None and _same_pass(before, target) else None
+            before = target
+            if target.number in done:
+                continue
+            if origin is None or origin.number != at:
+                out += self._approach(target, origin)
+            point = Segment(
+                SegmentKind.RAMP,
+                target.number,
+                target.level,
+                self.ramp_periods,
+                lag_deg=target.phase_lag_deg,
+                geometric=True,
+            )
+            longest, periods = self.settle.longest_periods, self.record_periods + 1.0
+            failing = replace(point, on_failure=failure, on_lost_lock=lost)
+            out += [
+                point,
+                replace(failing, kind=SegmentKind.SETTLE, periods=longest),
+                replace(failing, kind=SegmentKind.RECORD, periods=periods),
+            ]
+            at = target.number
+        return tuple(out)
+
+    def _approach(self, target: Target, origin: Target | None) -> list[Segment]:
+        """From whatever was before to the target's level, at ``approach_deg``, then at the lag of the ``origin``."""
+        first = _lag(origin or target) if self.approach_deg is None else self.approach_deg
+        ramp = Segment(SegmentKind.RAMP, -1, target.level, self.approach_periods, lag_deg=first, geometric=True)
+        hold = replace(ramp, kind=SegmentKind.HOLD, periods=float(2 * self.settle.average_periods))
+        out = [*self.start_segments(lag_deg=first), ramp]
+        if origin is not None and _lag(origin) != first:
+            steps = max(1.0, abs(_lag(origin) - first) / self.step_deg)
+            out += [hold, replace(ramp, lag_deg=_lag(origin), periods=steps * self.ramp_periods)]
+        return [*out, replace(hold, lag_deg=_lag(origin))] if origin is not None else out
+
+
+def _same_pass(before: Target, target: Target) -> bool:
+    """Whether a point lies on the way that the one before it is on."""
+    return (before.level, before.repeat, before.repeats_first) == (target.level, target.repeat, target.repeats_first)
+
+
+def _lag(target: Target) -> float:
+    """The lag that is asked for, deg."""
+    return 0.0 if target.phase_lag_deg is None else target.phase_lag_deg

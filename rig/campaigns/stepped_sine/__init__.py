@@ -1,0 +1,1 @@
+"""The stepped-sine campaign."""

@@ -1,0 +1,145 @@
+"""The stepped-sine campaign: frequencies given, step by step, at a given voltage or a held force or displacement."""
+
+from functools import partial
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from controller import AmplitudeLaw
+from rig.bench import Bench
+from rig.campaigns.planning.plan import Target, TonePlan
+from rig.errors import ConfigurationError
+from rig.tick.sequencer.layout import OnFailure, SegmentKind
+from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
+
+__all__ = ["SteppedSinePlan"]
+
+
+class SteppedSinePlan(TonePlan):
+    """Vibrations at given frequencies and levels; a single frequency makes it a sine test.
+
+    Every point is approached by a half-cosine ramp of frequency and level, settled by the amplitudes of force and response in
+    ``settle``, and recorded over whole periods. Where two responses exist at one frequency and voltage or force, the
+    direction decides which is found; the unstable one never is. A held displacement has one force at every frequency.
+    """
+
+    kind: Literal["stepped-sine"] = "stepped-sine"
+    """Kind of campaign."""
+    frequencies_hz: tuple[float, ...] | None = None
+    """Frequencies, in the order of measurement, Hz."""
+    start_hz: float | None = Field(None, gt=0)
+    """First frequency, in place of ``frequencies_hz``, Hz."""
+    stop_hz: float | None = Field(None, gt=0)
+    """Last frequency, Hz; below ``start_hz`` to step down."""
+    steps: int = Field(50, ge=2, le=100_000)
+    """Number of frequencies from the first to the last."""
+    spacing: Literal["linear", "logarithmic"] = "linear"
+    """How they are spaced."""
+    ramp_periods: float = Field(10.0, ge=1, le=1e5)
+    """Length of the ramp from one point to the next, periods."""
+    record_periods: int = Field(20, ge=4, le=1_000_000)
+    """Periods that are recorded and evaluated at each point."""
+    harmonics: int = Field(7, ge=1, le=50)
+    """Highest harmonic that is evaluated."""
+    settle: SettleRule = SettleRule(settled_periods=10)
+    """When a point counts as settled; its phase error is not asked for."""
+    accepted_drift: float = Field(0.05, gt=0, le=1)
+    """Largest change of the fundamental of force or drive over a record, relative, with which a point is accepted."""
+    accepted_level_error: float = Field(0.01, gt=0, le=1)
+    """Largest deviation of a recorded force or displacement from its level, relative, with which a point is accepted; of no
+    meaning with levels in volts."""
+    on_failure: Literal["skip", "stop"] = "skip"
+    """What follows when a point does not settle or is disturbed: the next point, or a ramp-down."""
+
+    @model_validator(mode="after")
+    def _frequencies_make_sense(self) -> Self:
+        if (self.frequencies_hz is None) == (self.start_hz is None) or (self.start_hz is None) != (
+            self.stop_hz is None
+        ):
+            raise ValueError("frequencies_hz: exactly one of it and of start_hz with stop_hz is to be given")
+        for index, frequency_hz in enumerate(self.frequencies_hz or ()):
+            if not frequency_hz > 0.0:
+                raise ValueError(f"frequencies_hz[{index}] = {frequency_hz:g}: allowed is above 0")
+        if not self.frequencies_at_each_level:
+            raise ValueError("frequencies_hz = []: at least one frequency is needed")
+        return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Levels and frequencies."""
+        if self.frequencies_hz is not None:
+            return {**super().counts, "frequencies_hz": len(self.frequencies_hz)}
+        return {**super().counts, "steps": self.steps}
+
+    @property
+    def frequencies_at_each_level(self) -> tuple[float, ...]:
+        """All frequencies in the order of measurement, Hz."""
+        if self.start_hz is None or self.stop_hz is None:
+            return self.frequencies_hz or ()
+        spaced = np.linspace if self.spacing == "linear" else np.geomspace
+        return tuple(float(f) for f in spaced(self.start_hz, self.stop_hz, self.steps))
+
+    @property
+    def settle_rule(self) -> SettleRule:
+        """When a point counts as settled."""
+        return self.settle
+
+    def targets(self) -> tuple[Target, ...]:
+        """All points: every frequency at the first level, then at the next."""
+        frequencies = self.frequencies_at_each_level
+        up = len(frequencies) < 2 or frequencies[1] >= frequencies[0]
+        return tuple(
+            Target(number=number, level=level, direction="up" if up else "down", frequency_hz=frequency_hz)
+            for number, (level, frequency_hz) in enumerate((v, f) for v in self.levels for f in frequencies)
+        )
+
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+        """The segments that measure all points but those ``done``; a new level begins from rest at its first frequency.
+
+        Points that are done are passed through on the way to the others of their level: where two responses exist, the way
+        decides which is found.
+        """
+        targets = self.targets()
+        last_of_level = {target.level: target.number for target in targets if target.number not in done}
+        out: list[Segment] = []
+        before: Target | None = None
+        for target in targets:
+            if target.number > last_of_level.get(target.level, -1):
+                continue
+            tone = Excitation(target.frequency_hz or 0.0)
+            number = -1 if target.number in done else target.number
+            if before is not None and before.level != target.level:
+                rest = partial(Segment, SegmentKind.RAMP, level=0.0, amplitude_law=AmplitudeLaw.VOLTAGE)
+                out.append(rest(point=-1, periods=self.ramp_periods, excitation=out[-1].excitation))
+                out.append(rest(point=number, periods=1.0, excitation=tone))
+            if before is None or before.level != target.level:
+                out += self.start_segments(excitation=tone)
+            out += self._at(target, number, tone)
+            before = target
+        return tuple(out)
+
+    def _at(self, target: Target, number: int, tone: Excitation) -> list[Segment]:
+        """The segments of a point, or the ramp through one that is done (-1)."""
+        at = partial(Segment, point=number, level=target.level, excitation=tone)
+        ramp = at(
+            kind=SegmentKind.RAMP, periods=self.ramp_periods, geometric=self.amplitude_law is AmplitudeLaw.RESPONSE
+        )
+        if number < 0:
+            return [ramp]
+        failure = OnFailure[self.on_failure.upper()]
+        settle = at(kind=SegmentKind.SETTLE, periods=self.settle.longest_periods, on_failure=failure)
+        record = at(kind=SegmentKind.RECORD, periods=self.record_periods + 1.0, on_failure=failure)
+        return [ramp, settle, record]
+
+    def check(self, bench: Bench) -> None:
+        """Refuse levels and frequencies beyond the bench's limits."""
+        frequencies = self.frequencies_at_each_level
+        self.check_levels(bench, (min(frequencies), max(frequencies)))
+        self.check_frequencies(bench, **{"lowest frequency": min(frequencies), "highest frequency": max(frequencies)})
+        highest = int(bench.sample_rate_hz / max(frequencies) / 2.0) - 1
+        if self.harmonics > highest:
+            raise ConfigurationError(
+                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s and "
+                f"{max(frequencies):g} Hz"
+            )

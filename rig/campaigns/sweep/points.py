@@ -1,0 +1,162 @@
+"""From the recorded rows of a sweep to its result, and to fundamentals over time."""
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from controller import AmplitudeLaw
+from identification import IdentificationError, Transient, demodulate, force_drop_out
+from rig.bench import Bench
+from rig.campaigns.evaluation.gaps import bridged, lost_rows, rms_of
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, head, skew_turn
+from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.sweep.plan import SweepPlan
+from rig.tick.layout import SATURATED
+
+__all__ = ["SWEEP_COLUMNS", "measure_sweep", "transient_of"]
+
+NOT_HELD = 0.05  # of its level: a deviation that is said
+USUAL = 0.75  # of a sweep: over so much of it the level is to be held
+
+SWEEP_COLUMNS = (
+    Column("off_resonance_n", "force off resonance", "N", ".4f"),
+    Column("minimum_ratio", "smallest", "%", ".2f", 100.0),
+    Column("minimum_frequency_hz", "at", "Hz", ".3f"),
+    Column("overshoot_ratio", "then up to", "%", ".1f", 100.0),
+    Column("held_least", "held from", "%", ".1f", 100.0, optional=True),
+    Column("held_most", "to", "%", ".1f", 100.0, optional=True),
+    Column("peak_m", "peak", "mm", ".4f", 1e3),
+    Column("peak_frequency_hz", "at", "Hz", ".3f"),
+)
+
+
+def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, settling: np.void) -> dict[str, Any]:
+    """The result of a recorded sweep: a transient vibration, that nothing was asked to settle in."""
+    point = head(plan, target)
+    try:
+        transient = transient_of(bench, rows)
+        drop_out = force_drop_out(transient, off_resonance_hz=plan.off_resonance_hz)
+    except (IdentificationError, ArithmeticError) as error:
+        return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+    held = _held(bench, plan, target, rows, transient)
+    held["warnings"] += _gaps(transient, rows)
+    reason = _level_objection(plan, held.get("held_usual_error"))
+    return {
+        **point,
+        "settled": None,
+        "accepted": not reason,
+        "reason": reason,
+        **asdict(drop_out),
+        "minimum_ratio": drop_out.minimum_ratio,
+        "overshoot_ratio": drop_out.overshoot_ratio,
+        "channel_rms": rms_of(rows),
+        "duration_s": rows.size / bench.sample_rate_hz,
+        **held,
+    }
+
+
+def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
+    """Where a sweep has holes: what happened there, the smallest force perhaps, is not known."""
+    lost = lost_rows(rows)
+    if not lost.any():
+        return []
+    usual = float(np.median(np.diff(transient.time_s))) if transient.time_s.size > 1 else 0.0
+    holes = np.flatnonzero(np.diff(transient.time_s) > 1.5 * usual)
+    where = ", ".join(f"{transient.frequency_hz[hole]:.3f}" for hole in holes[:5])
+    return (
+        [f"nothing is known about {where}{' Hz and more' if holes.size > 5 else ' Hz'}: samples were lost"]
+        if where
+        else []
+    )
+
+
+def _level_objection(plan: SweepPlan, error: float | None) -> str:
+    """That what was held was too far from its level, jumps aside: through these no loop holds it."""
+    if error is None or error <= plan.accepted_level_error:
+        return ""
+    held = "displacement" if plan.level_unit == "m" else "force"
+    return (
+        f"the {held} is more than {100.0 * error:.3g} % off its level in {100.0 * (1.0 - USUAL):.0f} % of the sweep, "
+        f"accepted up to {100.0 * plan.accepted_level_error:g} %"
+    )
+
+
+def _held(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, transient: Transient) -> dict[str, Any]:
+    """Least and largest of what a loop held, over its level; where that was; and what stood in its way."""
+    if plan.amplitude_law is AmplitudeLaw.VOLTAGE:
+        return {"warnings": []}
+    held = _course(bench, plan, rows, transient) / target.level
+    least, most = int(np.argmin(held)), int(np.argmax(held))
+    share = float(np.mean((rows["flags"] & SATURATED) != 0))
+    warnings = [f"the output stood at its limit in {100.0 * share:.2g} % of the sweep"] if share else []
+    for name, place in (("fell to", least), ("rose to", most)):
+        if abs(held[place] - 1.0) > NOT_HELD:
+            where = f"{100.0 * held[place]:.1f} % of its level at {transient.frequency_hz[place]:.3f} Hz"
+            warnings.append(f"the {'displacement' if plan.level_unit == 'm' else 'force'} {name} {where}")
+    return {
+        "held_least": float(held[least]),
+        "held_least_frequency_hz": float(transient.frequency_hz[least]),
+        "held_most": float(held[most]),
+        "held_most_frequency_hz": float(transient.frequency_hz[most]),
+        "held_rms_error": float(np.sqrt(np.mean((held - 1.0) ** 2))),
+        "held_usual_error": float(np.quantile(np.abs(held - 1.0), USUAL)),
+        "saturated_share": share,
+        "warnings": warnings,
+    }
+
+
+def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transient) -> np.ndarray:
+    """float[n]: what was held, over the transient's instants: the force, its RMS over two periods, or the displacement."""
+    if plan.amplitude_law is AmplitudeLaw.FORCE:
+        return np.asarray(np.abs(transient.force))
+    roles = [channel.role for channel in bench.channels]
+    if plan.amplitude_law is AmplitudeLaw.RESPONSE:
+        acceleration = np.abs(transient.fundamentals[roles.index("drive")])
+        return np.asarray(acceleration / (2.0 * np.pi * transient.frequency_hz) ** 2)
+    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * np.pi)
+    force = bridged(rows)[:, roles.index("force")]
+    sums = np.cumsum([force, force**2], axis=1)
+    instants = np.interp(transient.time_s * bench.sample_rate_hz, np.arange(turns.size), turns)
+    ends = np.clip(np.add.outer((-1.0, 1.0), instants), turns[0], turns[-1])
+    samples = np.interp(ends, turns, np.arange(turns.size))
+    mean, square = (np.diff(np.interp(ends, turns, one), axis=0)[0] / np.diff(samples, axis=0)[0] for one in sums)
+    return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0)))
+
+
+def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
+    """Fundamentals over time of recorded rows: every input, its skew taken out, and the output as channel ``voltage``.
+
+    Where samples were lost there are no instants. Raises `identification.IdentificationError` where none is left.
+    """
+    lost = lost_rows(rows)
+    inputs = bridged(rows) if lost.any() else rows["inputs"]
+    signals = np.vstack([inputs.T, rows["output_v"]])
+    transient = demodulate(
+        rows["theta_rad"],
+        signals,
+        (*channels_of(bench), VOLTAGE),
+        sample_rate_hz=bench.sample_rate_hz,
+    )
+    without_skew = transient.fundamentals.copy()
+    without_skew[:-1] *= skew_turn(bench, transient.frequency_hz)
+    return _without_gaps(replace(transient, fundamentals=without_skew), lost, bench.sample_rate_hz)
+
+
+def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float) -> Transient:
+    """Without the instants within whose window samples were lost."""
+    if not lost.any():
+        return transient
+    count = np.concatenate([[0], np.cumsum(lost)])
+    half = 0.5 * transient.window_periods / transient.frequency_hz
+    first, end = (
+        np.clip(np.rint((transient.time_s + side * half) * sample_rate_hz), 0, lost.size).astype(int)
+        for side in (-1, 1)
+    )
+    keep = count[end] == count[first]
+    return replace(
+        transient,
+        time_s=transient.time_s[keep],
+        frequency_hz=transient.frequency_hz[keep],
+        fundamentals=transient.fundamentals[:, keep],
+    )

@@ -1,0 +1,150 @@
+"""``rig analyse``: what can be known of a virtual bench without a test."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rig.analysis.study import Study
+    from rig.analysis.subject import Subject
+
+__all__ = ["app"]
+
+app = typer.Typer(no_args_is_help=True, help="What can be known of a virtual bench without a test.")
+
+BenchName = Annotated[str, typer.Option("--bench", help="Shipped bench or TOML file, with the virtual driver.")]
+NearHz = Annotated[float | None, typer.Option(help="Mode under test, nearest to this, Hz; default: the bench's.")]
+Figure = Annotated[Path | None, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")]
+Json = Annotated[bool, typer.Option("--json", help="Print all numbers as one JSON document; complex as pairs re, im.")]
+Harmonics = Annotated[int, typer.Option(help="Highest harmonic that is balanced.", min=1, max=200)]
+
+
+@app.command("modes")
+def modes_(bench: BenchName, near_hz: NearHz = None, output: Figure = None, json: Json = False) -> None:
+    """Linear modes of the structure, with their shapes at the channels, and of the coupled rig."""
+    from rig.analysis.modes import modes
+
+    _show(bench, near_hz, modes, output, json)
+
+
+@app.command("responses")
+def responses_(
+    bench: BenchName,
+    from_hz: Annotated[float | None, typer.Option(help="Lowest frequency, Hz.")] = None,
+    to_hz: Annotated[float | None, typer.Option(help="Highest frequency, Hz.")] = None,
+    points: Annotated[int, typer.Option(help="Number of frequencies, beside more around every resonance.")] = 500,
+    near_hz: NearHz = None,
+    output: Figure = None,
+    json: Json = False,
+) -> None:
+    """Linear frequency responses: voltage to force and accelerations, force to accelerations."""
+    from rig.analysis.linear_responses import responses
+
+    _show(bench, near_hz, lambda subject: responses(subject, from_hz=from_hz, to_hz=to_hz, points=points), output, json)
+
+
+@app.command("backbone")
+def backbone_(
+    bench: BenchName,
+    from_n: Annotated[float | None, typer.Option(help="Lowest force, N (peak of the fundamental).")] = None,
+    to_n: Annotated[float | None, typer.Option(help="Highest force, N; default: as the bench's limits allow.")] = None,
+    from_v: Annotated[float | None, typer.Option(help="Lowest voltage, V, instead of a force.")] = None,
+    to_v: Annotated[float | None, typer.Option(help="Highest voltage, V, instead of a force.")] = None,
+    points: Annotated[int, typer.Option(help="Number of levels.")] = 15,
+    near_hz: NearHz = None,
+    harmonics: Harmonics = 15,
+    output: Figure = None,
+    json: Json = False,
+) -> None:
+    """Phase-resonance backbone by harmonic balance of the coupled rig, with the hysteresis of its joints."""
+    from rig.analysis.backbone import backbone
+    from rig.errors import ConfigurationError
+
+    by_voltage = from_v is not None or to_v is not None
+    if by_voltage and (from_n is not None or to_n is not None):
+        raise ConfigurationError("--from-v, --to-v: given with --from-n or --to-n, allowed is one of the two")
+    _show(
+        bench,
+        near_hz,
+        lambda subject: backbone(
+            subject,
+            by="voltage" if by_voltage else "force",
+            lowest=from_v if by_voltage else from_n,
+            highest=to_v if by_voltage else to_n,
+            points=points,
+            harmonics=harmonics,
+        ),
+        output,
+        json,
+    )
+
+
+@app.command("constant-force")
+def constant_force_(
+    bench: BenchName,
+    force_n: Annotated[list[float] | None, typer.Option(help="Peak of the fundamental force, N; repeatable.")] = None,
+    points: Annotated[int, typer.Option(help="Number of phase lags along each curve.")] = 141,
+    near_hz: NearHz = None,
+    harmonics: Harmonics = 15,
+    output: Figure = None,
+    json: Json = False,
+) -> None:
+    """Response curves at constant force with their unstable branches, and the backbone."""
+    from rig.analysis.constant_force import constant_force
+
+    _show(
+        bench,
+        near_hz,
+        lambda subject: constant_force(subject, force_n or (), points=points, harmonics=harmonics),
+        output,
+        json,
+    )
+
+
+@app.command("forced")
+def forced_(
+    bench: BenchName,
+    voltage_v: Annotated[float | None, typer.Option(help="Amplitude of the voltage, V.")] = None,
+    from_hz: Annotated[float | None, typer.Option(help="Lowest frequency, Hz.")] = None,
+    to_hz: Annotated[float | None, typer.Option(help="Highest frequency, Hz.")] = None,
+    points: Annotated[int, typer.Option(help="Number of frequencies, half of them around resonance.")] = 401,
+    near_hz: NearHz = None,
+    harmonics: Harmonics = 15,
+    output: Figure = None,
+    json: Json = False,
+) -> None:
+    """Steady response to a constant voltage, up and down: what a slow uncontrolled sweep sees."""
+    from rig.analysis.forced import forced
+
+    _show(
+        bench,
+        near_hz,
+        lambda subject: forced(
+            subject, voltage_v=voltage_v, from_hz=from_hz, to_hz=to_hz, points=points, harmonics=harmonics
+        ),
+        output,
+        json,
+    )
+
+
+def _show(
+    bench: str, near_hz: float | None, analyse: "Callable[[Subject], Study]", figure: Path | None, json: bool
+) -> None:
+    """Analyse, print, draw; exit status 1 where not everything that was asked for was found."""
+    from rig.analysis.study import check_ending, draw
+    from rig.analysis.subject import subject_of
+    from rig.text.console import print_json
+
+    if figure is not None:
+        check_ending(figure)
+    study = analyse(subject_of(bench, near_hz))
+    if figure is not None:
+        draw(study, figure)
+    if json:
+        print_json(study.summary())
+    else:
+        study.say()
+    if not study.complete:
+        raise typer.Exit(1)

@@ -1,0 +1,74 @@
+"""``rig check``: the health check of a bench before a test."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.arming import ArmNow, Notes, Operator, SpecimenSerial, about_from, arm_from
+from rig.cli.options import Json, Overwrite, Realtime, keep_existing
+
+__all__ = ["check_"]
+
+
+def check_(
+    bench: Annotated[str, typer.Option(help="Shipped bench or TOML file.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Recording to write; named by bench and time if left out.")
+    ] = None,
+    reference: Annotated[Path | None, typer.Option(help="Recording of an earlier check to compare with.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
+    realtime: Realtime = False,
+    arm: ArmNow = False,
+    operator: Operator = None,
+    specimen_serial: SpecimenSerial = "",
+    note: Notes = None,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Check noise, dead, reversed and swapped channels, gains and latency, with a low-level multisine; 1 if anything fails."""
+    from rig.bench import load_bench
+    from rig.campaigns.multisine.points import MULTISINE_COLUMNS
+    from rig.check.figure import write_check
+    from rig.check.report import say, summary
+    from rig.check.run import check
+    from rig.errors import ConfigurationError
+    from rig.show.progress import RunProgress
+    from rig.text.console import print_json
+    from rig.tuning.figure import check_figure
+
+    loaded = load_bench(bench)
+    path = Path(f"check-{Path(bench).stem}-{datetime.now():%Y%m%d-%H%M%S}.h5") if output is None else output
+    if path.suffix != ".h5":
+        raise ConfigurationError(f"-o {path}: recordings are written as .h5")
+    keep_existing([] if reference is None else [reference], path, overwrite)
+    if figure is not None:
+        check_figure(figure, overwrite)
+    progress = RunProgress(MULTISINE_COLUMNS)
+    try:
+        found = check(
+            loaded,
+            path,
+            named=bench,
+            reference=reference,
+            seed=seed,
+            realtime=realtime,
+            overwrite=overwrite,
+            progress=progress,
+            arm=arm_from(arm),
+            about=about_from(operator, specimen_serial, note),
+        )
+    finally:
+        progress.close()
+    if figure is not None:
+        write_check(found, figure)
+    facts = summary(found)
+    if json:
+        print_json(facts)
+    else:
+        say(facts)
+        print(f"recorded in {path}" + (f", figure in {figure}" if figure else ""))
+    if found.failed:
+        raise typer.Exit(1)

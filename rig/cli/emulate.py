@@ -1,0 +1,139 @@
+"""``rig emulate``: a virtual rig behind the wire protocol of a real device."""
+
+import json as jsonlib
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.options import Json
+from rig.wire.can.frames import DATA_BIT_RATE_HZ
+
+if TYPE_CHECKING:
+    from rig.bench import Bench
+    from rig.emulator.process import Ready
+
+__all__ = ["emulate"]
+
+SHORTEST_BLOCK_S = 0.002
+"""Of the bench that is written: what a host of ordinary scheduling keeps up with by the clock."""
+
+
+def emulate(
+    wire: Annotated[str, typer.Argument(help="serial or can.")],
+    bench: Annotated[str, typer.Option(help="Virtual bench to put behind it: a name or TOML file.")] = "magnet-beam",
+    lockstep: Annotated[bool, typer.Option("--lockstep", help="Wait for the host instead of keeping time.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the rig's noise.", min=0)] = 0,
+    link: Annotated[Path | None, typer.Option(help="Symbolic link to the port, a name that stays.")] = None,
+    bench_file: Annotated[Path | None, typer.Option(help="Bench to write that reaches it: a TOML file.")] = None,
+    as_hardware: Annotated[bool, typer.Option("--as-hardware", help="Do not say that nothing moves.")] = False,
+    flip: Annotated[list[str] | None, typer.Option(help="Channel whose sensor sits the wrong way round.")] = None,
+    dead: Annotated[list[str] | None, typer.Option(help="Channel that is connected to nothing.")] = None,
+    swap: Annotated[list[str] | None, typer.Option(metavar="A,B", help="Two channels in each other's sockets.")] = None,
+    interface: Annotated[str | None, typer.Option(help="CAN: python-can's; slcan over a port if left out.")] = None,
+    channel: Annotated[str | None, typer.Option(help="CAN: channel of that interface.")] = None,
+    fd: Annotated[bool, typer.Option("--fd/--classic", help="CAN: frames of up to 64 or 8 bytes.")] = True,
+    node: Annotated[int, typer.Option(help="CAN: number of the device on its bus.", min=0, max=15)] = 1,
+    bitrate: Annotated[int, typer.Option(help="CAN: bit/s.")] = 1_000_000,
+    data_bitrate: Annotated[int, typer.Option(help="CAN FD: bit/s within the data.")] = DATA_BIT_RATE_HZ,
+    log_output: Annotated[Path | None, typer.Option(help="File for the device's output, a line a block.")] = None,
+    json: Json = False,
+) -> None:
+    """Put a virtual rig behind a wire, at the pace of the clock, until Ctrl-C."""
+    from rig.bench import load_bench
+    from rig.bench.configuration import validated
+    from rig.emulator.process import run_emulator
+    from rig.emulator.settings import EmulatorSettings
+
+    behind = load_bench(bench)
+    table = {
+        "wire": wire,
+        "bench": behind.model_dump(),
+        "seed": seed,
+        "lockstep": lockstep,
+        "as_hardware": as_hardware,
+        "flip": flip or [],
+        "dead": dead or [],
+        "swap": [_pair(text) for text in swap or []],
+        "link": link,
+        "log_output": log_output,
+        "interface": interface,
+        "channel": channel,
+        "fd": fd,
+        "node": node,
+        "bitrate": bitrate,
+        "data_bitrate": data_bitrate,
+    }
+    settings = validated(EmulatorSettings, table, "rig emulate")
+    _check_bench_file(bench_file)
+
+    def when_ready(ready: "Ready") -> None:
+        block = _block(behind, ready)
+        if bench_file is not None:
+            _write_bench(bench_file, _bench_text(bench, block, ready, as_hardware))
+        if json:
+            facts = {"wire": wire, **ready.options, "block": block, "process": ready.process}
+            print(jsonlib.dumps(facts), flush=True)
+        else:
+            where = ", ".join(f"{key} {value}" for key, value in {**ready.options, "block": block}.items())
+            print(f"{bench} behind {wire}: {where} ({ready.scheduling}); Ctrl-C ends it", flush=True)
+
+    counted = run_emulator(settings, when_ready)
+    if json:
+        print(jsonlib.dumps(counted), flush=True)
+    else:
+        counts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counted.items())
+        print(f"ended: {counts or 'nothing went wrong'}")
+
+
+def _pair(text: str) -> list[str]:
+    from rig.errors import ConfigurationError
+
+    names = text.split(",")
+    if len(names) != 2:
+        raise ConfigurationError(f"--swap {text}: allowed is two channels with a comma between them")
+    return names
+
+
+def _check_bench_file(path: Path | None) -> None:
+    from rig.errors import ConfigurationError
+
+    if path is not None and (path.suffix != ".toml" or not path.parent.is_dir()):
+        raise ConfigurationError(f"--bench-file {path}: allowed is a .toml file in a folder that exists")
+
+
+def _write_bench(path: Path, text: str) -> None:
+    from rig.errors import ConfigurationError
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"--bench-file {path}: cannot be written: {error.strerror}") from error
+
+
+def _block(bench: "Bench", ready: "Ready") -> int:
+    """Samples of a block: the bench's where nobody is in a hurry, else at least 2 ms, as far as the wire's frames go."""
+    if ready.lockstep:
+        return bench.block
+    wanted = math.ceil(round(SHORTEST_BLOCK_S * bench.sample_rate_hz, 6))
+    return max(bench.block, min(wanted, ready.largest_block))
+
+
+def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> str:
+    """A bench that starts from the emulated one, with its block, and names the driver that reaches it."""
+    from rig.emulator.emulated import driver_options
+
+    base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
+    options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware)
+    lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
+    head = [
+        f"base = {jsonlib.dumps(base)}",
+        f"block = {block}",
+        "",
+        "[driver]",
+        f"name = {jsonlib.dumps(ready.wire)}",
+        "",
+        "[driver.options]",
+    ]
+    return "\n".join([*head, *lines, ""])

@@ -1,0 +1,234 @@
+"""``rig identify`` and ``rig predict``: from recordings to models, from models to predictions."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.options import Json, Output, Overwrite, keep_existing, show_file
+
+__all__ = ["identify", "predict"]
+
+
+def identify(
+    files: Annotated[
+        list[Path], typer.Argument(help="Recordings, or imported measurements. Several are taken together.")
+    ],
+    output: Output,
+    model: Annotated[
+        str, typer.Option(help="Kind of model: nonlinear-mode, linear, force-surface, exciter or pnlss.")
+    ] = "nonlinear-mode",
+    modes: Annotated[Path | None, typer.Option(help="Linear model whose mode shapes the nonlinear mode uses.")] = None,
+    estimator: Annotated[str, typer.Option(help="Of a linear model's responses: instrument, H1 or H2.")] = "instrument",
+    band: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Lines of a linear or exciter model, Hz.")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option("--count", help="Number of modes of a linear model; found if left out.", min=1)
+    ] = None,
+    resistance: Annotated[
+        float | None, typer.Option(metavar="OHM", help="Of an exciter's coil, cable and amplifier, if measured.")
+    ] = None,
+    amplifier_gain: Annotated[
+        float | None, typer.Option(metavar="V/V", help="Of the exciter's voltage amplifier; 1 if left out.")
+    ] = None,
+    stinger_stiffness: Annotated[
+        float | None, typer.Option(metavar="N_PER_M", help="Of the exciter's stinger (E A / l), if known.")
+    ] = None,
+    states: Annotated[
+        int | None, typer.Option("--states", help="Of a PNLSS model: two per mode of vibration.", show_default="2")
+    ] = None,
+    degrees: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help='Degrees of a PNLSS model\'s monomials; "" for none.',
+            show_default="2,3; none beside --saturating",
+        ),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Sample rate of a PNLSS model; about 25 per period of the highest frequency."),
+    ] = None,
+    input_: Annotated[
+        str | None, typer.Option("--input", help="Of a PNLSS model: force or voltage.", show_default="force")
+    ] = None,
+    outputs: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Output channels of a PNLSS model; all motions if left out.")
+    ] = None,
+    no_output_polynomials: Annotated[
+        bool,
+        typer.Option("--no-output-polynomials", help="A PNLSS model whose outputs are linear in states and input."),
+    ] = False,
+    saturating: Annotated[
+        int | None,
+        typer.Option(
+            metavar="K",
+            help="Saturating features (tanh) of a PNLSS model, in place of the monomials; with --degrees, beside them.",
+        ),
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option(help="Most iterations of a PNLSS model's fit.", show_default="100")
+    ] = None,
+    validation: Annotated[
+        list[Path] | None,
+        typer.Option(help="Recording by which a PNLSS model's iterate is chosen; may be repeated."),
+    ] = None,
+    hold_out: Annotated[
+        int | None,
+        typer.Option(
+            "--hold-out",
+            help="Realisations of each level, the last ones, that choose a PNLSS model's iterate in place of --validation; of "
+            "five settled points and more every fourth does too. 0: none.",
+            show_default="1",
+        ),
+    ] = None,
+    relative_errors: Annotated[
+        bool,
+        typer.Option(
+            "--relative-errors", help="Of a PNLSS model: small levels count as much as large ones in the fit."
+        ),
+    ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the PNLSS model in OUTPUT, from the same files.")
+    ] = False,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Turn recordings into a model."""
+    from rig.models.files.files import save
+    from rig.models.files.pnlss import IdentifiedPnlss
+    from rig.models.identify.identify import Request, identify_model
+    from rig.models.identify.pnlss_request import PnlssOptions
+    from rig.show.progress import FitLines
+    from rig.system.stop_signals import insisting
+
+    keep_existing([*files, *(validation or ())], output, overwrite or resume)
+    request = Request(
+        kind=model,
+        modes=modes,
+        estimator=estimator,
+        band_hz=band,
+        count=count,
+        resistance_ohm=resistance,
+        amplifier_gain=amplifier_gain,
+        stinger_stiffness_n_m=stinger_stiffness,
+        pnlss=PnlssOptions(
+            states=states,
+            degrees=degrees,
+            rate_hz=rate,
+            input=input_,
+            outputs=outputs,
+            output_polynomials=False if no_output_polynomials else None,
+            saturating=saturating,
+            iterations=iterations,
+            validation=tuple(validation or ()),
+            hold_out=hold_out,
+            relative=True if relative_errors else None,
+            resume=output if resume else None,
+        ),
+    )
+    with insisting() as signals:
+        lines = FitLines(signals.check)
+        try:
+            found = identify_model(files, request, progress=lines)
+        finally:
+            lines.close()
+    save(found, output)
+    show_file(output, json)
+    if isinstance(found, IdentifiedPnlss) and found.fit is not None and found.fit.interrupted:
+        print(f"rig: interrupted; the best so far is in {output}, and --resume goes on", file=sys.stderr)
+        raise typer.Exit(1)
+
+
+def predict(
+    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model or force surface.")],
+    output: Output,
+    frequency_response: Annotated[
+        list[float] | None,
+        typer.Option(metavar="FORCE_N", help="Predict the frequency response at this constant force; may be repeated."),
+    ] = None,
+    voltage_response: Annotated[
+        list[float] | None,
+        typer.Option(
+            metavar="VOLT",
+            help="Predict a PNLSS model's frequency response at this constant voltage (peak), of its input or of the "
+            "exciter; may be repeated.",
+        ),
+    ] = None,
+    force: Annotated[
+        str | None,
+        typer.Option(
+            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; of a PNLSS model "
+            "driven by a force, and without an exciter, pure-sine."
+        ),
+    ] = None,
+    sweep: Annotated[
+        list[Path] | None, typer.Option(help="Predict the sweeps of this recording; may be repeated.")
+    ] = None,
+    multisine: Annotated[
+        list[Path] | None,
+        typer.Option(help="Simulate the realisations of this recording with a PNLSS model; may be repeated."),
+    ] = None,
+    planned_sweep: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."),
+    ] = None,
+    exciter: Annotated[
+        Path | None,
+        typer.Option(
+            help="Exciter model: sweeps are predicted from the voltage, recorded ones and planned ones. With a PNLSS model "
+            "driven by a force also responses and references at constant fundamental, RMS or voltage, with the harmonics that "
+            "the exciter makes; one driven by the voltage has its own."
+        ),
+    ] = None,
+    zero_crossings: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHICH",
+            help="Read an imposed force between its zero crossings, as the paper did: half-periods (between all of them) or "
+            "periods (those in the same direction).",
+        ),
+    ] = None,
+    modes: Annotated[Path | None, typer.Option(help="Linear model: other modes and other sensors.")] = None,
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(help="Stepped sines to compare with (recorded or imported); may be repeated."),
+    ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            help="Compare over frequency or phase, which tells all branches apart. "
+            "If left out: phase where the measured frequency turns back."
+        ),
+    ] = None,
+    allow_extrapolation: Annotated[
+        bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
+    ] = False,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Predict vibrations with a model, and compare them with recordings."""
+    from rig.models.files.files import save
+    from rig.models.predict.predict import predict_vibrations
+    from rig.models.predict.request import PredictionRequest
+
+    given = (model, exciter, modes, *(sweep or ()), *(multisine or ()), *(reference or ()))
+    keep_existing([path for path in given if path is not None], output, overwrite)
+    request = PredictionRequest(
+        forces_n=tuple(frequency_response or ()),
+        voltages_v=tuple(voltage_response or ()),
+        held=force,
+        sweeps=tuple(sweep or ()),
+        multisines=tuple(multisine or ()),
+        planned=tuple(planned_sweep or ()),
+        exciter=exciter,
+        zero_crossings=zero_crossings,
+        modes=modes,
+        references=tuple(reference or ()),
+        over=over,
+        allow_extrapolation=allow_extrapolation,
+    )
+    save(predict_vibrations(model, request), output)
+    show_file(output, json)

@@ -1,0 +1,61 @@
+"""Options that several commands share."""
+
+import contextlib
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["Json", "Output", "Overwrite", "Realtime", "keep_existing", "say_what_is_imported", "show_file"]
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
+Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
+
+
+class _Notes(logging.Handler):
+    """Prints a line of the log as a note."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(OSError):  # whoever read this has gone
+            print(f"note: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
+def say_what_is_imported() -> None:
+    """Print a note for each function of the user's own that a bench names, with the file that it comes from."""
+    log = logging.getLogger("simulators.sites.functions")
+    log.setLevel(logging.INFO)
+    log.handlers = [_Notes()]
+
+
+def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> None:
+    """Refuse to write over a folder, in no folder, over what is read, or over what exists unless that was asked for."""
+    from rig.errors import RecordingError
+
+    if output.is_dir():
+        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
+    if not output.parent.is_dir():
+        raise RecordingError(f"{output}: there is no folder {output.parent}")
+    if output.exists() and any(source.exists() and output.samefile(source) for source in sources):
+        raise RecordingError(f"{output}: is the file that is read; choose another name")
+    if output.exists() and not overwrite:
+        raise RecordingError(f"{output}: exists already; choose another name, or --overwrite")
+
+
+def show_file(path: Path, json: bool) -> None:
+    """Print what is in a file."""
+    from rig.models.files.files import understood
+    from rig.show.summary import summarise
+    from rig.show.tables import print_summary
+    from rig.text.console import print_json
+
+    summary = summarise(path)
+    if json:
+        print_json(summary)
+    else:
+        with understood(path, summary["kind"]):
+            print_summary(summary)

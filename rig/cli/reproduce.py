@@ -1,0 +1,93 @@
+"""``rig reproduce``: the whole campaign of the paper on a virtual rig, with its tables and figures."""
+
+import contextlib
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.options import Json
+
+__all__ = ["reproduce_"]
+
+
+def reproduce_(
+    specimen: Annotated[str, typer.Argument(help="magnet-beam or friction-beam.")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Folder to keep everything in; taken up if it exists."),
+    ],
+    models: Annotated[
+        str, typer.Option(metavar="N", help="Models of each training set, or paper: as many as the paper has.")
+    ] = "5",
+    scatter: Annotated[
+        float,
+        typer.Option(help="Scatter of modal frequencies from run to run, relative; each realisation then is a run."),
+    ] = 0.0,
+    input_: Annotated[str, typer.Option("--input", help="What goes into the models: force or voltage.")] = "force",
+    with_backbone: Annotated[
+        bool, typer.Option("--with-backbone", help="Fit points of a recorded backbone beside the multisines.")
+    ] = False,
+    saturating: Annotated[int, typer.Option(help="Saturating features in place of the monomials.", min=0, max=100)] = 0,
+    states: Annotated[
+        int | None, typer.Option(help="States of the models; default: the paper's.", min=1, max=20)
+    ] = None,
+    realisations: Annotated[
+        int | None, typer.Option(help="Realisations of each level that a model is fitted to, at most.", min=1)
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option(help="Iterations of a fit, at most; default: by the specimen.", min=1, max=10_000)
+    ] = None,
+    levels: Annotated[int | None, typer.Option(help="Levels of the specimen, from the lowest; default: all.")] = None,
+    channel: Annotated[str, typer.Option(help="Output whose errors the tables have.")] = "drive",
+    without: Annotated[
+        list[str] | None, typer.Option(metavar="PART", help="Leave out steady or sweeps; may be repeated.")
+    ] = None,
+    bench: Annotated[
+        str | None, typer.Option(help="Virtual bench to use instead of the specimen's: a name or TOML file.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="Models that are identified at the same time; -1 for all cores.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of noise, scatter and phases.", min=0)] = 0,
+    json: Json = False,
+) -> None:
+    """Record the paper's campaign on a virtual rig, identify all its models, and hold their predictions against the rig."""
+    from rig.bench import load_bench
+    from rig.reproduce.figures import draw_study
+    from rig.reproduce.options import Options
+    from rig.reproduce.report import say_study, write_tables
+    from rig.reproduce.specimens import specimen_of
+    from rig.reproduce.study import reproduce
+    from rig.text.console import print_json
+
+    of = specimen_of(specimen)
+    options = Options(
+        specimen=of,
+        bench=load_bench(of.name if bench is None else bench),
+        folder=output,
+        models=int(models) if models.isdecimal() else models,
+        scatter=scatter,
+        input=input_,
+        with_backbone=with_backbone,
+        saturating=saturating,
+        states=states,
+        realisations=realisations,
+        iterations=iterations,
+        levels=levels,
+        channel=channel,
+        jobs=jobs,
+        seed=seed,
+        without=frozenset(without or ()),
+    )
+    study = reproduce(options, _say)
+    write_tables(study)
+    draw_study(study)
+    if json:
+        print_json(study.summary())
+    else:
+        say_study(study)
+
+
+def _say(line: str) -> None:
+    with contextlib.suppress(OSError):  # whoever read this has gone; the study goes on
+        print(line, file=sys.stderr, flush=True)

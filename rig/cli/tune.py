@@ -1,0 +1,98 @@
+"""``rig tune``: from a bench to a plan with designed gains."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.arming import ArmNow, Notes, Operator, SpecimenSerial, about_from, arm_from
+from rig.cli.options import Json, Overwrite, Realtime, keep_existing
+
+__all__ = ["tune_"]
+
+
+def tune_(
+    bench: Annotated[str, typer.Option(help="Shipped bench or TOML file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Plan to write: a TOML file.")],
+    level: Annotated[
+        float | None, typer.Option(metavar="V", help="RMS voltage of the multisine; found by itself if left out.")
+    ] = None,
+    law: Annotated[
+        str, typer.Option(help="frequency-error (levels in metres) or phase (levels in volts).")
+    ] = "frequency-error",
+    from_m: Annotated[float | None, typer.Option(help="Lowest level, m; from the noise if left out.")] = None,
+    to_m: Annotated[float | None, typer.Option(help="Highest level, m; from the limits if left out.")] = None,
+    points: Annotated[int, typer.Option(help="Number of levels.", min=1, max=1000)] = 8,
+    recording: Annotated[
+        Path | None, typer.Option(help="Recording of the multisine; beside the plan if left out.")
+    ] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
+    realtime: Realtime = False,
+    arm: ArmNow = False,
+    operator: Operator = None,
+    specimen_serial: SpecimenSerial = "",
+    note: Notes = None,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Measure a rig with a low-level multisine, design gains, and write a plan that uses them."""
+    from rig.bench import load_bench
+    from rig.campaigns.multisine.points import MULTISINE_COLUMNS
+    from rig.errors import ConfigurationError
+    from rig.show.progress import RunProgress
+    from rig.system.whole_file import whole_file
+    from rig.text.console import print_json
+    from rig.text.printable import printable_strings
+    from rig.tuning.figure import check_figure, draw_tuning
+    from rig.tuning.report import lines, summary
+    from rig.tuning.tuning import tune
+
+    load_bench(bench)
+    if output.suffix != ".toml":
+        raise ConfigurationError(f"-o {output}: plans are written as .toml")
+    keep_existing([], output, overwrite)
+    recorded = output.with_suffix(".h5") if recording is None else recording
+    if recorded.suffix != ".h5":
+        raise ConfigurationError(f"--recording {recorded}: recordings are written as .h5")
+    if figure is not None:
+        check_figure(figure, overwrite)
+    progress = RunProgress(MULTISINE_COLUMNS)
+    try:
+        found = tune(
+            bench,
+            recorded,
+            named=_as_seen_from(bench, output),
+            level_rms_v=level,
+            law=law,
+            from_m=from_m,
+            to_m=to_m,
+            points=points,
+            seed=seed,
+            realtime=realtime,
+            overwrite=overwrite,
+            progress=progress,
+            arm=arm_from(arm),
+            about=about_from(operator, specimen_serial, note),
+        )
+    finally:
+        progress.close()
+    with whole_file(output) as part:
+        part.write_text(found.plan_toml, encoding="utf-8")
+    if figure is not None:
+        draw_tuning(found, figure)
+    facts = {**summary(found), "plan": str(output), "figure": None if figure is None else str(figure)}
+    if json:
+        print_json(facts)
+        return
+    for line in lines(printable_strings(facts)):
+        print(line)
+    print(f"plan written to {output}, multisine recorded in {recorded}" + (f", figure in {figure}" if figure else ""))
+
+
+def _as_seen_from(bench: str, plan: Path) -> str:
+    """What the plan calls the bench: a file by its way from the plan's own folder."""
+    if not bench.endswith(".toml") or Path(bench).is_absolute():
+        return bench
+    return Path(os.path.relpath(bench, plan.parent)).as_posix()

@@ -1,0 +1,216 @@
+"""`Device`: the device's half of the protocol, over any link, in front of any plant, without a clock: time is handed in."""
+
+import math
+from collections import Counter
+
+import numpy as np
+
+from rig.emulator.description import Words
+from rig.emulator.faults import Faults
+from rig.emulator.parameters import Parameters
+from rig.emulator.plant import Plant
+from rig.emulator.sampling import Sampling
+from rig.emulator.sending import FaultySender
+from rig.emulator.states import Life
+from rig.wire.link import Link
+from rig.wire.messages import (
+    HEARTBEATS_HZ,
+    Answer,
+    Command,
+    DeviceFlag,
+    DeviceState,
+    EmergencyStop,
+    Heartbeat,
+    Message,
+    Output,
+    Parameter,
+    Request,
+    Samples,
+    Status,
+    Stream,
+)
+
+__all__ = ["Device"]
+
+BEAT_S = 1.0 / HEARTBEATS_HZ
+
+
+class Device:
+    """A device: messages go in, and what is due goes out.
+
+    Whoever runs it hands every message to `handle`, calls `advance` at the latest at ``wake_s``, and gives both the present
+    time in seconds of any clock that only goes forward. With ``lockstep`` a block is measured once the outputs due for it
+    have come, however long that takes: as fast as the host, without deadlines. Only the watchdog then minds the clock.
+    """
+
+    def __init__(
+        self, plant: Plant, words: Words, link: Link, *, lockstep: bool = False, faults: Faults | None = None
+    ) -> None:
+        self.plant, self.link = plant, link
+        self.faults = faults or Faults()
+        self.counts: Counter[str] = Counter()
+        """What happened since the device was switched on."""
+        self._parameters = Parameters(words, self.faults)
+        self._sampling = Sampling(plant, lockstep=lockstep)
+        self._life = Life(self._sampling, self._parameters, self.counts, self._beat)
+        self._sender = FaultySender(link, self.faults)
+        self._beat_s = -math.inf
+        self._last: tuple[Request, Answer] | None = None
+        self._reset_s = self._deaf_s = math.inf
+        self._pressed = False
+        self._sampling.rest()
+
+    @property
+    def words(self) -> Words:
+        """The parameters, as they are told."""
+        return self._parameters.words
+
+    @property
+    def state(self) -> DeviceState:
+        """Where in its life it is."""
+        return self._life.state
+
+    @property
+    def measured(self) -> int:
+        """Samples measured since START."""
+        return self._sampling.measured
+
+    @property
+    def output_v(self) -> np.ndarray:
+        """Output of the block that was measured last, V."""
+        return self._sampling.output_v
+
+    @property
+    def wake_s(self) -> float:
+        """When `advance` wants to be called."""
+        life, sender = self._life, self._sender
+        return min(self._sampling.due_s, self._beat_s + BEAT_S, life.bites_s, self._reset_s, sender.wake_s)
+
+    def handle(self, message: Message, now_s: float) -> None:
+        """Do what a message asks for."""
+        if now_s >= self._deaf_s:
+            return
+        self._mind_a_stall(now_s)
+        self._life.watch(now_s)
+        if isinstance(message, Output):
+            self._take_output(message, now_s)
+        elif isinstance(message, Request):
+            self._answer(message, now_s)
+        elif isinstance(message, EmergencyStop):
+            self._life.emergency_stop(now_s)
+
+    def _take_output(self, output: Output, now_s: float) -> None:
+        if not self._sampling.on:
+            self.counts["outputs_while_idle"] += 1
+            return
+        in_time = self._sampling.take(output, now_s)
+        if in_time is None:
+            self.counts["bad_outputs"] += 1
+        else:
+            self._life.feed(now_s, in_time=in_time > 0)
+
+    def _answer(self, request: Request, now_s: float) -> None:
+        if self._last is not None and request == self._last[0]:
+            answer = self._last[1]
+            self.counts["repeated_requests"] += 1
+        else:
+            status, value = self._carry_out(request, now_s)
+            answer = Answer(request.number, status, request.parameter, request.item, value)
+            self._last = request, answer
+        self._sender.send(answer, now_s)
+
+    def _carry_out(self, request: Request, now_s: float) -> tuple[Status, int]:
+        life, parameters = self._life, self._parameters
+        match request.command:
+            case Command.GET if request.parameter == Parameter.STATE:
+                return Status.DONE, int(life.state)
+            case Command.GET:
+                return parameters.get(request.parameter, request.item)
+            case Command.SET if self._sampling.on:
+                return Status.WRONG_STATE, int(life.state)
+            case Command.SET:
+                return parameters.set(request.parameter, request.item, request.value)
+            case Command.START:
+                return self._start(now_s)
+            case Command.STOP:
+                self._reset_s = math.inf
+                return life.stop(now_s)
+            case Command.ARM:
+                return life.arm(request.value, now_s)
+            case Command.DISARM:
+                return life.disarm(now_s)
+            case Command.CLEAR:
+                return life.clear(now_s)
+        return Status.UNKNOWN, 0
+
+    def _start(self, now_s: float) -> tuple[Status, int]:
+        if self.state is DeviceState.IDLE:
+            value, faults = self._parameters.value, self.faults
+            channels = faults.channels_sent or len(self.plant.names)
+            rate_hz = 1e-3 * value(Parameter.RATE_MHZ)
+            bits, queue = self.plant.bits, value(Parameter.QUEUE)
+            self.link.configure(Stream(channels, value(Parameter.BLOCK), rate_hz, bits, queue))
+            self._reset_s = now_s + faults.reset_after_s if faults.reset_after_s is not None else math.inf
+            self._deaf_s = now_s + faults.deaf_after_s if faults.deaf_after_s is not None else math.inf
+            self._sender.start(now_s)
+        return self._life.start(now_s)
+
+    def press_emergency_stop(self) -> None:
+        """The device's own emergency stop; it acts with the next `advance`, and may be pressed from a signal handler."""
+        self._pressed = True
+
+    def switch_off(self, now_s: float) -> None:
+        """Switch off: 0 V."""
+        self._life.stop(now_s)
+
+    def _reset(self, now_s: float) -> None:
+        """Start anew, as after a loss of supply."""
+        self._life.begin_anew(now_s)
+        self.words[Parameter.BOOT, 0] = (self.words[Parameter.BOOT, 0] + 1) & 0xFFFFFFFF
+        self._last = None
+        self._reset_s = math.inf
+        self._beat(now_s)
+
+    def advance(self, now_s: float) -> None:
+        """Measure and send what is due, let the watchdog bite, send heartbeats."""
+        if self._pressed:
+            self._pressed = False
+            self._life.emergency_stop(now_s)
+        if now_s >= self._reset_s:
+            self._reset(now_s)
+        self._mind_a_stall(now_s)
+        self._life.watch(now_s)
+        while self._sampling.is_due(now_s):
+            self._measure(now_s)
+        if now_s >= self._beat_s + BEAT_S:
+            self._beat(now_s)
+        self._sender.flush(now_s)
+
+    def _mind_a_stall(self, now_s: float) -> None:
+        if now_s <= self._sampling.due_s:
+            return
+        late_s = self._sampling.stand_still(now_s)
+        if late_s:
+            self._life.stand_still(late_s)
+            self.counts["stalls"] += 1
+            self.counts["stalled_us"] += round(1e6 * late_s)
+
+    def _measure(self, now_s: float) -> None:
+        flags = self._life.latch
+        first, readings, seen, held = self._sampling.measure()
+        if held and self.state is DeviceState.ARMED:
+            flags |= DeviceFlag.OUTPUT_HELD
+            self.counts["held_blocks"] += 1
+        if self.faults.channels_sent is not None:
+            readings = readings[:, : self.faults.channels_sent]
+        number = self._sampling.blocks
+        clock_us = round(1e6 * now_s) & 0xFFFFFFFFFFFFFFFF
+        sequence = (number - 1) & 0xFFFF
+        samples = Samples(first, readings, flags | seen, self._sender.dropped_samples, clock_us, sequence)
+        self._sender.send_samples(samples, number, now_s)
+
+    def _beat(self, now_s: float) -> None:
+        self._beat_s = now_s
+        boot = self._parameters.value(Parameter.BOOT) & 0xFF
+        measured, dropped = self.measured & 0xFFFFFFFF, self._sender.dropped_samples
+        self._sender.send(Heartbeat(int(self.state), self._life.latch, boot, measured, dropped), now_s)

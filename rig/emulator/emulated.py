@@ -1,0 +1,133 @@
+"""Emulators from Python: started in a process of their own, reached by an ordinary bench."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Self
+
+from rig import errors
+from rig.bench import Bench, DriverChoice
+from rig.bench.configuration import validated
+from rig.emulator.settings import EmulatorSettings
+
+__all__ = ["Emulator", "driver_options", "emulated"]
+
+ENDING_S = 10.0
+LOCKSTEP_S = 60.0
+"""Watchdog and time-out of a bench whose device waits for the host: nothing is in a hurry, and nothing waits for ever."""
+
+HARDWARE_S = 1.0
+"""Watchdog of one that does not say that nothing moves: drivers take no longer one."""
+
+
+def driver_options(options: dict[str, Any], *, lockstep: bool, as_hardware: bool = False) -> dict[str, Any]:
+    """Options of a driver that reaches an emulator: patient ones where the device waits for the host."""
+    watchdog_s = HARDWARE_S if as_hardware else LOCKSTEP_S
+    patience = {"watchdog_s": watchdog_s, "timeout_s": LOCKSTEP_S} if lockstep else {}
+    return {**patience, **options}
+
+
+class Emulator:
+    """An emulator in a process of its own; a context manager.
+
+    ``bench`` reaches it. ``counted`` is known once it has ended: watchdog trips, held blocks, damaged frames and the like.
+    Errors: `ConfigurationError` or a `DaqError` for what the emulator refuses.
+    """
+
+    def __init__(
+        self, bench: Bench, wire: str = "serial", *, options: dict[str, Any] | None = None, **settings: Any
+    ) -> None:
+        table = {"wire": wire, "bench": bench.model_dump(), **settings}
+        self._settings = validated(EmulatorSettings, table, "emulator")
+        self._options = options or {}
+        self.bench = bench
+        self.counted: dict[str, int] = {}
+        self.process: subprocess.Popen[str] | None = None
+
+    def start(self) -> Self:
+        """Start it and wait until it can be reached."""
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "rig.emulator"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # Ctrl-C is the host's affair
+        )
+        assert self.process.stdin is not None
+        self.process.stdin.write(self._settings.model_dump_json() + "\n")
+        self.process.stdin.flush()
+        ready = self._heard()["ready"]
+        lockstep, as_hardware = self._settings.lockstep, self._settings.as_hardware
+        options = {**ready["options"], **self._options}
+        options = driver_options(options, lockstep=lockstep, as_hardware=as_hardware)
+        driver = DriverChoice(name=self._settings.wire, options=options)
+        self.bench = self._settings.bench.model_copy(update={"driver": driver})
+        return self
+
+    def _heard(self) -> dict[str, Any]:
+        assert self.process is not None
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        if not line:
+            self.stop()
+            raise errors.DaqRefused("the emulator ended without a word")
+        said: dict[str, Any] = json.loads(line)
+        if "error" in said:
+            self.process.wait(ENDING_S)
+            self.stop()
+            raise getattr(errors, said["error"], errors.DaqError)(said["message"])
+        return said
+
+    def press_emergency_stop(self) -> None:
+        """Press the device's own emergency stop. `DaqRefused` on a system without SIGUSR1 (Windows)."""
+        if not hasattr(signal, "SIGUSR1"):
+            raise errors.DaqRefused(
+                "the emulator's emergency stop is pressed by a signal that this system does not have"
+            )
+        if self.process is not None:
+            os.kill(self.process.pid, signal.SIGUSR1)
+
+    def stop(self) -> None:
+        """End it; any number of times."""
+        process, self.process = self.process, None
+        if process is None:
+            return
+        process.terminate()
+        try:
+            said, _ = process.communicate(timeout=ENDING_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            said, _ = process.communicate()
+        for line in said.splitlines():
+            self.counted = json.loads(line).get("counted", self.counted)
+
+    def __enter__(self) -> Self:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+@contextmanager
+def emulated(
+    bench: Bench,
+    wire: str = "serial",
+    *,
+    lockstep: bool = True,
+    seed: int = 0,
+    options: dict[str, Any] | None = None,
+    **settings: Any,
+) -> Iterator[Bench]:
+    """A bench that reaches an emulator of a virtual bench, over ``serial`` or ``can``, for as long as the context lasts.
+
+    ``options`` are further driver options (``queue_blocks``, ``watchdog_s``...), ``settings`` further `EmulatorSettings`.
+    """
+    with Emulator(bench, wire, options=options, lockstep=lockstep, seed=seed, **settings) as emulator:
+        yield emulator.bench

@@ -1,0 +1,66 @@
+"""What an emulator is told when it is started."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from rig.bench import Bench
+from rig.bench.configuration import Configured
+from rig.emulator.faults import Faults
+from rig.wire.can.frames import DATA_BIT_RATE_HZ
+
+__all__ = ["EmulatorSettings"]
+
+
+class EmulatorSettings(Configured):
+    """A virtual bench behind a wire."""
+
+    wire: Literal["serial", "can"]
+    """The wire protocol it speaks."""
+    bench: Bench
+    """A bench with the virtual driver: the rig behind the wire."""
+    seed: int = Field(0, ge=0)
+    """Seed of the rig's noise."""
+    lockstep: bool = False
+    """Measure a block when its outputs have come, instead of by the clock."""
+    as_hardware: bool = False
+    """Do not say that nothing physical moves: what is asked of people before a real test is asked here too."""
+    flip: tuple[str, ...] = ()
+    """Sensors mounted the other way round."""
+    dead: tuple[str, ...] = ()
+    """Channels that are connected to nothing."""
+    swap: tuple[tuple[str, str], ...] = ()
+    """Pairs of sensors in each other's sockets."""
+    serial_number: str = Field("0001", max_length=32)
+    """Serial number that the device tells."""
+    link: Path | None = None
+    """Symbolic link to the pseudo-terminal, so that the port has a name that stays."""
+    log_output: Path | None = None
+    """File for the device's output, a line a block."""
+    interface: str | None = None
+    """CAN: interface of python-can, or slcan over a pseudo-terminal if left out."""
+    channel: str | None = None
+    """CAN: channel of that interface."""
+    fd: bool = True
+    """CAN: frames of up to 64 bytes."""
+    bitrate: int = Field(1_000_000, ge=10_000, le=1_000_000)
+    """CAN: bit rate of the bus, bit/s."""
+    data_bitrate: int = Field(DATA_BIT_RATE_HZ, ge=1_000_000, le=8_000_000)
+    """CAN FD: bit rate within the data, bit/s."""
+    node: int = Field(1, ge=0, le=15)
+    """CAN: number of the device on its bus."""
+    faults: dict[str, Any] = Field(default_factory=dict)
+    """What the device shall do wrong; see `Faults`."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        unknown = sorted(set(self.faults) - set(asdict(Faults())))
+        if unknown:
+            raise ValueError(f"faults: {unknown[0]!r}: allowed is {', '.join(asdict(Faults()))}")
+        if self.wire == "serial" and self.interface is not None:
+            raise ValueError(f"interface = {self.interface!r}: a serial device has none")
+        if self.interface not in (None, "slcan") and self.channel is None:
+            raise ValueError(f"channel: is missing, interface {self.interface!r} has several")
+        return self

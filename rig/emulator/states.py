@@ -1,0 +1,123 @@
+"""A device's life: which state it is in, what has latched, and the watchdog; every way out of ARMED leads to 0 V."""
+
+import math
+from collections import Counter
+from collections.abc import Callable
+
+from rig.emulator.parameters import Parameters
+from rig.emulator.sampling import Sampling
+from rig.wire.messages import ARM_KEY, DeviceFlag, DeviceState, Parameter, Status
+
+__all__ = ["Life"]
+
+
+class Life:
+    """States and the ways between them.
+
+    ``changed`` is called at every change of state, with the time. Commands return what they are answered with.
+    """
+
+    def __init__(
+        self, sampling: Sampling, parameters: Parameters, counts: Counter[str], changed: Callable[[float], None]
+    ) -> None:
+        self._sampling, self._parameters, self._counts, self._changed = sampling, parameters, counts, changed
+        self.state = DeviceState.IDLE
+        self.latch = 0
+        """What has latched, as `DeviceFlag`."""
+        self._fed_s = math.inf
+        self._watchdog_s = 1.0
+
+    @property
+    def bites_s(self) -> float:
+        """When the watchdog will bite unless it is fed."""
+        return self._fed_s + self._watchdog_s
+
+    def feed(self, now_s: float, *, in_time: bool) -> None:
+        """A valid output has come; one that is late altogether moves nothing, and so does not quieten the watchdog."""
+        if self.state is DeviceState.ARMED:
+            self._fed_s = now_s if in_time else self._fed_s
+            self._sampling.has_output = True
+
+    def stand_still(self, late_s: float) -> None:
+        """Our clock stood still for so long."""
+        self._fed_s += late_s
+
+    def watch(self, now_s: float) -> None:
+        """Let the watchdog bite if it is time."""
+        bites_s = self.bites_s
+        if now_s >= bites_s and self.state is DeviceState.ARMED:
+            self._counts["watchdog_trips"] += 1
+            self.latch |= DeviceFlag.WATCHDOG
+            self._bring_down(bites_s, DeviceState.LATCHED, 1e-6 * self._parameters.value(Parameter.RAMP_US))
+
+    def start(self, now_s: float) -> tuple[Status, int]:
+        """Begin to sample, with the settings in force."""
+        if self.state is DeviceState.LATCHED:
+            return Status.LATCHED, self.latch
+        if self.state is not DeviceState.IDLE:
+            return Status.WRONG_STATE, int(self.state)
+        value = self._parameters.value
+        self._watchdog_s = 1e-6 * value(Parameter.WATCHDOG_US)
+        rate_hz = 1e-3 * value(Parameter.RATE_MHZ)
+        self._sampling.start(rate_hz, value(Parameter.BLOCK), value(Parameter.QUEUE), now_s)
+        self._become(DeviceState.RUNNING, now_s)
+        return Status.DONE, 0
+
+    def arm(self, key: int, now_s: float) -> tuple[Status, int]:
+        """Let outputs through."""
+        if key != ARM_KEY:
+            return Status.NOT_ALLOWED, 0
+        if self.state is DeviceState.LATCHED:
+            return Status.LATCHED, self.latch
+        if self.state is not DeviceState.RUNNING:
+            return Status.WRONG_STATE, int(self.state)
+        self._sampling.let_outputs_through(now_s)
+        self._fed_s = now_s
+        self._become(DeviceState.ARMED, now_s)
+        return Status.DONE, 0
+
+    def disarm(self, now_s: float) -> tuple[Status, int]:
+        """0 V at once; sampling goes on."""
+        if self.state is DeviceState.ARMED:
+            self._bring_down(now_s, DeviceState.RUNNING)
+        return Status.DONE, int(self.state)
+
+    def stop(self, now_s: float) -> tuple[Status, int]:
+        """0 V at once, end sampling; what has latched stays so."""
+        self._sampling.stop()
+        self._fed_s = math.inf
+        if self.state is not DeviceState.LATCHED:
+            self._become(DeviceState.IDLE, now_s)
+        return Status.DONE, int(self.state)
+
+    def clear(self, now_s: float) -> tuple[Status, int]:
+        """Forget what has latched."""
+        if self._sampling.on:
+            return Status.WRONG_STATE, int(self.state)
+        self.latch = 0
+        self._become(DeviceState.IDLE, now_s)
+        return Status.DONE, 0
+
+    def emergency_stop(self, now_s: float) -> None:
+        """0 V at once, and latch."""
+        self._counts["emergency_stops"] += 1
+        self.latch |= DeviceFlag.EMERGENCY_STOP
+        self._bring_down(now_s, DeviceState.LATCHED)
+
+    def begin_anew(self, now_s: float) -> None:
+        """As after a loss of supply."""
+        self.stop(now_s)
+        self.latch = 0
+        self.state = DeviceState.IDLE
+        self._sampling.measured = 0
+
+    def _become(self, state: DeviceState, now_s: float) -> None:
+        changed = state is not self.state
+        self.state = state
+        if changed:
+            self._changed(now_s)
+
+    def _bring_down(self, at_s: float, state: DeviceState, ramp_s: float = 0.0) -> None:
+        self._sampling.bring_down(at_s, ramp_s)
+        self._fed_s = math.inf
+        self._become(state, at_s)

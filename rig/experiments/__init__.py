@@ -1,5 +1,0 @@
-"""Recordings as training and test data of nonlinear state-space models."""
-
-from rig.experiments.build import default_rate_hz, experiments
-
-__all__ = ["default_rate_hz", "experiments"]

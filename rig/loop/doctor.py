@@ -1,0 +1,80 @@
+"""What this machine and a bench can promise: the answers of ``rig doctor``."""
+
+import os
+import platform
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+from rig.bench import Bench
+from rig.errors import RigError
+
+__all__ = ["examine", "examine_bench"]
+
+RATE_HZ = 1000.0
+SECONDS = 1.0
+
+
+def examine(folder: Path) -> dict[str, Any]:
+    """Facts on processor, clock, privileges, kernels, disk, drivers and serial ports; ``folder`` is where recordings would go.
+
+    The lateness is that of a process like the one a wall-clock loop gets, woken a thousand times in a second, with and
+    without its privileges.
+    """
+    import vibrolock
+    from rig.bench import shipped_benches
+    from rig.drivers import driver_names
+    from rig.wire.serial.port import port_names
+    from vibrolock.compiled import kernel_cache_folder
+
+    with_it, without_it = _probed(privileged=True), _probed(privileged=False)
+    return {
+        "vibrolock": vibrolock.__version__,
+        "python": sys.version.split()[0],
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "processors": os.cpu_count() or 1,
+        "realtime_scheduling": with_it.pop("scheduling", "not on this system"),
+        "memory_lock": with_it.pop("memory", "not on this system"),
+        "timer_slack": with_it.pop("timer_slack", "not on this system"),
+        "wake_up_lateness_us": with_it.get("wake_up_us", {}),
+        "without_privilege_us": without_it.get("wake_up_us", {}),
+        "kernel_cache": str(kernel_cache_folder()),
+        "free_disk_gb": round(shutil.disk_usage(folder).free / 1e9, 1),
+        "drivers": driver_names(),
+        "benches": shipped_benches(),
+        "serial_ports": port_names(),
+        "wall_clock_rigs": _promise(with_it),
+    }
+
+
+def examine_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str, Any]:
+    """Open a bench's device, swap blocks of 0 V with it for some seconds, and say how that went; nothing is driven.
+
+    Raises `rig.errors.DaqError`, `rig.errors.ConfigurationError` where the device cannot be opened.
+    """
+    from rig.loop.worker.probe import round_trips
+    from rig.loop.worker.spawn import ask, supported
+
+    if supported():
+        return dict(ask("round trips", bench, seed, seconds))
+    return round_trips(bench, seed, seconds)
+
+
+def _probed(*, privileged: bool) -> dict[str, Any]:
+    from rig.loop.worker.spawn import ask, supported
+
+    if not supported():
+        return {}
+    try:
+        return dict(ask("probe", RATE_HZ, SECONDS, privileged))
+    except RigError as error:
+        return {"scheduling": str(error)}
+
+
+def _promise(probed: dict[str, Any]) -> str:
+    """In one sentence, what a wall-clock loop may count on here."""
+    if "wake_up_us" not in probed:
+        return "in the campaign's own process, and nothing is promised on this system"
+    rate_hz = 0.5e6 / max(1.0, probed["wake_up_us"]["p99_9"])
+    return f"in a process of their own; by this second, 999 of 1000 blocks begin within half a period up to {rate_hz:.0f} Hz"

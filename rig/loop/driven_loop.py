@@ -1,0 +1,99 @@
+"""What a loop does in any process: swap blocks with the driver, and come to 0 V whatever the driver raises."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.daq import DAQ, LOST
+from rig.errors import DaqError, as_daq_error
+from rig.tick.safety.layout import GuardMode
+from rig.tick.safety.limits import end_reason_of
+from rig.tick.tick import Tick
+
+__all__ = ["Block", "DrivenLoop", "end_by_driver"]
+
+
+class Block(NamedTuple):
+    """A block of inputs, V [n, n_channels], and the device's flags [n]."""
+
+    inputs: np.ndarray
+    flags: np.ndarray
+
+
+def end_by_driver(tick: Tick, error: DaqError) -> None:
+    """Note in the guard that the driver has failed, with which the output is off."""
+    guard = tick.guard
+    if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
+        guard["reason"] = end_reason_of(error)
+        guard["sample"] = tick.sample
+    guard["mode"] = GuardMode.OFF
+    guard["amplitude_v"] = 0.0
+
+
+class DrivenLoop:
+    """A tick over a started driver, as far as both loops are alike.
+
+    An exception of the driver ends the loop and is its ``failure``. What is no error, such as `KeyboardInterrupt` or
+    `SystemExit` raised inside the driver, is its ``interruption``: it asks for the ramp, and the block that it cost counts as
+    lost. A second one is a failure.
+    """
+
+    failure: DaqError | None
+    cause: str
+
+    def __init__(self, daq: DAQ, tick: Tick) -> None:
+        self.daq, self.tick = daq, tick
+        self.failure = None
+        self.cause = ""
+        self.interruption: BaseException | None = None
+        self._counted: dict[str, int] | None = None
+        self._voltages = np.zeros(daq.block)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The driver's counters as of the last row: blocks of 0 V at the end have none."""
+        return dict(self.daq.counters) if self._counted is None else self._counted
+
+    def stop(self) -> None:
+        """Exchange 0 V for what is under way in the device, then stop it; any number of times.
+
+        An error is the loop's failure unless there is one; whatever happens, the device is told to stop.
+        """
+        for step in (self._keep_counters, self.daq.exchange_zeros, self.daq.stop):
+            try:
+                step()
+            except Exception as error:
+                self.failure = self.failure or as_daq_error(error)
+            except BaseException as error:
+                self.interruption = self.interruption or error
+
+    def _keep_counters(self) -> None:
+        if self._counted is None:
+            self._counted = {}
+            self._counted = dict(self.daq.counters)
+
+    def _swap(self) -> Block | None:
+        """The next block for the voltages at hand; None where the loop has failed."""
+        daq = self.daq
+        try:
+            return Block(daq.exchange(self._voltages), daq.flags)
+        except Exception as error:
+            self._fail(as_daq_error(error))
+        except BaseException as error:  # KeyboardInterrupt, SystemExit: a rig that is driven comes down first
+            if self.interruption is None:
+                return self._interrupted(error)
+            self._fail(DaqError(f"{type(error).__name__} was raised in the driver again while the output came down"))
+        return None
+
+    def _fail(self, error: DaqError) -> None:
+        self.failure = error
+        end_by_driver(self.tick, error)
+
+    def _interrupted(self, error: BaseException) -> Block:
+        """Ask for the ramp; the block whose exchange was broken off is one of lost samples."""
+        self.interruption = error
+        if not self.cause and int(self.tick.guard["mode"][0]) == GuardMode.ARMED:
+            self.cause = " ".join(f"{type(error).__name__} was raised in the driver: {error}".split()).rstrip(":")
+        self.tick.request_stop()
+        daq = self.daq
+        return Block(np.full((daq.block, len(daq.channels)), np.nan), np.full(daq.block, LOST, np.uint16))

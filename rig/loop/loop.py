@@ -1,0 +1,205 @@
+"""The loop: blocks from the driver through the tick and back, in chunks of telemetry for whoever records them."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from rig.daq import DAQ
+from rig.errors import DaqError
+from rig.loop.driven_loop import DrivenLoop
+from rig.tick.kernels import tick_block
+from rig.tick.layout import TickArrays
+from rig.tick.tick import Tick
+
+__all__ = ["FusedDAQ", "Loop", "LoopStatistics", "RunningLoop"]
+
+CHUNK_S = 0.5
+PACED_CHUNK_S = 0.02
+
+
+@runtime_checkable
+class FusedDAQ(Protocol):
+    """A driver that can run the tick and what stands behind it in one compiled loop."""
+
+    def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
+        """Fill ``readings`` and ``rows``; returns the number of samples done, fewer once the output is off."""
+
+
+@dataclass
+class LoopStatistics:
+    """What the loop did. ``busy_s`` is the time in tick and driver alone."""
+
+    sample_rate_hz: float
+    samples: int = 0
+    overruns: int = 0
+    busy_s: float = 0.0
+    wall_s: float = 0.0
+
+    @property
+    def realtime_factor(self) -> float:
+        """Seconds of rig time per second in tick and driver."""
+        return self.samples / self.sample_rate_hz / self.busy_s if self.busy_s > 0 else 0.0
+
+    @property
+    def end_to_end_factor(self) -> float:
+        """Seconds of rig time per second of everything, recording included."""
+        return self.samples / self.sample_rate_hz / self.wall_s if self.wall_s > 0 else 0.0
+
+    def report(self, periods: int) -> dict[str, Any]:
+        """All of it as plain data; ``periods`` of the oscillator, in all."""
+        factors = {name: getattr(self, name) for name in ("realtime_factor", "end_to_end_factor")}
+        return {**asdict(self), "periods": periods, **factors}
+
+
+class RunningLoop(Protocol):
+    """A loop as a campaign sees it, in this process or in another."""
+
+    tick: Tick
+    """Its control state, as of the last row that `run` has yielded."""
+    failure: DaqError | None
+    """Why the driver ended the loop, if it did."""
+    cause: str
+    """Why the loop asked for the ramp, or who had it do so, in a sentence; else empty."""
+    statistics: LoopStatistics
+    """What the loop did so far."""
+
+    @property
+    def waits(self) -> bool:
+        """Whether time stands still for it while its rows are not taken."""
+
+    def run(self) -> Iterator[np.ndarray]:
+        """Telemetry in chunks, until the output is off."""
+
+    def request_stop(self, cause: str = "") -> None:
+        """Ask for the ramp to 0 V, for a ``cause`` if there is one to be recorded.
+
+        Returns at once, may be called any time and from a signal handler.
+        """
+
+    def bring_down(self) -> None:
+        """Ramp to 0 V what still runs, and wait for it: for whoever does not take its rows any more."""
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The driver's counters."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The driver's remarks on the bench."""
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Statistics for the record, as plain data."""
+
+
+class Loop(DrivenLoop):
+    """Runs a tick over a started driver until the guard has brought the output to 0 V.
+
+    `run` yields structured rows in chunks; between two chunks the caller may `request_stop`. A driver that fails
+    ends the loop: the rows so far are yielded, ``failure`` holds the error. An interruption inside the driver
+    (`KeyboardInterrupt`, `SystemExit`) is raised by `run` once the output is off and all rows are yielded.
+
+    ``paced`` holds a virtual rig back to the wall clock; a chunk that is done too late counts as an overrun. ``fused`` false
+    makes a virtual rig go through `DAQ.exchange` as a real one does.
+    """
+
+    def __init__(self, daq: DAQ, tick: Tick, *, paced: bool = False, fused: bool = True) -> None:
+        super().__init__(daq, tick)
+        self.paced = paced
+        self.notes: tuple[str, ...] = ()
+        self.statistics = LoopStatistics(daq.sample_rate_hz)
+        self._fused = daq if fused and isinstance(daq, FusedDAQ) else None
+
+    @property
+    def waits(self) -> bool:
+        """Unless it is paced, or its device has a clock."""
+        return not (self.paced or self.daq.wall_clock)
+
+    def run(self) -> Iterator[np.ndarray]:
+        """Telemetry in chunks, until the output is off."""
+        yield from self._chunks()
+        if self.interruption is not None:
+            raise self.interruption
+
+    def bring_down(self) -> None:
+        """Ramp to 0 V what still runs; nobody takes the rows."""
+        self.request_stop()
+        for _ in self._chunks():
+            pass
+
+    def _chunks(self) -> Iterator[np.ndarray]:
+        chunk = self._chunk_samples()
+        self._load_kernels()
+        began = time.perf_counter()
+        while not self.over:
+            readings, rows = self.tick.buffers(chunk)
+            start = time.perf_counter()
+            done = self._advance(readings, rows)
+            self.statistics.busy_s += time.perf_counter() - start
+            self.statistics.samples += done
+            if self.over:
+                self.stop()  # before its rows are taken, which may last
+            if self.paced:
+                self._wait_for_the_clock(began)
+            self.statistics.wall_s = time.perf_counter() - began
+            if done:
+                yield self.tick.joined(readings[:done], rows[:done])
+        self.statistics.wall_s = time.perf_counter() - began
+
+    def request_stop(self, cause: str = "") -> None:
+        """Ask for the ramp to 0 V; it begins with the next chunk."""
+        self.cause = self.cause or cause
+        self.tick.request_stop()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The driver's remarks on the bench."""
+        return (*self.daq.remarks, *self.notes)
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Statistics for the record, as plain data."""
+        return {**self.statistics.report(int(self.tick.arrays.loop["cycles"][0])), **self.daq.statistics}
+
+    def _load_kernels(self) -> None:
+        """Compile, or load from the cache, what the loop calls, before the clock runs."""
+        readings, rows = self.tick.buffers(0)
+        if self._fused is not None:
+            self._fused.run_fused(self.tick.arrays, readings, rows)
+        else:
+            nothing = np.empty((0, len(self.daq.channels)))
+            tick_block(self.tick.arrays, nothing, self.daq.flags, readings, rows, np.empty(0))
+
+    @property
+    def over(self) -> bool:
+        """Whether the output is off for good."""
+        return self.failure is not None or self.tick.over
+
+    def _chunk_samples(self) -> int:
+        seconds = PACED_CHUNK_S if self.paced or self.daq.capabilities.paced else CHUNK_S
+        blocks = max(1, round(seconds * self.daq.sample_rate_hz / self.daq.block))
+        return blocks * self.daq.block
+
+    def _advance(self, readings: np.ndarray, rows: np.ndarray) -> int:
+        if self._fused is not None:
+            return self._fused.run_fused(self.tick.arrays, readings, rows)
+        block = self.daq.block
+        for first in range(0, rows.size, block):
+            swapped = self._swap()
+            if swapped is None:
+                return first
+            part = slice(first, first + block)
+            tick_block(self.tick.arrays, *swapped, readings[part], rows[part], self._voltages)
+            if self.over:
+                return first + block
+        return int(rows.size)
+
+    def _wait_for_the_clock(self, began: float) -> None:
+        early = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()
+        if early > 0.0:
+            time.sleep(early)
+        else:
+            self.statistics.overruns += 1

@@ -1,0 +1,100 @@
+"""A session with a bench: its driver open and its loop running, in this process or in one of its own.
+
+A virtual rig runs here, as fast as the machine allows; what has to keep to a clock runs in `rig.loop.worker`.
+"""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from rig.bench import Bench
+from rig.bench.cross_checks import refuse
+from rig.daq import DAQ, Capabilities
+from rig.drivers import make_daq
+from rig.errors import RigError
+from rig.loop.loop import Loop, RunningLoop
+from rig.tick.tick import TickSettings
+
+__all__ = ["Session", "open_session"]
+
+NO_PROCESS = "this system has no process for the loop alone: it shares its time with the recorder, nothing is promised"
+
+
+class Session(Protocol):
+    """A bench whose device is open."""
+
+    capabilities: Capabilities
+    """What its driver can do."""
+    identity: dict[str, str]
+    """What stands behind the driver, for the record."""
+    latched: str
+    """What the device had latched when it was opened, in words; empty for nothing."""
+
+    def start(self, settings: TickSettings) -> RunningLoop:
+        """Start the device and a loop over it; the loop runs when its rows are asked for. Once in a session.
+
+        The device forgets what it had latched when it was opened: whoever calls this has been armed.
+        """
+
+
+class LocalSession:
+    """A session in this process."""
+
+    def __init__(self, daq: DAQ, *, realtime: bool) -> None:
+        self._daq, self._realtime = daq, realtime
+        self._loop: Loop | None = None
+        self.capabilities = daq.capabilities
+        self.identity = daq.identity
+        self.latched = daq.latched
+
+    def start(self, settings: TickSettings) -> RunningLoop:
+        """Start the device; the loop runs while its rows are taken."""
+        self._daq.clear()
+        self._daq.start(settings.bench.block)
+        loop = Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
+        if self._realtime or self._daq.wall_clock:
+            loop.notes = (NO_PROCESS,)
+        self._loop = loop
+        return loop
+
+    def finish(self) -> None:
+        """Ramp down what still runs, for whoever leaves in mid-run."""
+        if self._loop is not None and not self._loop.over:
+            self._loop.bring_down()
+
+
+@contextmanager
+def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iterator[Session]:
+    """Open the bench's driver; on the way out its output is at 0 V and it is closed, whatever happened.
+
+    A driver with a clock behind it is opened in a process of its own, and so is a virtual rig that ``realtime`` holds back to
+    the wall clock. Raises `ConfigurationError`, `rig.errors.DaqError`.
+    """
+    from rig.loop.worker.session import WorkerSession
+    from rig.loop.worker.spawn import supported
+
+    refuse(bench)
+    daq = make_daq(bench, seed)
+    if supported() and (realtime or daq.wall_clock):
+        del daq  # nothing is open yet; the other process makes its own
+        with WorkerSession(bench, seed) as session:
+            yield session
+        return
+    try:
+        daq.open()
+        local = LocalSession(daq, realtime=realtime)
+        try:
+            yield local
+        finally:
+            local.finish()
+    finally:
+        _closed(daq)
+
+
+def _closed(daq: DAQ) -> None:
+    """Close a driver; what it has to say at that is no reason to lose what was recorded."""
+    try:
+        daq.close()
+    except RigError as error:
+        warnings.warn(f"the driver failed when it was closed: {error}", RuntimeWarning, stacklevel=2)

@@ -1,0 +1,190 @@
+"""The loop by the wall clock: one block after the other, on time or counted, and a safe end whatever happens."""
+
+import os
+import struct
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from rig.daq import DAQ
+from rig.errors import DaqError
+from rig.loop.driven_loop import DrivenLoop
+from rig.loop.worker.disturbances import disturbances, since
+from rig.loop.worker.memory import STOP, SharedMemory, Slot
+from rig.loop.worker.pace import pace_of
+from rig.loop.worker.times import BlockTimes
+from rig.tick.kernels import tick_block
+from rig.tick.safety.layout import GuardMode
+from rig.tick.tick import Tick
+
+__all__ = ["CHUNK_DONE", "LONGEST_STALL_S", "WallClockLoop", "suspended_s"]
+
+CHUNK_DONE = b"."
+"""What is sent to the campaign with every chunk."""
+NOTICE = struct.pack("!i", len(CHUNK_DONE)) + CHUNK_DONE  # as `Connection.send_bytes` has it, without its detours
+LONGEST_STALL_S = 1.0
+"""A loop paced by the host that comes later than this, or ten blocks, ends with a ramp."""
+OFF = int(GuardMode.OFF)
+
+_now = time.monotonic_ns
+
+
+def suspended_s() -> float:
+    """Seconds that the computer has slept since it was started; 0 where nobody counts them."""
+    clock = getattr(time, "CLOCK_BOOTTIME", None)
+    return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
+
+
+class WallClockLoop(DrivenLoop):
+    """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
+
+    ``tick`` must have its state in ``state`` (`rig.loop.worker.memory.packed`). ``asked`` returns in a sentence who has
+    asked the process itself to end, or an empty text.
+
+    Whatever asks for the end of it (the campaign, a signal, a full ring, a campaign that is gone, a computer that has
+    slept) gets the tick's ramp to 0 V. ``cause`` says who, unless it was the campaign; ``failure`` is the driver's error.
+    ``disturbances``: what may have held it up, counted.
+    """
+
+    def __init__(
+        self, daq: DAQ, tick: Tick, state: np.ndarray, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
+    ) -> None:
+        super().__init__(daq, tick)
+        self._state, self._memory, self._asked = state, memory, asked
+        self._facts_descriptor = facts.fileno()
+        self._parent = os.getppid()
+        self._alone = False
+        self._slept_s = suspended_s()
+        self._pace = pace_of(daq)
+        period_ns = 1e9 * daq.block / daq.sample_rate_hz
+        queue = daq.queue_blocks if self._pace.by_device else 1
+        self._deadline_ns = int(period_ns * max(1, queue))
+        self.times = BlockTimes(self._pace, memory, self._deadline_ns)
+        self._stall_ns = int(max(1e9 * LONGEST_STALL_S, 10 * period_ns))
+        self._unsaid = False
+        # Spread over the blocks of a chunk, for each costs as much as a block does; a chunk of one block does both in one.
+        chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
+        self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
+        self._samples = 0
+        self.disturbances: dict[str, int] = {}
+
+    @property
+    def deadline_s(self) -> float:
+        """Longest time from the release of a block to the handing over of its outputs."""
+        return 1e-9 * self._deadline_ns
+
+    def run(self) -> None:
+        """Until the output is off."""
+        before = disturbances()
+        began = _now()
+        self._pace.begin()
+        over = False
+        while not over:
+            slot = self._memory.to_fill()
+            rows = self._fill(slot)
+            over = self.failure is not None or self.tick.over
+            if over:
+                self.stop()  # before anything else: the rows can wait
+            self._hand_over(slot, rows, _now() - began)
+        self._announce()
+        self.disturbances = since(before)
+
+    def _fill(self, slot: Slot) -> int:
+        """Fill a slot block by block; returns the rows that it holds."""
+        tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
+        arrays, block, by_device = tick.arrays, self.daq.block, self._pace.by_device
+        chores = self._chores
+        guard = arrays.guard.view(np.int64).data
+        for first in range(0, self._memory.layout.chunk, block):
+            if words[STOP]:
+                tick.request_stop()
+            if first in chores:
+                chores[first]()
+                if self.failure is not None:  # there may be no room for anything
+                    return first
+            self._account()
+            pace.wait()
+            begun = 0 if by_device else _now()
+            swapped = self._swap()
+            if swapped is None:
+                return first
+            begun = _now() if by_device else begun
+            end = first + block
+            tick_block(arrays, *swapped, slot.readings[first:end], slot.rows[first:end], voltages)
+            self.times.begun(begun)
+            self._samples += block
+            if guard[0] == OFF and tick.over:
+                self._account()
+                return end
+        return self._memory.layout.chunk
+
+    def _account(self) -> None:
+        """The block before is over, and its outputs are handed over now: count its times."""
+        response = self.times.done()
+        if response > self._stall_ns and not self._pace.by_device:
+            self._end(f"the loop stood still for {1e-9 * response:.1f} s")
+
+    def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
+        """Complete a chunk and announce it.
+
+        Without anybody there the slot is filled again; without room it is one that the campaign may be reading.
+        """
+        self._announce()  # the chunk before, where this one ended before it came to it
+        if self._alone or self._memory.free < 1:
+            return
+        slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns
+        counts = list(self.counters.values())[: slot.counters.size]
+        slot.counters[: len(counts)] = counts
+        slot.state[:] = self._state
+        self._memory.publish()
+        self._unsaid = True
+
+    def _announce(self) -> None:
+        """Tell the campaign of a chunk that it has not been told of."""
+        if not self._unsaid:
+            return
+        self._unsaid = False
+        try:
+            os.write(self._facts_descriptor, NOTICE)
+        except OSError:
+            self._alone = True
+
+    def _both(self) -> None:
+        self._look_round()
+        self._announce()
+
+    def _look_round(self) -> None:
+        """Whether anything asks for the end."""
+        if os.getppid() != self._parent:
+            self._alone = True
+        if self._alone:
+            self._end("the campaign's process is gone")
+        elif self._memory.free <= self._memory.layout.reserve and not self._waited_for_room():
+            self._end("the campaign did not take its rows, and the output was brought down before any was lost")
+        if not self._alone and self._memory.free < 1:  # it has had the time of a ramp and more
+            self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
+        asked = self._asked()
+        if asked:
+            self._end(asked)
+        slept = suspended_s()
+        if slept - self._slept_s > 0.05:
+            self._end(f"the computer was suspended for {slept - self._slept_s:.1f} s")
+        self._slept_s = slept
+
+    def _waited_for_room(self) -> bool:
+        """Wait for the campaign where nobody's clock runs on."""
+        if self._pace.has_clock:
+            return False
+        while self._memory.free <= self._memory.layout.reserve:
+            if os.getppid() != self._parent or self._asked() or self._memory.words[STOP]:
+                break
+            time.sleep(0.01)
+        return True
+
+    def _end(self, cause: str) -> None:
+        """Ask for the ramp, for a cause of the loop's own; the first one stays."""
+        if not self.cause and not self._memory.words[STOP] and int(self.tick.guard["mode"][0]) == GuardMode.ARMED:
+            self.cause = cause
+        self.tick.request_stop()

@@ -1,0 +1,154 @@
+"""The loop process: opens the driver, takes its orders from the campaign, runs the loop, and says what came of it."""
+
+import signal
+import sys
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.daq import DAQ
+from rig.drivers import make_daq
+from rig.errors import ConfigurationError, DaqError, RigError
+from rig.loop.worker.loop import WallClockLoop
+from rig.loop.worker.memory import Layout, SharedMemory, packed
+from rig.loop.worker.pace import pacing_of
+from rig.loop.worker.probe import probe, round_trips
+from rig.system.privileges import prepare
+from rig.tick.kernels import tick_block
+from rig.tick.tick import TickSettings
+
+__all__ = ["main"]
+
+SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
+
+
+def main() -> None:
+    """Descriptors of the two pipes and of the shared memory are the arguments; see `rig.loop.worker.spawn`."""
+    commands = Connection(int(sys.argv[1]), writable=False)
+    facts = Connection(int(sys.argv[2]), readable=False)
+    memory = int(sys.argv[3])
+    try:
+        name, *arguments = _told(commands)
+        if name == "probe":
+            facts.send(("probed", probe(*arguments)))
+        elif name == "round trips":
+            facts.send(("round trips", round_trips(*arguments)))
+        elif name == "open":
+            _serve(commands, facts, memory, *arguments)
+    except (EOFError, BrokenPipeError):
+        return  # nobody is there any more, and the driver is closed
+    except RigError as error:
+        facts.send(("failed", described(error)))
+    except Exception as error:
+        facts.send(("failed", described(DaqError(f"the driver has failed: {type(error).__name__}: {error}"))))
+        raise
+
+
+def _told(commands: Connection) -> Any:
+    """The next order; `ConfigurationError` where it holds an object of a class that only the campaign's process has."""
+    try:
+        return commands.recv()
+    except (AttributeError, ImportError) as error:
+        raise ConfigurationError(
+            f"the loop's process cannot import what it was sent ({error}): a law, plan or driver of one's own must be "
+            "defined in a module that can be imported, not in the script that is run"
+        ) from None
+
+
+def described(error: RigError) -> tuple[tuple[str, ...], str]:
+    """An error for the other process: names of its classes, the closest first, and its message."""
+    return tuple(kind.__name__ for kind in type(error).__mro__), str(error)
+
+
+def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Bench, seed: int, privileged: bool) -> None:
+    """Open the driver, and run one loop over it if the campaign says so."""
+    with make_daq(bench, seed) as daq:
+        facts.send(("opened", daq.capabilities, dict(daq.identity), daq.latched, daq.remarks, dict(daq.counters)))
+        _, settings, ring_s = _told(commands)
+        presumed = _presumed_latency(daq, bench)
+        layout, memory = _shared(daq, settings, presumed, ring_s, descriptor)
+        _load_kernels(daq, bench, settings)
+        came = _listen()
+        said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")  # in no hurry, and never asleep
+        daq.clear()
+        daq.start(bench.block)
+        if daq.latency_samples > presumed:
+            layout, memory = _shared(daq, settings, daq.latency_samples, ring_s, descriptor)
+        loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
+        facts.send(("started", daq.latency_samples, layout, daq.remarks))
+        try:
+            loop.run()
+        finally:
+            loop.stop()
+        statistics = _statistics(loop, said)
+    failure = None if loop.failure is None else described(loop.failure)
+    facts.send(("ended", failure, loop.cause, loop.counters, statistics))
+
+
+def _presumed_latency(daq: DAQ, bench: Bench) -> float:
+    """Samples from output to input as far as they can be told before the device is started: queue, hold and filters."""
+    queue = bench.driver.options.get("queue_blocks", 1)
+    queue = queue if isinstance(queue, int) else 1
+    return queue * bench.block + 1.0 + daq.filter_delay_samples
+
+
+def _shared(
+    daq: DAQ, settings: TickSettings, latency_samples: float, ring_s: float, descriptor: int
+) -> tuple[Layout, SharedMemory]:
+    """The shared block, with room for a ramp and all that is under way in the device behind it."""
+    arrays = settings.build(latency_samples).arrays
+    layout = Layout.of(settings.bench, arrays, len(daq.counters), ring_s)
+    return layout, SharedMemory(descriptor, layout, create=True)
+
+
+def _begin(
+    daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
+) -> WallClockLoop:
+    tick = settings.build(daq.latency_samples)
+    tick.arrays, state = packed(tick.arrays)
+    return WallClockLoop(daq, tick, state, memory, facts, asked)
+
+
+def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
+    """Compile, or load from the cache, what the loop calls, before any device runs."""
+    tick = settings.build(0.0)
+    arrays, _ = packed(tick.arrays)
+    readings, rows = tick.buffers(0)
+    nothing = np.empty((0, len(bench.channels)))
+    tick_block(arrays, nothing, np.zeros(0, np.uint16), readings, rows, np.empty(0))
+    _ = tick.over
+    if not daq.wall_clock:  # software, which starts anew as if nothing had been
+        daq.start(bench.block)
+        daq.exchange(np.zeros(bench.block))
+        daq.stop()
+
+
+def _listen() -> list[str]:
+    """From here on signals only ask for the ramp; the list holds the names of those that have come."""
+    came: list[str] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        came.append(signal.Signals(number).name)
+
+    for name in SIGNALS:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), note)
+    return came
+
+
+def _asked(came: list[str], commands: Connection) -> str:
+    """Who has asked this process to end, in a sentence: a signal, or a campaign that talks to it no more."""
+    if came:
+        return f"the loop's process was asked to end ({came[0]})"
+    return "the campaign has let go of the loop" if commands.poll() else ""  # nothing else comes once it runs
+
+
+def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
+    """What the loop process alone knows, as plain data for the record."""
+    counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
+    real_time = {**said, **{name: str(value) for name, value in counted.items()}}
+    return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}

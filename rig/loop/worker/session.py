@@ -1,0 +1,194 @@
+"""A bench whose driver and loop live in a process of their own, as a campaign sees it."""
+
+import pickle
+import warnings
+from collections.abc import Callable, Iterator
+from functools import partial
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.daq import Capabilities
+from rig.errors import DaqError
+from rig.loop.driven_loop import end_by_driver
+from rig.loop.loop import LoopStatistics, RunningLoop
+from rig.loop.worker.loop import CHUNK_DONE
+from rig.loop.worker.memory import TIMES, Layout, SharedMemory, packed
+from rig.loop.worker.spawn import Worker, rebuilt
+from rig.tick.tick import TickSettings
+
+__all__ = ["WorkerLoop", "WorkerSession"]
+
+RING_S = 10.0
+LONGEST_SILENCE_S = 10.0
+HUNG_S = 0.5
+PATIENCE_S = 5.0
+
+
+class WorkerLoop:
+    """A loop in another process: its rows, and a copy of its control state as of the last of them."""
+
+    failure: DaqError | None
+
+    def __init__(
+        self,
+        worker: Worker,
+        settings: TickSettings,
+        latency_samples: float,
+        layout: Layout,
+        counters: dict[str, int],
+        remarks: tuple[str, ...],
+    ) -> None:
+        bench = settings.bench
+        self.tick = settings.build(latency_samples)
+        self.tick.arrays, self._state = packed(self.tick.arrays)
+        self.failure = None
+        self.cause = ""
+        self.remarks = remarks
+        self.counters = counters
+        self.statistics = LoopStatistics(bench.sample_rate_hz)
+        self.ended = False
+        self._worker, self._memory = worker, SharedMemory(worker.memory, layout)
+        self._ramp_down_s = bench.limits.ramp_down_s
+        self._silence_s = max(LONGEST_SILENCE_S, 50 * bench.block / bench.sample_rate_hz)
+        self._said: dict[str, Any] = {}
+
+    def run(self) -> Iterator[np.ndarray]:
+        """Telemetry in chunks of about 20 ms, until the output is off or the loop's process is gone."""
+        while not self.ended:
+            end = self._wait()
+            while self._memory.published > self._memory.taken:  # one that was not announced any more counts as well
+                rows = self._take()
+                if rows.size:
+                    yield rows
+            if end is not None:
+                end()
+
+    @property
+    def waits(self) -> bool:
+        """Never: the other process goes on."""
+        return False
+
+    def request_stop(self, cause: str = "") -> None:
+        """Ask for the ramp to 0 V; the loop looks at every block."""
+        self.cause = self.cause or cause
+        self._memory.request_stop()
+
+    def bring_down(self) -> None:
+        """Ramp to 0 V what still runs, and wait for it; nobody takes the rows."""
+        self.request_stop()
+        for _ in self.run():
+            pass
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Statistics for the record: how late each block began, how long it took, and both together, us."""
+        periods = int(self.tick.arrays.loop["cycles"][0])
+        out = {**self.statistics.report(periods), **self._said}
+        histograms = self._memory.histograms
+        out |= {f"{name}_us": histograms[name].report() for name in TIMES}
+        return out | {"histograms": {name: histograms[name].bins() for name in TIMES}}
+
+    def _wait(self) -> Callable[[], None] | None:
+        """Until a chunk has come; returns what is to be done at the end of the loop once nothing more will come."""
+        facts = self._worker.facts
+        try:
+            if not facts.poll(self._silence_s):
+                left = self._worker.end(HUNG_S + self._ramp_down_s)
+                return partial(self._fail, DaqError(self._silent_text(left)))
+            said = facts.recv_bytes()
+        except (EOFError, OSError):
+            return partial(self._fail, self._worker.ended())
+        return None if said == CHUNK_DONE else partial(self._finish, said)
+
+    def _silent_text(self, left: str) -> str:
+        how = left or "the loop's process was ended; the device's own watchdog brings its output to 0 V"
+        return f"the loop's process has been silent for {self._silence_s:g} s: its driver hangs; {how}"
+
+    def _take(self) -> np.ndarray:
+        slot = self._memory.to_take()
+        count, samples, overruns, busy_ns, wall_ns = (int(number) for number in slot.head)
+        rows = self.tick.joined(slot.readings[:count], slot.rows[:count])
+        self._state[:] = slot.state
+        self.counters = dict(zip(self.counters, (int(number) for number in slot.counters), strict=False))
+        self._memory.take()
+        statistics = self.statistics
+        statistics.samples, statistics.overruns = samples, overruns
+        statistics.busy_s, statistics.wall_s = 1e-9 * busy_ns, 1e-9 * wall_ns
+        return rows
+
+    def _finish(self, said: bytes) -> None:
+        name, *facts = pickle.loads(said)
+        if name == "ended":
+            failure, cause, self.counters, self._said = facts
+            self.cause = self.cause or cause
+            self.failure = None if failure is None else _daq_error(failure)
+        else:
+            self.failure = _daq_error(facts[0])
+        if self.failure is not None:
+            end_by_driver(self.tick, self.failure)
+        self.ended = True
+
+    def _fail(self, error: DaqError) -> None:
+        self.failure = error
+        end_by_driver(self.tick, error)
+        self.ended = True
+
+
+def _daq_error(described: tuple[tuple[str, ...], str]) -> DaqError:
+    error = rebuilt(*described)
+    return error if isinstance(error, DaqError) else DaqError(str(error))
+
+
+class WorkerSession:
+    """Opens the driver in a process of its own; a context manager, at whose end the output is at 0 V.
+
+    ``privileged`` false does without real-time scheduling and locked memory. ``ring_s``: rows of how many seconds the loop
+    keeps for a campaign that is late.
+
+    Raises what the driver does when it is opened: `rig.errors.DaqError`, `rig.errors.ConfigurationError`.
+    """
+
+    capabilities: Capabilities
+    identity: dict[str, str]
+    latched: str
+
+    def __init__(self, bench: Bench, seed: int = 0, *, privileged: bool = True, ring_s: float = RING_S) -> None:
+        self._bench, self._ring_s = bench, ring_s
+        self._loop: WorkerLoop | None = None
+        self._worker = Worker()
+        try:
+            self._worker.send("open", bench, seed, privileged)
+            opened = self._worker.receive("opened")
+            self.capabilities, self.identity, self.latched, self.remarks, self._counters = opened
+        except BaseException:
+            self._worker.close(0.5)
+            raise
+
+    @property
+    def pid(self) -> int:
+        """Number of the loop's process."""
+        return self._worker.pid
+
+    def start(self, settings: TickSettings) -> RunningLoop:
+        """Start the device and the loop, which runs from here on; its rows wait in the ring until they are asked for."""
+        self._worker.send("start", settings, self._ring_s)
+        latency_samples, layout, remarks = self._worker.receive("started")
+        self._loop = WorkerLoop(self._worker, settings, latency_samples, layout, self._counters, remarks)
+        return self._loop
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Ramp down what still runs, and wait for it."""
+        patience_s = PATIENCE_S + self._bench.limits.ramp_down_s  # it may run although nobody was told any more
+        if self._loop is not None and not self._loop.ended:
+            self._loop.request_stop()
+        left = self._worker.close(patience_s)
+        if left:
+            warnings.warn(left, RuntimeWarning, stacklevel=2)

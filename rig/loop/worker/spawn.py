@@ -1,0 +1,123 @@
+"""Starting the loop process, and talking to it."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+from typing import Any
+
+import rig.errors
+from rig.errors import DaqError, RigError
+from rig.loop.worker.memory import anonymous_file
+
+__all__ = ["Worker", "ask", "rebuilt", "supported"]
+
+KILLED = "the loop's process was killed; only the device's watchdog has acted"
+
+
+def supported() -> bool:
+    """Whether this system can have a loop process: descriptors must be inherited."""
+    return os.name == "posix"
+
+
+class Worker:
+    """A loop process.
+
+    It has a session of its own, so that a terminal's Ctrl-C and hang-up reach the campaign alone, and inherits two pipes and
+    the memory; it is a program of its own, so that a user's script needs no guard around its main part.
+    """
+
+    def __init__(self) -> None:
+        orders, self._commands = multiprocessing.Pipe(duplex=False)
+        self.facts, said = multiprocessing.Pipe(duplex=False)
+        self.memory = anonymous_file()
+        passed = (orders.fileno(), said.fileno(), self.memory)
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "rig.loop.worker", *map(str, passed)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                pass_fds=passed,
+                start_new_session=True,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},  # noqa: PTH109
+            )
+        except OSError as error:
+            os.close(self.memory)
+            raise DaqError(f"the loop's process cannot be started: {error}") from error
+        finally:
+            orders.close()
+            said.close()
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    def send(self, *command: Any) -> None:
+        """Send an order; one that nobody takes any more is found out by the next `receive`."""
+        with contextlib.suppress(BrokenPipeError):
+            self._commands.send(command)
+
+    def receive(self, expected: str) -> tuple[Any, ...]:
+        """What the process says next; raises its error again, or `DaqError` where it has ended."""
+        try:
+            name, *facts = self.facts.recv()
+        except (EOFError, OSError):
+            raise self.ended() from None
+        if name == "failed":
+            raise rebuilt(*facts[0])
+        if name != expected:
+            raise DaqError(f"the loop's process says {name!r} where {expected!r} was expected")
+        return tuple(facts)
+
+    def ended(self) -> DaqError:
+        """The error of a process that is there no more."""
+        try:
+            status = self._process.wait(2.0)
+        except subprocess.TimeoutExpired:
+            return DaqError("the loop's process is silent, and was not waited for any longer")
+        how = signal.Signals(-status).name if status < 0 else f"status {status}"
+        return DaqError(f"the loop's process has ended ({how}); the device's own watchdog brings its output to 0 V")
+
+    def end(self, patience_s: float) -> str:
+        """Ask it to end, then make it. Returns in a sentence what could not be done in order; empty if it ended by itself."""
+        for action, said in ((self._process.terminate, ""), (self._process.kill, KILLED)):
+            action()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(patience_s)
+                return said
+        return f"{KILLED}, and it is there still as process {self.pid}"
+
+    def close(self, patience_s: float) -> str:
+        """Let it end by itself for a while, then make it; returns what `end` does."""
+        self._commands.close()
+        try:
+            self._process.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            return self.end(patience_s)
+        else:
+            return ""
+        finally:
+            self.facts.close()
+            os.close(self.memory)
+
+
+def rebuilt(names: tuple[str, ...], message: str) -> RigError:
+    """An error of the other process: the closest class that both know."""
+    for name in names:
+        kind = getattr(rig.errors, name, None)
+        if isinstance(kind, type) and issubclass(kind, RigError):
+            return kind(message)
+    return DaqError(message)
+
+
+def ask(*command: Any) -> Any:
+    """A loop process for one question: ``probe`` or ``round trips``."""
+    worker = Worker()
+    try:
+        worker.send(*command)
+        return worker.receive({"probe": "probed"}.get(command[0], command[0]))[0]
+    finally:
+        worker.close(2.0)

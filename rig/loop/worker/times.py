@@ -1,0 +1,68 @@
+"""The times of the blocks of a loop: how late each began, how long it took, and what held it up."""
+
+import time
+
+from rig.loop.worker.memory import SharedMemory
+from rig.loop.worker.pace import Pace
+
+__all__ = ["STALL_NS", "BlockTimes"]
+
+STALL_NS = 1_000_000
+"""A block that is handed over later than this after its release has been held up."""
+
+_now = time.monotonic_ns
+_computed = time.thread_time_ns
+
+
+class BlockTimes:
+    """Counts into the histograms of the shared memory, and the blocks that were late or held up.
+
+    A *stall* is a block handed over more than 1 ms after its release. One of ``own_stalls`` is explained by what the thread
+    itself computed since the block before: Python, or the kernel on its behalf. In all others it was ready or asleep, and
+    somebody else had the processor. Without a clock (`rig.loop.worker.pace.Lockstep`) nothing can be late: only the time that
+    the blocks took is counted.
+    """
+
+    def __init__(self, pace: Pace, memory: SharedMemory, deadline_ns: int) -> None:
+        self._pace, self._deadline_ns = pace, deadline_ns
+        histograms = memory.histograms
+        self._counts = histograms["wake_up"].add, histograms["execution"].add, histograms["response"].add
+        self._begun_ns = self._release_ns = 0
+        self._computed_ns = _computed()
+        self.late = self.stalls = self.own_stalls = self.busy_ns = 0
+
+    def report(self) -> dict[str, int]:
+        """Periods left out and stalls, for the record."""
+        return {"skipped_periods": self._pace.skipped, "stalls": self.stalls, "own_stalls": self.own_stalls}
+
+    @property
+    def overruns(self) -> int:
+        """Blocks beyond their deadline, and periods left out."""
+        return self.late + self._pace.skipped
+
+    def begun(self, begun_ns: int) -> None:
+        """A block was in hand at a time (monotonic clock, ns)."""
+        self._begun_ns, self._release_ns = begun_ns, self._pace.release(begun_ns)
+
+    def done(self) -> int:
+        """The outputs of the block are handed over now; returns how long after its release, ns."""
+        begun, release = self._begun_ns, self._release_ns
+        if not begun:
+            return 0
+        done = _now()
+        self._begun_ns = 0
+        self.busy_ns += done - begun
+        count_wake_up, count_execution, count_response = self._counts
+        count_execution(done - begun)
+        if not self._pace.has_clock:
+            return 0
+        count_wake_up(begun - release)
+        response = done - release
+        count_response(response)
+        computed = _computed()
+        if response > STALL_NS:
+            self.stalls += 1
+            self.own_stalls += computed - self._computed_ns > STALL_NS
+        self._computed_ns = computed
+        self.late += response > self._deadline_ns
+        return response

@@ -1,0 +1,31 @@
+"""Recordings as measurements in memory, and as experiments for nonlinear state-space models."""
+
+from rig.measurements.measurements import (
+    STEPPED,
+    Estimator,
+    backbone,
+    bench_of_recording,
+    continuous_backbones,
+    force_surface,
+    frequency_responses,
+    load_backbone,
+    point_rows,
+    response_matrices,
+    spectra,
+    sweeps,
+)
+
+__all__ = [
+    "STEPPED",
+    "Estimator",
+    "backbone",
+    "bench_of_recording",
+    "continuous_backbones",
+    "force_surface",
+    "frequency_responses",
+    "load_backbone",
+    "point_rows",
+    "response_matrices",
+    "spectra",
+    "sweeps",
+]

@@ -1,0 +1,1 @@
+"""Files of models, predictions and imported measurements: one description per kind."""

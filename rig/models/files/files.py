@@ -1,0 +1,87 @@
+"""Models, predictions and imported measurements in files: written whole, read back as what they were."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from numpy.exceptions import ComplexWarning
+
+from identification import LinearModes, ModalAnalysis, PnlssFit, PnlssModel
+from rig.errors import RecordingError
+from rig.models.files.exciter import EXCITER
+from rig.models.files.force_surface import FORCE_SURFACE
+from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
+from rig.models.files.kind import FileKind
+from rig.models.files.linear_modes import LINEAR_MODES
+from rig.models.files.measured_backbone import MEASURED_BACKBONE
+from rig.models.files.nonlinear_mode import NONLINEAR_MODE
+from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.files.predictions import PREDICTIONS
+from rig.models.files.response_matrix import RESPONSE_MATRIX
+from rig.recording.arrays import kind_of, read_arrays, write_arrays
+from rig.text.printable import error_text
+
+__all__ = ["KINDS", "load", "load_as", "save", "understood"]
+
+_ALL = (
+    NONLINEAR_MODE,
+    LINEAR_MODES,
+    EXCITER,
+    PNLSS,
+    FORCE_SURFACE,
+    FREQUENCY_RESPONSES,
+    RESPONSE_MATRIX,
+    MEASURED_BACKBONE,
+    PREDICTIONS,
+)
+KINDS = {kind.name: kind for kind in _ALL}
+"""Every kind of file that is no recording, by its name in the file."""
+
+_MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
+
+
+def save(thing: Any, path: Path) -> None:
+    """Write a model, a prediction or an imported measurement, whole or not at all.
+
+    Linear modes alone are written as a modal analysis, a fit or a model alone as an identified PNLSS model.
+    """
+    if isinstance(thing, LinearModes):
+        thing = ModalAnalysis(thing)
+    elif isinstance(thing, PnlssFit):
+        thing = IdentifiedPnlss(model=thing.model, fit=thing)
+    elif isinstance(thing, PnlssModel):
+        thing = IdentifiedPnlss(model=thing)
+    kind = next((kind for kind in KINDS.values() if isinstance(thing, kind.holds)), None)
+    if kind is None:
+        raise RecordingError(f"{path}: a {type(thing).__name__} has no file of its own; known are {', '.join(KINDS)}")
+    write_arrays(path, kind.name, *kind.pack(thing))
+
+
+def load(path: Path) -> Any:
+    """What `save` wrote; `RecordingError` where the file holds a recording or is damaged."""
+    name, arrays, attributes = read_arrays(path)
+    if name not in KINDS:
+        raise RecordingError(f"{path}: is a file of kind {name}; known are {', '.join(KINDS)}")
+    with understood(path, name):
+        return KINDS[name].unpack(arrays, attributes)
+
+
+@contextmanager
+def understood(path: Path, kind: str) -> Iterator[None]:
+    """Turn what missing arrays, wrong shapes and wrong types in a file lead to into one `RecordingError` that names it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ComplexWarning)  # an imaginary part must not get lost
+            yield
+    except (*_MISFITS, ComplexWarning) as error:
+        raise RecordingError(f"{path}: does not hold what makes a {kind} ({error_text(error)})") from error
+
+
+def load_as(kind: FileKind, path: Path) -> Any:
+    """The same where one kind alone will do; `RecordingError` for any other."""
+    found = kind_of(path)
+    if found != kind.name:
+        raise RecordingError(f"{path}: is a file of kind {found}, wanted is one of kind {kind.name}")
+    return load(path)

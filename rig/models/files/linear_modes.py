@@ -1,0 +1,58 @@
+"""Files of linear modal analyses: the modes, and what they were found in."""
+
+from typing import Any
+
+from identification import ModalAnalysis
+from rig.models.files.kind import FileKind
+from rig.text.console import number, print_table
+
+__all__ = ["LINEAR_MODES"]
+
+
+def _summarise(analysis: ModalAnalysis) -> dict[str, Any]:
+    modes = analysis.modes
+    return {
+        "specimen": modes.specimen,
+        "channels": [channel.name for channel in modes.channels],
+        "estimator": None if analysis.responses is None else analysis.responses.estimator,
+        "band_hz": [modes.lowest_hz, modes.highest_hz],
+        "force_rms_n": modes.force_rms_n,
+        "fit_residual": modes.fit_residual,
+        "modes": modes.table(),
+        "shapes": modes.shapes.T.tolist(),
+        "shapes_std": modes.shapes_std.T.tolist(),
+        "notes": list(modes.notes),
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    low, high = summary["band_hz"]
+    source = f"{summary['estimator']}, " if summary["estimator"] else ""
+    level = f", {summary['force_rms_n']:.3g} N RMS" if summary["force_rms_n"] > 0.0 else ""
+    print(f"{source}{low:g} to {high:g} Hz{level}; misfit over expected error {number(summary['fit_residual'], '.2f')}")
+    print_table(
+        ("mode", "frequency Hz", "+-", "damping %", "+-", *(f"shape {name}" for name in summary["channels"])),
+        [
+            (
+                str(index + 1),
+                number(m["frequency_hz"], ".4f"),
+                number(m["frequency_std_hz"], ".4f", 1.96),
+                number(m["damping_ratio"], ".4f", 100.0),
+                number(m["damping_ratio_std"], ".4f", 196.0),
+                *(number(value, ".5f") for value in summary["shapes"][index]),
+            )
+            for index, m in enumerate(summary["modes"])
+        ],
+    )
+
+
+LINEAR_MODES = FileKind(
+    name="linear-modes",
+    holds=ModalAnalysis,
+    pack=ModalAnalysis.to_arrays,
+    unpack=ModalAnalysis.from_arrays,
+    summarise=_summarise,
+    say=_say,
+    draw="rig.models.files.linear_modes_figure:draw_linear_modes",
+    figure_in=(12.0, 8.0),
+)

@@ -1,0 +1,178 @@
+"""Figure of a linear modal analysis: responses with their fit, stabilisation, mode shapes, MAC."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
+from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_linear_modes"]
+
+_MOST_OUTPUTS = 4
+_MOST_DOTS = 4000
+_POOLED_LINES = 21
+
+
+def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
+    """Draw modes with the responses and the stabilisation diagram, where the file has them.
+
+    ``page`` is an empty figure, about 11 by 8 inches.
+    """
+    modes, responses, stabilisation = found.modes, found.responses, found.stabilisation
+    left, right = np.asarray(page.subfigures(1, 2, width_ratios=(1.35, 1.0)))
+    responses_on(left, modes, responses)
+    top, middle, bottom = right.subplots(3, 1, height_ratios=(1.1, 1.0, 1.0))
+    _stabilisation(top, modes, stabilisation, responses)
+    _shapes(middle, modes)
+    _mac(bottom, modes)
+    level = "" if not np.isfinite(modes.force_rms_n) else f", {modes.force_rms_n:.3g} N RMS"
+    level = ", extrapolated to zero force" if modes.force_rms_n == 0.0 else level
+    title(page, f"{modes.specimen or 'specimen'}: linear modal analysis, {modes.frequency_hz.size} modes{level}")
+
+
+def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatrix | None) -> None:
+    """Amplitude and phase of measured responses and of the model; standard error of the measured ones."""
+    size, phase = page.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    if responses is None:
+        say_why_empty(size, "no frequency responses in the file")
+        say_why_empty(phase, "")
+        return
+    frequency = responses.frequency_hz
+    fine = np.union1d(np.geomspace(max(frequency[0], 1e-3), frequency[-1], 2000), _around(modes))
+    fitted = modes.response_matrix(fine[(fine >= modes.lowest_hz) & (fine <= modes.highest_hz)])
+    every = slice(None, None, max(1, frequency.size // _MOST_DOTS))
+    known = {channel.name for channel in modes.channels}
+    errors = responses.total_std if np.isfinite(responses.total_std).any() else responses.noise_std
+    colours = (MAIN, SECOND, "#4f8f4f", "#8064a2")
+    for row, (channel, colour) in enumerate(zip(responses.outputs[:_MOST_OUTPUTS], colours, strict=False)):
+        measured = responses.value[every, row, 0]
+        label = f"{channel.name}, {_unit(channel.unit, responses.inputs[0].unit)}"
+        size.semilogy(frequency[every], np.abs(measured), ".", ms=2.5, color=colour, alpha=0.5, label=label)
+        if np.isfinite(errors[:, row, 0]).any():
+            size.semilogy(frequency[every], _smooth(errors[:, row, 0])[every], color=colour, lw=0.6, alpha=0.6, ls="--")
+        phase.plot(frequency[every], np.degrees(np.angle(measured)), ".", ms=2.5, color=colour, alpha=0.5)
+        if channel.name in known:
+            model = fitted.path(channel.name)
+            size.semilogy(fitted.frequency_hz, np.abs(model), color=colour, lw=1.0)
+            phase.plot(fitted.frequency_hz, _broken(np.degrees(np.angle(model))), color=colour, lw=1.0)
+    size.plot([], [], color=REJECTED, lw=1.0, label="model")
+    size.plot([], [], color=REJECTED, lw=0.6, ls="--", label="standard error")
+    size.set(ylabel=f"frequency response ({responses.estimator})")
+    size.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=6, handlelength=1.2, columnspacing=1.2)
+    size.tick_params(labelbottom=False)
+    phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+
+
+def _unit(output: str, source: str) -> str:
+    """Unit of a response, as it is printed."""
+    return f"({output.replace('^2', '2').replace('s2', 's²')})/{source}"
+
+
+def _smooth(errors: np.ndarray) -> np.ndarray:
+    """Root of the mean square over neighbouring lines: the scatter of a standard error says nothing."""
+    window = np.ones(min(_POOLED_LINES, errors.size))
+    power = np.convolve(errors**2, window, mode="same") / np.convolve(np.ones(errors.size), window, mode="same")
+    return np.asarray(np.sqrt(power))
+
+
+def _broken(angle_deg: np.ndarray) -> np.ndarray:
+    """An angle without the strokes where it turns over from 180 to -180."""
+    jump = np.abs(np.diff(angle_deg, prepend=angle_deg[:1])) > 180.0
+    return np.where(jump, np.nan, angle_deg)
+
+
+def _around(modes: LinearModes) -> np.ndarray:
+    """Frequencies that show every peak of the model."""
+    width = modes.damping_ratio * modes.frequency_hz
+    return np.asarray((modes.frequency_hz[:, None] + width[:, None] * np.linspace(-12.0, 12.0, 97)).ravel())
+
+
+def _stabilisation(
+    axis: "Axes",
+    modes: LinearModes,
+    diagram: StabilisationDiagram | None,
+    responses: FrequencyResponseMatrix | None,
+) -> None:
+    """Poles over the model's order, with the sum of the responses behind them."""
+    if diagram is None:
+        say_why_empty(axis, "no stabilisation diagram: modes were given")
+        return
+    if responses is not None:
+        behind = axis.twinx()
+        behind.semilogy(responses.frequency_hz, np.abs(responses.value).sum(axis=(1, 2)), color="#cccccc", lw=0.7)
+        behind.set_axis_off()
+        axis.set_zorder(behind.get_zorder() + 1)
+        axis.patch.set_visible(False)
+    kinds = (
+        (~diagram.frequency_stable, ".", REJECTED, "new"),
+        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "frequency"),
+        (diagram.stable, "o", MAIN, "frequency, damping and shape stable"),
+    )
+    for which, marker, colour, label in kinds:
+        at = which & diagram.physical
+        axis.plot(
+            diagram.frequency_hz[at], diagram.order[at], marker, ms=3, mfc="none", ls="", color=colour, label=label
+        )
+    for frequency in modes.frequency_hz:
+        axis.axvline(frequency, color=MAIN, lw=0.5, alpha=0.4)
+    axis.set(xlabel="frequency, Hz", ylabel="model order", ylim=(0, 1.05 * diagram.orders.max()))
+    _legend_above(axis, 3)
+
+
+def _shapes(axis: "Axes", modes: LinearModes) -> None:
+    """Mass-normalised deflection of every mode, a group of bars for each channel, with 95 % intervals."""
+    count = modes.frequency_hz.size
+    width = 0.8 / count
+    at = np.arange(len(modes.channels))
+    for mode in range(count):
+        label = f"{modes.frequency_hz[mode]:.2f} Hz, {100 * modes.damping_ratio[mode]:.3f} %"
+        error = 1.96 * np.nan_to_num(modes.shapes_std[:, mode])
+        colour = _shade(mode, count)
+        x = at + (mode - 0.5 * (count - 1)) * width
+        axis.bar(x, modes.shapes[:, mode], 0.9 * width, yerr=error, color=colour, label=label, capsize=2)
+    axis.axhline(0.0, color=REJECTED, lw=0.8)
+    axis.set_xticks(at, [channel.name for channel in modes.channels])
+    axis.set_ylabel("mode shape, kg$^{-1/2}$")
+    _legend_above(axis, min(count, 3))
+
+
+def _mac(axis: "Axes", modes: LinearModes) -> None:
+    """MAC of every mode with every other."""
+    unit = modes.shapes / np.linalg.norm(modes.shapes, axis=0)
+    mac = (unit.T @ unit) ** 2
+    axis.imshow(mac, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    names = [f"{frequency:.1f}" for frequency in modes.frequency_hz]
+    axis.set_xticks(range(len(names)), names)
+    axis.set_yticks(range(len(names)), names)
+    axis.set(xlabel="mode, Hz", ylabel="mode, Hz")
+    axis.grid(False)
+    axis.set_title("MAC of the modes at these sensors", fontsize=9)
+    for (row, column), value in np.ndenumerate(mac):
+        colour = "white" if value > 0.6 else "black"
+        axis.text(
+            column, row, f"{value:.2f}", ha="center", va="center", fontsize=8 if len(mac) < 9 else 6, color=colour
+        )
+
+
+def _legend_above(axis: "Axes", columns: int) -> None:
+    """Legend over the panel, where it hides nothing."""
+    axis.legend(
+        fontsize=7,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=columns,
+        handletextpad=0.3,
+        columnspacing=1.0,
+        handlelength=1.2,
+    )
+
+
+def _shade(index: int, count: int) -> Any:
+    from matplotlib import colormaps
+
+    return colormaps["viridis"](0.9 * index / max(1, count - 1))

@@ -1,0 +1,51 @@
+"""Files of nonlinear-mode models."""
+
+from typing import Any
+
+from identification import NonlinearMode
+from rig.models.files.kind import FileKind
+from rig.text.console import number, print_table
+
+__all__ = ["NONLINEAR_MODE"]
+
+
+def _summarise(mode: NonlinearMode) -> dict[str, Any]:
+    return {
+        "specimen": mode.specimen,
+        "source": mode.source,
+        "frequency_shift": mode.frequency_shift,
+        "points": mode.table(),
+        "notes": list(mode.notes),
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    print_table(
+        ("force N", "amplitude mm", "modal frequency Hz", "+-", "damping %", "+-", "all harmonics %", "phase lag deg"),
+        [
+            (
+                number(p["force_n"], ".4f"),
+                number(p["amplitude_m"], ".5f", 1e3),
+                number(p["modal_frequency_hz"], ".4f"),
+                number(p["modal_frequency_bound_95_hz"], ".4f"),
+                number(p["damping_ratio"], ".4f", 100.0),
+                number(p["damping_ratio_bound_95"], ".4f", 100.0),
+                number(p["damping_ratio_total_power"], ".4f", 100.0),
+                number(p["phase_lag_deg"], ".2f"),
+            )
+            for p in summary["points"]
+        ],
+    )
+    print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
+
+
+NONLINEAR_MODE = FileKind(
+    name="nonlinear-mode",
+    holds=NonlinearMode,
+    pack=NonlinearMode.to_arrays,
+    unpack=NonlinearMode.from_arrays,
+    summarise=_summarise,
+    say=_say,
+    draw="rig.figures.nonlinear_mode:draw_mode",
+    figure_in=(12.0, 6.4),
+)

@@ -1,0 +1,200 @@
+"""Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one of them."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from identification import ErrorSpectra, Features, IdentificationError, PnlssFit, PnlssModel, SimulatedRun
+from identification.packing import pack_all, unpack_all
+from rig.models.files.kind import Arrays, Attributes, FileKind
+from rig.text.console import number, print_table
+
+__all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentifiedPnlss:
+    """A model, and how it was come by.
+
+    Parameters
+    ----------
+    model
+        The model.
+    fit
+        What it is the best iterate of; None for a model from elsewhere.
+    runs, linear_runs
+        Every experiment as the model simulates it, and as the linear start does; the latter may be empty.
+    spectra
+        Of one periodic experiment, validation data where there are any; None where there is none.
+    seconds
+        Wall time of the identification; NaN if unknown.
+    notes
+        What a user should know about the data, one line each.
+    data
+        Fingerprint of the data of the fit, by which it is known again; empty if unknown.
+    uses
+        ``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown.
+    """
+
+    model: PnlssModel
+    fit: PnlssFit | None = None
+    runs: tuple[SimulatedRun, ...] = ()
+    linear_runs: tuple[SimulatedRun, ...] = ()
+    spectra: ErrorSpectra | None = None
+    seconds: float = float("nan")
+    notes: tuple[str, ...] = ()
+    data: str = ""
+    uses: Mapping[str, str] = field(default_factory=dict)
+
+
+def _pack(found: IdentifiedPnlss) -> tuple[Arrays, Attributes]:
+    kept: PnlssFit | PnlssModel = found.model if found.fit is None else found.fit
+    arrays, attributes = kept.to_arrays()
+    head = "model" if found.fit is None else "fit"
+    arrays = {f"{head}/{name}": array for name, array in arrays.items()}
+    out: dict[str, Any] = {
+        head: attributes,
+        "seconds": found.seconds,
+        "notes": list(found.notes),
+        "data": found.data,
+        "uses": dict(found.uses),
+    }
+    spectra = () if found.spectra is None else (found.spectra,)
+    for name, things in (("runs", found.runs), ("linear_runs", found.linear_runs), ("spectra", spectra)):
+        inside, of_things = pack_all(name, things)
+        arrays, out = arrays | inside, out | of_things
+    return arrays, out
+
+
+def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
+    head = next((name for name in ("fit", "model") if name in attributes), None)
+    if head is None:
+        raise IdentificationError("PNLSS file: holds neither a fit nor a model")
+    inside = {name.removeprefix(f"{head}/"): array for name, array in arrays.items() if name.startswith(f"{head}/")}
+    fit = PnlssFit.from_arrays(inside, attributes[head]) if head == "fit" else None
+    kinds: dict[str, type] = {"runs": SimulatedRun, "linear_runs": SimulatedRun, "spectra": ErrorSpectra}
+    parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in kinds.items()}
+    spectra = parts.pop("spectra")
+    return IdentifiedPnlss(
+        model=PnlssModel.from_arrays(inside, attributes[head]) if fit is None else fit.model,
+        fit=fit,
+        **parts,
+        spectra=spectra[0] if spectra else None,
+        seconds=float(attributes["seconds"]),
+        notes=tuple(attributes["notes"]),
+        data=str(attributes.get("data", "")),
+        uses={str(name): str(use) for name, use in attributes.get("uses", {}).items()},
+    )
+
+
+def poles_of(model: PnlssModel) -> list[dict[str, float]]:
+    """Natural frequencies (Hz) and damping ratios of the linear part, each pair of poles once, lowest first."""
+    values = np.linalg.eigvals(model.a).astype(complex)
+    s = np.log(values[(np.abs(values) > 0.0) & (values.imag >= 0.0)]) * model.sample_rate_hz
+    rows = [{"frequency_hz": float(abs(p) / (2.0 * np.pi)), "damping_ratio": float(-p.real / abs(p))} for p in s]
+    return sorted(rows, key=lambda row: row["frequency_hz"])
+
+
+def _features(features: Features) -> dict[str, Any]:
+    """How many of which kind."""
+    degrees = Counter(int(degree) for degree in features.exponents.sum(axis=1))
+    return {
+        "monomials": {str(degree): degrees[degree] for degree in sorted(degrees)},
+        "saturating": len(features.weights),
+        "bounded": bool(np.isfinite(features.limits).any()),
+    }
+
+
+def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
+    model, fit = found.model, found.fit
+    return {
+        "specimen": model.specimen,
+        "states": model.states,
+        "inputs": [channel.name for channel in model.inputs],
+        "outputs": [channel.name for channel in model.outputs],
+        "sample_rate_hz": model.sample_rate_hz,
+        "state_features": _features(model.state_features),
+        "output_features": _features(model.output_features),
+        "nonlinear_coefficients": model.nonlinear_coefficients,
+        "poles": poles_of(model),
+        "fit": None
+        if fit is None
+        else {
+            "iterations": fit.history.iterations,
+            "chosen": fit.chosen,
+            "training_error": fit.training_error,
+            "validation_error": fit.validation_error,
+            "stopped": fit.stopped,
+            "interrupted": fit.interrupted,
+            "seconds": float(fit.history.seconds[-1]),
+        },
+        "errors": [run.row() for run in found.runs],
+        "linear_errors": [run.row() for run in found.linear_runs],
+        "training": list(model.training),
+        "state_range": model.state_range.tolist(),
+        "input_range": model.input_range.tolist(),
+        "seconds": found.seconds,
+        "notes": list(dict.fromkeys([*found.notes, *model.notes])),
+    }
+
+
+def _said(features: dict[str, Any]) -> str:
+    """Features in words."""
+    parts = [f"{count} of degree {degree}" for degree, count in features["monomials"].items()]
+    parts += [f"{features['saturating']} saturating"] if features["saturating"] else []
+    return (", ".join(parts) or "none") + (", bounded" if features["bounded"] else "")
+
+
+def _say(summary: dict[str, Any]) -> None:
+    inputs, outputs = ", ".join(summary["inputs"]), ", ".join(summary["outputs"])
+    print(f"{summary['states']} states at {summary['sample_rate_hz']:g} Hz; {inputs} to {outputs}")
+    print(
+        f"{summary['nonlinear_coefficients']} nonlinear coefficients; features of the states: "
+        f"{_said(summary['state_features'])}; of the outputs: {_said(summary['output_features'])}"
+    )
+    modes = (f"{p['frequency_hz']:.4f} Hz, {100.0 * p['damping_ratio']:.3f} %" for p in summary["poles"])
+    print(f"poles of the linear part: {'; '.join(modes)}")
+    if summary["fit"] is not None:
+        fit = summary["fit"]
+        judged = number(fit["validation_error"], ".3f", 100.0)
+        print(
+            f"iteration {fit['chosen']} of {fit['iterations']} chosen: error {number(fit['training_error'], '.3f', 100.0)} % "
+            f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; {fit['stopped']}; "
+            f"{number(summary['seconds'], '.1f')} s in all"
+        )
+    if summary["errors"]:
+        print("relative errors of the model, in brackets those of its linear start, %")
+        linear = summary["linear_errors"] or [None] * len(summary["errors"])
+        print_table(
+            ("experiment", "use", *summary["outputs"], "range use"),
+            [
+                (
+                    run["name"],
+                    run["use"],
+                    *(_error(run, before, name) for name in summary["outputs"]),
+                    "unbounded" if run["unbounded"] else number(run["range_use"], ".2f"),
+                )
+                for run, before in zip(summary["errors"], linear, strict=True)
+            ],
+        )
+
+
+def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str:
+    """One error, and the linear start's in brackets."""
+    own = "unbounded" if run["unbounded"] else number(run["errors"][name], ".3f", 100.0)
+    return own if before is None else f"{own} ({number(before['errors'][name], '.2f', 100.0)})"
+
+
+PNLSS = FileKind(
+    name="pnlss",
+    holds=IdentifiedPnlss,
+    pack=_pack,
+    unpack=_unpack,
+    summarise=_summarise,
+    say=_say,
+    draw="rig.models.files.pnlss_figure:draw_pnlss",
+    figure_in=(12.0, 7.5),
+)

@@ -1,0 +1,156 @@
+"""Files of predictions."""
+
+from typing import Any
+
+import numpy as np
+
+from identification import FrequencyResponse, Predictions, ResponseBand, SteadyPrediction, SweepPrediction, Transient
+from rig.models.files.kind import FileKind
+from rig.text.console import number, print_table
+
+__all__ = ["CUT", "PREDICTIONS"]
+
+CUT = "the response from "
+"""So begins the note of a response that was cut off, that of the first path before that of the other."""
+
+
+def _steady(
+    response: SteadyPrediction, band: ResponseBand | None, reference: FrequencyResponse | None
+) -> dict[str, Any]:
+    peak, reached = response.peak(), response.peak_reached()
+    return {
+        "name": (reference.label if reference else "") or response.name,
+        "force_n": None if response.force == "voltage" else response.force_n,
+        "voltage_v": response.force_n if response.force == "voltage" else None,
+        "force": response.force,
+        "complete": response.complete,
+        "largest_m": peak.amplitude_m,
+        "peak_m": peak.amplitude_m if reached else None,
+        "peak_frequency_hz": peak.frequency_hz if reached else None,
+        "peak_std_m": None if band is None else band.peak_amplitude_std_m,
+        "peak_frequency_std_hz": None if band is None else band.peak_frequency_std_hz,
+        "peak_phase_lag_deg": peak.phase_lag_deg if reached else None,
+        "folds_hz": response.fold_frequency_hz.tolist(),
+        "detached_branches": int(response.branch.max()) if response.complete else 0,
+        "range_use": float(response.range_use[response.branch == 0].max()),
+        "notes": sorted(response.notes, key=lambda note: not note.startswith(CUT)),
+    }
+
+
+def _sweep(sweep: SweepPrediction, recorded: Transient | None, name: str) -> dict[str, Any]:
+    peak_m, peak_hz = sweep.peak(recorded)
+    return {
+        "name": name,
+        "origin": sweep.origin,
+        "peak_m": peak_m,
+        "peak_frequency_hz": peak_hz,
+        "smallest_force_n": float(np.abs(sweep.force).min()),
+        "range_use": sweep.range_use,
+        "unbounded": sweep.unbounded_at_s is not None,
+        "unbounded_at_s": sweep.unbounded_at_s,
+        "notes": list(sweep.notes),
+    }
+
+
+def _summarise(predictions: Predictions) -> dict[str, Any]:
+    steady = zip(predictions.steady, predictions.steady_bands, predictions.steady_references, strict=True)
+    compared = zip(predictions.sweeps, predictions.sweep_errors, strict=True)
+    names = [error.name if error else sweep.origin for sweep, error in compared]
+    return {
+        "specimen": predictions.specimen,
+        "frequency_responses": [_steady(*each) for each in steady],
+        "sweeps": [_sweep(*each) for each in zip(predictions.sweeps, predictions.sweep_references, names, strict=True)],
+        "multisines": [run.row() for run in predictions.runs],
+        "errors": [error.row() for error in predictions.errors],
+        "notes": list(predictions.notes),
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    if summary["frequency_responses"]:
+        print("frequency responses; +- are 95 % by the model's own errors")
+        print_table(
+            ("response", "force N", "peak mm", "+-", "at Hz", "+-", "lag deg", "folds at Hz", "range use"),
+            [
+                (
+                    r["name"],
+                    number(r["force_n"], ".4g"),
+                    number(r["peak_m"], ".5f", 1e3) if r["peak_m"] else f">= {1e3 * r['largest_m']:.5f}",
+                    number(r["peak_std_m"], ".2g", 1.96e3),
+                    number(r["peak_frequency_hz"], ".4f"),
+                    number(r["peak_frequency_std_hz"], ".2g", 1.96),
+                    number(r["peak_phase_lag_deg"], ".1f"),
+                    ", ".join(f"{fold:.4f}" for fold in r["folds_hz"]) or "none",
+                    number(r["range_use"], ".2f"),
+                )
+                for r in summary["frequency_responses"]
+            ],
+        )
+    if summary["sweeps"]:
+        print("sweeps")
+        print_table(
+            ("sweep", "from", "peak mm", "at Hz", "least force N", "range use"),
+            [
+                (
+                    s["name"],
+                    s["origin"] if s["origin"] != s["name"] else "the plan",
+                    number(s["peak_m"], ".5f", 1e3),
+                    number(s["peak_frequency_hz"], ".3f"),
+                    number(s["smallest_force_n"], ".4f"),
+                    "unbounded" if s["unbounded"] else number(s["range_use"], ".2f"),
+                )
+                for s in summary["sweeps"]
+            ],
+        )
+    if summary["multisines"]:
+        print("multisines: relative errors, %")
+        names = list(summary["multisines"][0]["errors"])
+        print_table(
+            ("realisation", "use", *names, "range use"),
+            [
+                (
+                    r["name"],
+                    r["use"],
+                    *("-" if r["unbounded"] else number(r["errors"].get(name), ".3f", 100.0) for name in names),
+                    "unbounded" if r["unbounded"] else number(r["range_use"], ".2f"),
+                )
+                for r in summary["multisines"]
+            ],
+        )
+        lost = sum(r["unbounded"] for r in summary["multisines"])
+        if lost:
+            print(f"{lost} of {len(summary['multisines'])} runs unbounded")
+    if summary["errors"]:
+        print("errors: predicted over reference, minus one")
+        print_table(
+            ("prediction", "peak %", "frequency %", "envelope %", "range use", ""),
+            [
+                (
+                    e["name"],
+                    number(e["peak_error"], "+.2f", 100.0),
+                    number(e["peak_frequency_error"], "+.3f", 100.0),
+                    number(e["envelope_error"], ".2f", 100.0),
+                    "-" if e["verdict"] == "unbounded" else number(e["range_use"], ".2f"),
+                    e["verdict"],
+                )
+                for e in summary["errors"]
+            ],
+        )
+    shown = set()
+    for part in (*summary["frequency_responses"], *summary["sweeps"], *summary["errors"]):
+        for note in part["notes"]:
+            if note not in shown:
+                print(f"note: {part['name']}: {note}")
+            shown.add(note)
+
+
+PREDICTIONS = FileKind(
+    name="predictions",
+    holds=Predictions,
+    pack=Predictions.to_arrays,
+    unpack=Predictions.from_arrays,
+    summarise=_summarise,
+    say=_say,
+    draw="rig.models.files.predictions_figure:draw_predictions",
+    figure_in=(12.0, 7.0),
+)

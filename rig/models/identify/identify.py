@@ -1,0 +1,234 @@
+"""From recordings to models."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+from identification import (
+    Backbone,
+    ContinuousBackbone,
+    Exciter,
+    FitProgress,
+    FrequencyResponse,
+    FrequencyResponseMatrix,
+    IdentificationError,
+    LinearModes,
+    ModalAnalysis,
+    NonlinearMode,
+    PeriodicSpectra,
+    best_linear_approximation,
+    combined,
+    extrapolated_to_zero,
+    identify_exciter,
+    linear_modes,
+    nonlinear_mode,
+    stabilisation,
+    stepped_sine_mode,
+)
+from identification.validation import one_specimen
+from rig.campaigns.kinds import kinds_that_yield
+from rig.errors import ConfigurationError, RecordingError
+from rig.measurements import (
+    STEPPED,
+    Estimator,
+    backbone,
+    bench_of_recording,
+    continuous_backbones,
+    frequency_responses,
+    spectra,
+)
+from rig.measurements.points_left_out import points_left_out
+from rig.models.files.files import KINDS, load, load_as
+from rig.models.files.force_surface import MeasuredSurface
+from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
+from rig.models.files.linear_modes import LINEAR_MODES
+from rig.models.identify.pnlss import identified_pnlss
+from rig.models.identify.request import Request
+from rig.recording.arrays import kind_of
+from rig.recording.reader import Recording
+
+__all__ = ["Request", "identify_model", "modes_in"]
+
+
+def identify_model(
+    paths: Sequence[Path], request: Request, *, progress: Callable[[FitProgress], None] | None = None
+) -> Any:
+    """The model in recordings or imported measurements; ``progress`` is called after every iteration of a PNLSS model's fit.
+
+    Raises `RecordingError` for files that hold something else, `identification.IdentificationError` where the data does not
+    allow it.
+    """
+    for index, path in enumerate(paths):
+        if any(path.exists() and other.exists() and path.samefile(other) for other in paths[:index]):
+            raise ConfigurationError(f"{path}: is given twice; each file once")
+    if request.kind == "pnlss":
+        return identified_pnlss(paths, request.pnlss, progress)
+    return _MODELS[request.kind](paths, request)
+
+
+def modes_in(path: Path) -> LinearModes:
+    """The linear modes in a file of a modal analysis."""
+    return cast(ModalAnalysis, load_as(LINEAR_MODES, path)).modes
+
+
+def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
+    """From one or several backbones, or from stepped sines: imported, or response-controlled."""
+    kinds = {kind_of(path): path for path in paths}
+    modes = None if request.modes is None else modes_in(request.modes)
+    if set(kinds) <= {FREQUENCY_RESPONSES.name, *STEPPED}:
+        if modes is not None:
+            raise ConfigurationError("--modes: stepped sines of one sensor have no use for mode shapes; leave it out")
+        return _stepped_mode(paths)
+    identified = []
+    for path in paths:
+        runs, notes = _backbones(path)
+        for run in runs:
+            found = (
+                run.nonlinear_mode(modes=modes)
+                if isinstance(run, ContinuousBackbone)
+                else nonlinear_mode(run, modes=modes)
+            )
+            identified.append(replace(found, notes=(*notes, *found.notes)))
+    return identified[0] if len(identified) == 1 else combined(identified)
+
+
+def _stepped_mode(paths: Sequence[Path]) -> NonlinearMode:
+    """From levels of a held response; at others stepped sines give responses, through which a mode's amplitude passes."""
+    stepped, missing = _stepped(paths)
+    if all(item.controlled != "response" for item in stepped):
+        raise ConfigurationError(
+            f"{', '.join(map(str, paths))}: frequency responses at levels of force or voltage, not a mode (`rig plot` shows "
+            "them); a nonlinear mode comes from backbones, or from levels of a held response"
+        )
+    try:
+        found = stepped_sine_mode(stepped)
+    except IdentificationError as error:
+        raise IdentificationError(
+            f"{error}; --model force-surface takes levels of held displacement as they are"
+        ) from None
+    return replace(found, notes=(*missing, *found.notes))
+
+
+def _stepped(paths: Sequence[Path]) -> tuple[list[FrequencyResponse], tuple[str, ...]]:
+    """Stepped sines, recorded or imported, and what of the recordings' plans is not in them."""
+    measured: list[FrequencyResponse] = []
+    notes: tuple[str, ...] = ()
+    for path in paths:
+        kind = kind_of(path)
+        if kind == FREQUENCY_RESPONSES.name:
+            measured += load(path)
+        elif kind in STEPPED:
+            with Recording(path) as recording:
+                measured += frequency_responses(recording)
+                notes += points_left_out(recording)
+        else:
+            raise RecordingError(
+                f"{path}: holds a {kind}; a force surface comes from response-controlled or stepped sines"
+            )
+    return measured, notes
+
+
+def _force_surface(paths: Sequence[Path], request: Request) -> MeasuredSurface:
+    """From levels of held displacement, those of all files together."""
+    measured, missing = _stepped(paths)
+    one_specimen(**{response.label: response.specimen for response in measured})
+    found = MeasuredSurface(tuple(measured), missing)
+    found.surface  # noqa: B018  refused here, not when the file is read
+    return found
+
+
+def _backbones(path: Path) -> tuple[Sequence[Backbone | ContinuousBackbone], tuple[str, ...]]:
+    """What was measured, every repeat of a continuous backbone by itself, and what of its plan is not in it."""
+    kind = kind_of(path)
+    if kind in KINDS and isinstance(measured := load(path), Backbone):
+        return (measured,), ()
+    if kind not in kinds_that_yield(Backbone):
+        raise RecordingError(
+            f"{path}: holds a {kind}; a nonlinear mode comes from backbones, or from stepped sines alone"
+        )
+    with Recording(path) as recording:
+        notes = points_left_out(recording)
+        continuous = kind in kinds_that_yield(ContinuousBackbone)
+        return (continuous_backbones(recording) if continuous else (backbone(recording),)), notes
+
+
+def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
+    """From multisines or frequency responses; levels are extrapolated to zero force."""
+    estimator = cast(Estimator, request.estimator)
+    read = [_matrices(path, estimator) for path in paths]
+    pairs = [pair for found, _ in read for pair in found]
+    if request.band_hz is not None:
+        low, high = request.band_hz
+        pairs = [
+            (shown.select(lowest_hz=low, highest_hz=high), fitted.select(lowest_hz=low, highest_hz=high))
+            for shown, fitted in pairs
+        ]
+    pairs.sort(key=lambda pair: pair[0].input_rms or (0.0,))
+    one_specimen(**{f"{shown.input_rms[0]:.3g} N RMS": shown.specimen for shown, _ in pairs if shown.input_rms})
+    lowest, fitted = pairs[0]
+    diagram = stabilisation(fitted)
+    found = [linear_modes(fitted, modes=request.count, diagram=diagram)]
+    found += [linear_modes(higher, modes=found[0]) for _, higher in pairs[1:]]
+    modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
+    notes = [note for _, missing in read for note in missing]
+    return ModalAnalysis(replace(modes, notes=(*notes, *modes.notes)), lowest, diagram)
+
+
+def _matrices(
+    path: Path, estimator: Estimator
+) -> tuple[list[tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]], tuple[str, ...]]:
+    """Responses by level: as they are shown, and as they are fitted; and what of the plan is not in them.
+
+    With the voltage as instrument the fit is to force and motions over the voltage.
+    """
+    kind = kind_of(path)
+    if kind in kinds_that_yield(PeriodicSpectra):
+        with Recording(path) as recording:
+            specimen = bench_of_recording(recording).specimen.name
+            measured, missing = list(spectra(recording).values()), points_left_out(recording)
+        shown = [best_linear_approximation(s, estimator=estimator, specimen=specimen) for s in measured]
+        if estimator != "instrument":
+            return [(matrix, matrix) for matrix in shown], missing
+        return [(matrix, _over_voltage(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
+    if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
+        return [(matrix, matrix)], ()
+    raise RecordingError(f"{path}: holds a {kind}; a linear model comes from multisines or frequency response matrices")
+
+
+def _over_voltage(measured: PeriodicSpectra, specimen: str) -> FrequencyResponseMatrix:
+    names = [channel.name for channel in measured.channels if channel.role in ("force", "drive", "response")]
+    return best_linear_approximation(measured, inputs=("voltage",), outputs=names, specimen=specimen)
+
+
+def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
+    """From one multisine: its highest level."""
+    if len(paths) != 1:
+        raise ConfigurationError(f"--model exciter: {len(paths)} files given, allowed is one multisine recording")
+    kind = kind_of(paths[0])
+    if kind not in kinds_that_yield(PeriodicSpectra):
+        raise RecordingError(f"{paths[0]}: holds a {kind}; an exciter model comes from a multisine")
+    low, high = request.band_hz or (None, None)
+    with Recording(paths[0]) as recording:
+        bench = bench_of_recording(recording)
+        _, at_level = max(spectra(recording).items())
+        notes = points_left_out(recording)
+    found = identify_exciter(
+        at_level,
+        lowest_hz=low,
+        highest_hz=high,
+        sample_rate_hz=bench.sample_rate_hz,
+        stinger_stiffness_n_m=request.stinger_stiffness_n_m,
+        resistance_ohm=request.resistance_ohm,
+        amplifier_gain=1.0 if request.amplifier_gain is None else request.amplifier_gain,
+        source=f"{bench.name}, {bench.specimen.name}",
+    )
+    return replace(found, notes=(*notes, *found.notes))
+
+
+_MODELS: dict[str, Callable[[Sequence[Path], Request], Any]] = {
+    "nonlinear-mode": _nonlinear_mode,
+    "linear": _linear,
+    "force-surface": _force_surface,
+    "exciter": _exciter,
+}

@@ -1,0 +1,122 @@
+"""From recordings to nonlinear state-space models: data, what is held out, the fit, and its errors."""
+
+import time
+from collections.abc import Callable, Sequence
+from itertools import compress
+from pathlib import Path
+
+import numpy as np
+
+from identification import (
+    FitProgress,
+    FitSettings,
+    PnlssFit,
+    error_spectra,
+    fit_pnlss,
+    identify_pnlss,
+    simulated_run,
+)
+from rig.errors import ConfigurationError, RecordingError
+from rig.models.files.files import load_as
+from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.identify.data_fingerprints import uses_of
+from rig.models.identify.pnlss_data import PnlssData, pnlss_data
+from rig.models.identify.pnlss_request import PnlssOptions
+
+__all__ = ["identified_pnlss"]
+
+Progress = Callable[[FitProgress], None]
+
+
+def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Progress | None = None) -> IdentifiedPnlss:
+    """The model in recordings, all taken together; after Ctrl-C what was reached, which `PnlssOptions.resume` goes on with.
+
+    Raises `RecordingError` for files that hold something else, `identification.IdentificationError` where the data does not
+    allow it.
+    """
+    begun = time.perf_counter()
+    earlier = None if options.resume is None else _earlier(options.resume)
+    data = pnlss_data(paths, options, earlier)
+    if earlier is not None and earlier.fit is not None:
+        _check_resumed(options, earlier, data)
+    settings = FitSettings() if options.iterations is None else FitSettings(iterations=options.iterations)
+    if earlier is not None and earlier.fit is not None:
+        fit = fit_pnlss(
+            earlier.fit.last,
+            data.training,
+            validation=data.validation,
+            settings=settings,
+            progress=progress,
+            resume=earlier.fit,
+        )
+        begun -= earlier.seconds
+    else:
+        fit = identify_pnlss(
+            data.training,
+            states=2 if options.states is None else options.states,
+            degrees=options.chosen_degrees,
+            output_degrees=() if options.output_polynomials is False else None,
+            saturating=options.saturating_features,
+            validation=data.validation,
+            settings=settings,
+            progress=progress,
+        )
+    return _with_errors(fit, data, time.perf_counter() - begun)
+
+
+def _earlier(path: Path) -> IdentifiedPnlss:
+    """The fit that is to go on."""
+    if not path.exists():
+        raise RecordingError(f"{path}: there is nothing to resume; leave --resume out")
+    found: IdentifiedPnlss = load_as(PNLSS, path)
+    if found.fit is None:
+        raise RecordingError(f"{path}: holds a model from elsewhere and no fit that could go on")
+    return found
+
+
+def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssData) -> None:
+    """Refuse to go on with other data: what chose the iterate might become what it is fitted to."""
+    if earlier.data and earlier.data != data.fingerprint:
+        uses = [run.use for run in earlier.runs]
+        raise ConfigurationError(
+            f"{options.resume}: was fitted to other data ({uses.count('training')} experiments in training, "
+            f"{uses.count('validation')} in validation, the first {earlier.runs[0].name}); give the same files, --hold-out, "
+            "--validation and --relative-errors"
+        )
+    done = 0 if earlier.fit is None else earlier.fit.history.iterations
+    if options.iterations is not None and options.iterations <= done:
+        raise ConfigurationError(f"--iterations = {options.iterations}: {done} are done; allowed is more")
+
+
+def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPnlss:
+    """The fit, its errors on all data, and spectra of the last periodic experiment, of validation where there is one."""
+    every = [(one, "training") for one in data.training] + [(one, "validation") for one in data.validation]
+    begins = iter(fit.initial_states)
+    states = [next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every]
+    moved = [bool(np.all(np.any(one.counted_outputs != 0.0, axis=1))) for one, _ in every]
+    both, known = list(compress(every, moved)), list(compress(states, moved))
+    still = [
+        f"{one.name}: an output is zero throughout, so that it has no errors"
+        for (one, _), is_moved in zip(every, moved, strict=True)
+        if not is_moved
+    ]
+    runs = tuple(
+        simulated_run(fit.model, one, initial_state=begin, use=use)
+        for (one, use), begin in zip(both, known, strict=True)
+    )
+    linear = fit.linear
+    linear_runs = () if linear is None else tuple(simulated_run(linear, one, use=use) for one, use in both)
+    periodic = [one for one in data.validation if one.period_samples]
+    periodic = periodic or [one for one in data.training if one.period_samples]
+    spectra = error_spectra(fit.model, linear, periodic[-1]) if periodic else None
+    return IdentifiedPnlss(
+        model=fit.model,
+        fit=fit,
+        runs=runs,
+        linear_runs=linear_runs,
+        spectra=spectra,
+        seconds=seconds,
+        notes=(*data.notes, *still),
+        data=data.fingerprint,
+        uses=uses_of(data.training, data.validation),
+    )

@@ -1,0 +1,76 @@
+"""What is to be identified, and how; options that mean nothing together are refused."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import get_args
+
+from rig.errors import ConfigurationError
+from rig.measurements import Estimator
+from rig.models.identify.pnlss_request import PnlssOptions
+
+__all__ = ["Request"]
+
+_OPTIONS: dict[str, tuple[str, ...]] = {
+    "nonlinear-mode": ("--modes",),
+    "linear": ("--estimator", "--band", "--count"),
+    "force-surface": (),
+    "exciter": ("--band", "--resistance", "--amplifier-gain", "--stinger-stiffness"),
+    "pnlss": tuple(PnlssOptions().given()),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is to be identified, and how."""
+
+    kind: str = "nonlinear-mode"
+    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter`` or ``pnlss``."""
+    modes: Path | None = None
+    """Linear model whose mode shapes a nonlinear mode uses."""
+    estimator: str = "instrument"
+    """Of the responses of a linear model: ``instrument``, ``H1`` or ``H2``."""
+    band_hz: tuple[float, float] | None = None
+    """Lines that a linear or exciter model is fitted to."""
+    resistance_ohm: float | None = None
+    """Of an exciter's coil, cable and amplifier together, where a meter has told it."""
+    amplifier_gain: float | None = None
+    """Of its voltage amplifier (V/V), for the resistance; 1 if None."""
+    stinger_stiffness_n_m: float | None = None
+    """Of its stinger, where it is known."""
+    count: int | None = None
+    """Number of modes of a linear model; found if None."""
+    pnlss: PnlssOptions = field(default_factory=PnlssOptions)
+    """Of a nonlinear state-space model."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in _OPTIONS:
+            raise ConfigurationError(f"--model = {self.kind!r}: allowed are {', '.join(_OPTIONS)}")
+        if self.estimator not in get_args(Estimator):
+            raise ConfigurationError(f"--estimator = {self.estimator!r}: allowed are {', '.join(get_args(Estimator))}")
+        if self.band_hz is not None and not 0.0 <= self.band_hz[0] < self.band_hz[1]:
+            raise ConfigurationError(
+                f"--band = {self.band_hz[0]:g} {self.band_hz[1]:g}: allowed is 0 <= LOW < HIGH, Hz"
+            )
+        numbers = {
+            "--resistance": self.resistance_ohm,
+            "--amplifier-gain": self.amplifier_gain,
+            "--stinger-stiffness": self.stinger_stiffness_n_m,
+        }
+        for name, value in numbers.items():
+            if value is not None and not 0.0 < value < math.inf:
+                raise ConfigurationError(f"{name} = {value:g}: allowed is any number above 0")
+        given = {
+            "--modes": self.modes is not None,
+            "--band": self.band_hz is not None,
+            "--count": self.count is not None,
+            "--estimator": self.estimator != "instrument",
+            **{name: value is not None for name, value in numbers.items()},
+            **self.pnlss.given(),
+        }
+        for name in (name for name, is_given in given.items() if is_given):
+            if name not in _OPTIONS[self.kind]:
+                allowed = ", ".join(_OPTIONS[self.kind]) or "no such option"
+                raise ConfigurationError(f"{name}: means nothing to --model {self.kind}, which takes {allowed}")
+        if self.amplifier_gain is not None and self.resistance_ohm is None:
+            raise ConfigurationError("--amplifier-gain: is for the resistance; add --resistance, or leave it out")

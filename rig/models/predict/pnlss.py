@@ -1,0 +1,154 @@
+"""Predictions of nonlinear state-space models: steady vibrations, recorded sweeps, recorded multisines."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+from identification import (
+    Exciter,
+    FrequencyResponse,
+    PeriodicSpectra,
+    PnlssModel,
+    PredictionError,
+    Predictions,
+    SimulatedRun,
+    SteadyPrediction,
+    pnlss_frequency_response,
+    simulated_run,
+)
+from rig.campaigns.kinds import kinds_that_yield
+from rig.errors import ConfigurationError, RecordingError
+from rig.measurements import bench_of_recording
+from rig.measurements.experiments import experiments
+from rig.measurements.points_left_out import points_left_out
+from rig.models.files.exciter import EXCITER
+from rig.models.files.files import load_as
+from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.identify.data_fingerprints import fingerprint
+from rig.models.predict.pnlss_steady import Held, Reference, compared, default_held
+from rig.models.predict.pnlss_sweep_models import PnlssSweepModels
+from rig.models.predict.pnlss_sweeps import planned_pnlss_sweeps, recorded_pnlss_sweeps
+from rig.models.predict.request import PredictionRequest
+from rig.models.predict.sweeps import strangers
+from rig.recording.reader import Recording
+
+__all__ = ["pnlss_predictions"]
+
+
+def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequence[Reference]) -> Predictions:
+    """What is asked for, with errors where there is something to compare with; unbounded runs are results like others.
+
+    Raises `ConfigurationError` for what a nonlinear state-space model does not answer, `identification.IdentificationError`
+    where it has no periodic vibration, or channels that do not fit.
+    """
+    found: IdentifiedPnlss = load_as(PNLSS, path)
+    model = found.model
+    _check(request, model, path)
+    exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
+    held = cast(Held, request.held or default_held(model, exciter))
+    steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
+        (pnlss_frequency_response(model, level, force=one, exciter=exciter), None, None)
+        for one, levels in ((held, request.forces_n), ("voltage", request.voltages_v))
+        for level in levels
+    ]
+    steady += [compared(model, exciter, reference) for reference in references]
+    models = PnlssSweepModels(model, exciter)
+    swept = [one for recording in request.sweeps for one in recorded_pnlss_sweeps(recording, models)]
+    swept += [one for plan in request.planned for one in planned_pnlss_sweeps(plan, models)]
+    runs: list[SimulatedRun] = []
+    notes = list(_default(request, held) if request.forces_n else ())
+    for recording in request.multisines:
+        more, said = _multisine(recording, found)
+        runs += more
+        notes += said
+    notes += _strangers(model, [reference.measured for reference in references])
+    notes += [note for one in swept for note in one.notes]
+    return Predictions(
+        steady=tuple(one for one, _, _ in steady),
+        steady_references=tuple(reference for _, reference, _ in steady),
+        steady_errors=tuple(error for _, _, error in steady),
+        sweeps=tuple(one.prediction for one in swept),
+        sweep_references=tuple(one.recorded for one in swept),
+        sweep_errors=tuple(one.error for one in swept),
+        runs=tuple(runs),
+        specimen=model.specimen,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
+    """Refuse what is asked of a nonlinear mode alone, and what the model's channels do not allow."""
+    given = {
+        "--zero-crossings": request.zero_crossings is not None,
+        "--modes": request.modes is not None,
+        "--allow-extrapolation": request.allow_extrapolation,
+    }
+    for name in (name for name, is_given in given.items() if is_given):
+        raise ConfigurationError(
+            f"{name}: means nothing to a PNLSS model, which answers --frequency-response, --voltage-response, --reference, "
+            "--sweep, --planned-sweep and --multisine"
+        )
+    steady = bool(request.forces_n or request.voltages_v or request.references)
+    swept = bool(request.sweeps or request.planned)
+    inputs, outputs = ([channel.role for channel in channels] for channels in (model.inputs, model.outputs))
+    named = ", ".join(channel.name for channel in (*model.inputs, *model.outputs))
+    if (steady or swept) and "force" not in (*inputs, *outputs):
+        raise ConfigurationError(
+            f"{path}: has no force among its channels ({named}), without which it answers --multisine alone; identify it with "
+            "the force among --outputs"
+        )
+    if swept and "drive" not in outputs:
+        raise ConfigurationError(
+            f"{path}: has no drive point among its channels ({named}), which sweeps are compared at; identify it with the "
+            "drive point among --outputs"
+        )
+    if request.exciter is None and "force" in inputs:
+        for name, asked in (("--voltage-response", request.voltages_v), ("--planned-sweep", request.planned)):
+            if asked:
+                raise ConfigurationError(f"{name}: gives a voltage, and {path} is driven by a force; add --exciter")
+    if request.exciter is not None and "force" not in inputs:
+        raise ConfigurationError(f"--exciter: is inside {path}, whose input is the voltage; leave it out")
+    if request.exciter is not None and not (steady or swept):
+        raise ConfigurationError(
+            "--exciter: means nothing to --multisine, which takes the recorded force; leave it out"
+        )
+
+
+def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
+    """What was chosen where nothing was said."""
+    if request.held is not None or held != "pure-sine":
+        return ()
+    return (
+        "constant is a force without harmonics, for nothing in the model makes any: add --exciter for the fundamental or "
+        "the RMS of a force that a shaker makes",
+    )
+
+
+def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedRun], tuple[str, ...]]:
+    """Every realisation of a recording, simulated, what it was to the model, and notes."""
+    model = identified.model
+    with Recording(path) as recording:
+        if recording.kind not in kinds_that_yield(PeriodicSpectra):
+            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a multisine recording")
+        found = experiments(
+            recording,
+            inputs=[channel.name for channel in model.inputs],
+            outputs=[channel.name for channel in model.outputs],
+            rate_hz=model.sample_rate_hz,
+        )
+        notes = (
+            *strangers(bench_of_recording(recording), model.specimen, None, str(path)),
+            *points_left_out(recording),
+        )
+    uses = identified.uses
+    other = "test" if uses else "unknown"
+    runs = [simulated_run(model, one, use=uses.get(fingerprint(one), other)) for one in found]
+    if not uses:
+        notes = (*notes, "the model does not say what it was identified with: these may be its training data")
+    return runs, notes
+
+
+def _strangers(model: PnlssModel, references: Sequence[FrequencyResponse]) -> list[str]:
+    """References of another specimen."""
+    others = {one.specimen for one in references} - {"", model.specimen}
+    return [f"the model is of {model.specimen}, a reference of {one}: not the same specimen" for one in sorted(others)]

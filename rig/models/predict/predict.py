@@ -1,0 +1,194 @@
+"""From models to predictions, beside the recordings they are compared with."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from identification import (
+    Exciter,
+    FrequencyResponse,
+    IdentificationError,
+    LinearModes,
+    NonlinearMode,
+    PredictionError,
+    Predictions,
+    ResponseBand,
+    SteadyPrediction,
+    compare,
+    frequency_response,
+    recorded_force_response,
+    response_band,
+)
+from identification.prediction.comparison import Over
+from identification.prediction.frequency_response import HeldForce
+from identification.prediction.properties import FLAGGED_BEYOND
+from rig.campaigns.evaluation.vibrations import as_complex
+from rig.errors import ConfigurationError, RecordingError
+from rig.measurements import STEPPED, frequency_responses
+from rig.models.files.exciter import EXCITER
+from rig.models.files.files import load_as
+from rig.models.files.force_surface import FORCE_SURFACE
+from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
+from rig.models.files.nonlinear_mode import NONLINEAR_MODE
+from rig.models.files.pnlss import PNLSS
+from rig.models.identify.identify import modes_in
+from rig.models.predict.pnlss import pnlss_predictions
+from rig.models.predict.pnlss_steady import Reference
+from rig.models.predict.request import PredictionRequest
+from rig.models.predict.surface import surface_predictions
+from rig.models.predict.sweeps import SweepModels, Swept, planned_sweeps, recorded_sweeps
+from rig.recording.arrays import kind_of
+from rig.recording.reader import Recording
+
+__all__ = ["predict_vibrations"]
+
+
+_Compared = tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None, ResponseBand | None]
+
+_DRAWS = 40
+
+
+def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
+    """Predictions of a nonlinear mode, PNLSS model or force surface, with errors where there is something to compare with.
+
+    Raises `RecordingError` for files that hold something else, `ConfigurationError` for plans that cannot be predicted,
+    `identification.IdentificationError` where the model cannot answer, in particular beyond twice the largest amplitude
+    that it was identified with.
+    """
+    kind = kind_of(model)
+    if kind not in (NONLINEAR_MODE.name, PNLSS.name, FORCE_SURFACE.name):
+        raise RecordingError(
+            f"{model}: is a file of kind {kind}; predictions are made with a {NONLINEAR_MODE.name}, a {PNLSS.name} model or a "
+            f"{FORCE_SURFACE.name}"
+        )
+    if kind == PNLSS.name:
+        return pnlss_predictions(
+            model, request, [one for path in request.references for one in _references(path, request)]
+        )
+    if request.voltages_v:
+        raise ConfigurationError(f"--voltage-response: means nothing to a {kind}; a PNLSS model answers it")
+    if kind == FORCE_SURFACE.name:
+        references = [measured for path in request.references for measured in _stepped_sines(path)]
+        return surface_predictions(load_as(FORCE_SURFACE, model), request, references)
+    _check_mode(request)
+    mode = cast(NonlinearMode, load_as(NONLINEAR_MODE, model))
+    modes = None if request.modes is None else modes_in(request.modes)
+    exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
+    steady: list[_Compared] = [_alone(mode, force, modes, request) for force in request.forces_n]
+    for path in request.references:
+        steady += [_compared(mode, measured, modes, request) for measured in _stepped_sines(path)]
+    models = SweepModels(mode, modes, exciter, request.zero_crossings, request.allow_extrapolation)
+    swept: list[Swept] = [found for path in request.sweeps for found in recorded_sweeps(path, models)]
+    swept += [found for plan in request.planned for found in planned_sweeps(plan, models)]
+    return Predictions(
+        steady=tuple(item[0] for item in steady),
+        steady_references=tuple(item[1] for item in steady),
+        steady_errors=tuple(item[2] for item in steady),
+        steady_bands=tuple(item[3] for item in steady),
+        sweeps=tuple(item.prediction for item in swept),
+        sweep_references=tuple(item.recorded for item in swept),
+        sweep_errors=tuple(item.error for item in swept),
+        specimen=mode.specimen,
+        notes=tuple(dict.fromkeys([*_strangers(mode, steady), *(note for item in swept for note in item.notes)])),
+    )
+
+
+def _check_mode(request: PredictionRequest) -> None:
+    """Refuse what is asked of other models than a nonlinear mode."""
+    if request.exciter is None and request.planned:
+        raise ConfigurationError("--planned-sweep: gives a voltage, which needs an exciter; add --exciter")
+    if request.exciter is not None and not (request.sweeps or request.planned):
+        raise ConfigurationError(
+            "--exciter: is for sweeps, and none is given; add --sweep or --planned-sweep, or leave it out"
+        )
+    if request.multisines:
+        raise ConfigurationError("--multisine: means nothing to a nonlinear mode; a PNLSS model simulates multisines")
+
+
+def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:
+    """References of another specimen."""
+    others = {item[1].specimen for item in steady if item[1] is not None} - {"", mode.specimen}
+    return [
+        f"the model is of {mode.specimen}, a reference of {other}: not the same specimen" for other in sorted(others)
+    ]
+
+
+def _alone(mode: NonlinearMode, force_n: float, modes: LinearModes | None, request: PredictionRequest) -> _Compared:
+    return _steady(mode, force_n, modes, request), None, None, _band(mode, force_n, request)
+
+
+def _steady(
+    mode: NonlinearMode, force_n: float, modes: LinearModes | None, request: PredictionRequest
+) -> SteadyPrediction:
+    held = cast(HeldForce, request.held or "fundamental")
+    return frequency_response(mode, force_n, force=held, modes=modes, allow_extrapolation=request.allow_extrapolation)
+
+
+def _band(mode: NonlinearMode, force_n: float, request: PredictionRequest) -> ResponseBand | None:
+    """What the model's standard errors make of a response; None where they are unknown, or a draw leaves the range."""
+    held = cast(HeldForce, request.held or "fundamental")
+    try:
+        if _steady(mode, force_n, None, request).range_use.max() > FLAGGED_BEYOND:
+            return None  # what the extrapolation may be off by is not in the errors
+        return response_band(mode, force_n, force=held, draws=_DRAWS, allow_extrapolation=request.allow_extrapolation)
+    except IdentificationError:
+        return None
+
+
+def _compared(
+    mode: NonlinearMode, measured: FrequencyResponse, modes: LinearModes | None, request: PredictionRequest
+) -> _Compared:
+    """At constant force where the force was controlled, else at the force that each point had."""
+    if measured.controlled == "force":
+        wanted = replace(request, held="fundamental")
+        predicted, band = _steady(mode, measured.level, modes, wanted), _band(mode, measured.level, wanted)
+    else:
+        predicted, band = (
+            recorded_force_response(mode, measured, modes=modes, allow_extrapolation=request.allow_extrapolation),
+            None,
+        )
+    return predicted, measured, compare(predicted, measured, over=_over(measured, request)).error, band
+
+
+def _over(measured: FrequencyResponse, request: PredictionRequest) -> Over:
+    """What a reference is compared over."""
+    return cast(Over, request.over or ("phase" if _turns_back(measured.frequency_hz) else "frequency"))
+
+
+def _turns_back(frequency_hz: np.ndarray) -> bool:
+    """Whether a branch has more than one vibration at a frequency: then only the phase tells them apart."""
+    steps = np.diff(frequency_hz)
+    return bool((steps > 0.0).any() and (steps < 0.0).any())
+
+
+def _references(path: Path, request: PredictionRequest) -> list[Reference]:
+    """Stepped sines with the second harmonic of their force, as far as it was recorded."""
+    ratios: dict[tuple[float, float], float] = {}
+    if kind_of(path) in STEPPED:
+        with Recording(path) as recording:
+            row = [channel["role"] for channel in recording.channels].index("force")
+            for point in (point for point in recording.latest.values() if point["accepted"]):
+                force = np.abs(as_complex(point["harmonics"])[row])
+                if force.size > 2 and force[1] > 0.0:
+                    ratios[point["level"], point["frequency_hz"]] = float(force[2] / force[1])
+    found = []
+    for measured in _stepped_sines(path):
+        top = float(measured.frequency_hz[int(np.argmax(measured.amplitude_m))])
+        over = _over(measured, request)
+        found.append(Reference(measured, over, request.over is not None, ratios.get((measured.level, top))))
+    return found
+
+
+def _stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
+    kind = kind_of(path)
+    if kind == FREQUENCY_RESPONSES.name:
+        return cast(tuple[FrequencyResponse, ...], load_as(FREQUENCY_RESPONSES, path))
+    if kind not in STEPPED:
+        raise RecordingError(
+            f"{path}: is a file of kind {kind}; a reference is a stepped-sine recording or imported stepped sines"
+        )
+    with Recording(path) as recording:
+        return frequency_responses(recording)

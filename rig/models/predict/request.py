@@ -1,0 +1,79 @@
+"""What is to be predicted, and with what; options that mean nothing together are refused."""
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import get_args
+
+from identification.prediction.comparison import Over
+from identification.prediction.frequency_response import HeldForce
+from rig.errors import ConfigurationError
+from rig.models.predict.sweeps import CROSSINGS
+
+__all__ = ["PredictionRequest"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictionRequest:
+    """What is to be predicted, with what."""
+
+    forces_n: tuple[float, ...] = ()
+    """Constant forces of frequency responses."""
+    voltages_v: tuple[float, ...] = ()
+    """Constant voltages of frequency responses."""
+    held: str | None = None
+    """What of the force is constant: ``fundamental``, ``rms`` or ``pure-sine``; if not given, the first that the model can."""
+    sweeps: tuple[Path, ...] = ()
+    """Recordings whose sweeps are predicted."""
+    multisines: tuple[Path, ...] = ()
+    """Recordings whose realisations a PNLSS model simulates."""
+    planned: tuple[str, ...] = ()
+    """Plans of sweeps that are yet to be made, by name or file."""
+    zero_crossings: str | None = None
+    """Imposed force from its zero crossings, the founding paper's way: ``half-periods`` or ``periods``; else demodulated."""
+    exciter: Path | None = None
+    """Exciter model: sweeps are predicted from the voltage, else from the recorded force."""
+    modes: Path | None = None
+    """Linear model: the other modes take part, responses of the other sensors are predicted."""
+    references: tuple[Path, ...] = ()
+    """Stepped sines that are predicted at their own force and compared."""
+    over: str | None = None
+    """What they are compared over: ``frequency`` or ``phase``; if not given, the phase where the frequency turns back."""
+    allow_extrapolation: bool = False
+    """Whether to answer beyond twice the largest modal amplitude identified."""
+
+    def __post_init__(self) -> None:
+        if not (self.forces_n or self.voltages_v or self.sweeps or self.multisines or self.planned or self.references):
+            raise ConfigurationError(
+                "nothing to predict: give --frequency-response, --voltage-response, --sweep, --planned-sweep, --multisine or "
+                "--reference"
+            )
+        for name, values, unit in (
+            ("--frequency-response", self.forces_n, "N"),
+            ("--voltage-response", self.voltages_v, "V"),
+        ):
+            for level in values:
+                if not 0.0 < level < math.inf:
+                    raise ConfigurationError(f"{name} = {level:g}: allowed is any number above 0, {unit}")
+        for name, paths in (
+            ("--sweep", self.sweeps),
+            ("--multisine", self.multisines),
+            ("--reference", self.references),
+        ):
+            for one, other in combinations(paths, 2):
+                if one.exists() and other.exists() and one.samefile(other):
+                    raise ConfigurationError(f"{name} = {other}: is given twice; each file once")
+        for name, value, allowed in (
+            ("--force", self.held, (None, *get_args(HeldForce))),
+            ("--over", self.over, (None, *get_args(Over))),
+            ("--zero-crossings", self.zero_crossings, (None, *CROSSINGS)),
+        ):
+            if value not in allowed:
+                raise ConfigurationError(f"{name} = {value!r}: allowed are {', '.join(filter(None, allowed))}")
+        if self.exciter is not None and self.zero_crossings is not None:
+            raise ConfigurationError(
+                "--zero-crossings: are those of an imposed force; with --exciter the voltage is imposed"
+            )
+        if self.zero_crossings is not None and not self.sweeps:
+            raise ConfigurationError("--zero-crossings: is for recorded sweeps; add --sweep, or leave it out")

@@ -1,0 +1,151 @@
+"""Sweeps, recorded ones and planned ones, as a nonlinear-mode model predicts them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from identification import (
+    Exciter,
+    HalfPeriods,
+    LinearModes,
+    NonlinearMode,
+    PredictionError,
+    SweepPrediction,
+    Transient,
+    VoltageSweep,
+    compare_sweep,
+    predict_sweep,
+    zero_crossings,
+)
+from rig.bench import Bench
+from rig.campaigns.evaluation.gaps import bridged
+from rig.campaigns.kinds import kinds_that_yield
+from rig.campaigns.plans import bench_of, load_plan
+from rig.campaigns.sweep.plan import SweepPlan
+from rig.errors import ConfigurationError, RecordingError
+from rig.measurements import bench_of_recording, point_rows, sweeps
+from rig.recording.reader import Recording
+
+__all__ = [
+    "CROSSINGS",
+    "SweepModels",
+    "Swept",
+    "force_and_drive",
+    "planned",
+    "planned_sweeps",
+    "recorded_sweeps",
+    "strangers",
+]
+
+CROSSINGS = ("half-periods", "periods")
+"""Between which zero crossings a force can be read: all of them, or those in the same direction."""
+
+
+@dataclass(frozen=True)
+class SweepModels:
+    """What sweeps are predicted with."""
+
+    mode: NonlinearMode
+    """The nonlinear mode."""
+    modes: LinearModes | None
+    """The other modes."""
+    exciter: Exciter | None
+    """Exciter; without it the recorded force is imposed."""
+    zero_crossings: str | None
+    """Between which zero crossings that force is read, one of `CROSSINGS`; None if it is demodulated."""
+    allow_extrapolation: bool
+    """Whether to answer beyond twice the largest modal amplitude identified."""
+
+    def predict(self, given: Transient | HalfPeriods | VoltageSweep) -> SweepPrediction:
+        """`identification.predict_sweep` with these."""
+        return predict_sweep(
+            self.mode,
+            given,
+            exciter=self.exciter,
+            modes=self.modes,
+            allow_extrapolation=self.allow_extrapolation,
+        )
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A predicted sweep, the recorded one if there is one, and what a user should know about the two."""
+
+    prediction: SweepPrediction
+    """The prediction."""
+    recorded: Transient | None
+    """Force and drive point as recorded."""
+    error: PredictionError | None
+    """How far apart they are."""
+    notes: tuple[str, ...]
+    """Models that may not belong to the rig."""
+
+
+def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
+    """Every sweep of a recording; `RecordingError` where it holds something else."""
+    with Recording(path) as recording:
+        if recording.kind not in kinds_that_yield(Transient):
+            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
+        notes = strangers(bench_of_recording(recording), models.mode.specimen, models.exciter, str(path))
+        recorded = sweeps(recording)
+        rejected = set(recording.latest) - set(recorded)
+        if rejected or not recording.complete:
+            notes += (f"{path}: is not complete; sweeps accepted, and predicted: {len(recorded)}",)
+        for number, sweep in recorded.items():
+            name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
+            which = models.zero_crossings
+            predicted = models.predict(sweep if which is None else _between_crossings(recording, number, which))
+            yield Swept(predicted, force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), notes)
+
+
+def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
+    """Every level of a plan's sweep; `ConfigurationError` where it is no sweep, or not linear in time."""
+    plan = planned(plan_source)
+    if plan.rate_hz_per_s is None:
+        raise ConfigurationError(
+            f"{plan_source}: rate_octaves_per_min: a logarithmic sweep cannot be predicted; give rate_hz_per_s"
+        )
+    notes = strangers(bench_of(plan, plan_source), models.mode.specimen, models.exciter, plan_source)
+    for level_v in plan.levels:
+        predicted = models.predict(VoltageSweep(plan.start_hz, plan.stop_hz, plan.rate_hz_per_s, level_v))
+        yield Swept(predicted, None, None, notes)
+
+
+def planned(plan_source: str) -> SweepPlan:
+    """A plan of sweeps of constant voltage; `ConfigurationError` for any other."""
+    plan = load_plan(plan_source)
+    if not isinstance(plan, SweepPlan):
+        raise ConfigurationError(f"{plan_source}: is a plan of kind {plan.kind}, wanted is a sweep")
+    if plan.level_unit != "V":
+        raise ConfigurationError(
+            f"{plan_source}: has levels in {plan.level_unit}, whose voltage only the test can tell; give levels_v"
+        )
+    return plan
+
+
+def strangers(bench: Bench, specimen: str, exciter: Exciter | None, source: str) -> tuple[str, ...]:
+    """Models of another rig: an exciter may move on to another structure, but that only its user knows."""
+    notes = []
+    if specimen not in ("", bench.specimen.name):
+        notes.append(f"the model is of {specimen}, {source} of {bench.specimen.name}: not the same specimen")
+    here = f"{bench.name}, {bench.specimen.name}"  # as the identification of an exciter calls it
+    if exciter is not None and exciter.source not in ("", here):
+        notes.append(
+            f"the exciter model is of {exciter.source}, {source} of {here}: right only if amplifier, exciter and "
+            "stinger are the same"
+        )
+    return tuple(notes)
+
+
+def _between_crossings(recording: Recording, number: int, which: str) -> HalfPeriods:
+    """The force of a recorded sweep between its zero crossings."""
+    bench = bench_of_recording(recording)
+    column = next(index for index, channel in enumerate(bench.channels) if channel.role == "force")
+    force = bridged(point_rows(recording, number))[:, column]
+    return zero_crossings(force, sample_rate_hz=bench.sample_rate_hz, whole_periods=which == "periods")
+
+
+def force_and_drive(sweep: Transient) -> Transient:
+    """What a comparison shows of a sweep."""
+    rows = [row for row, channel in enumerate(sweep.channels) if channel.role in ("force", "drive")]
+    return replace(sweep, channels=tuple(sweep.channels[row] for row in rows), fundamentals=sweep.fundamentals[rows])

@@ -1,0 +1,55 @@
+"""Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
+
+from pathlib import Path
+from pkgutil import resolve_name
+
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.check.assessment import assess, is_check
+from rig.check.figure import draw_check
+from rig.errors import RecordingError
+from rig.figures.style import STYLE
+from rig.models.files.files import KINDS, load, understood
+from rig.recording.arrays import kind_of
+from rig.recording.reader import Recording
+from rig.show.lateness_figure import draw_lateness
+
+__all__ = ["plot"]
+
+
+def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
+    """Draw what is in ``source`` into ``figure`` (png, pdf or svg by its ending).
+
+    With ``lateness`` it is how punctual the loop of a recording was.
+
+    Raises `RecordingError` where the file cannot be read or the figure not be written.
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+    if figure.is_dir():
+        raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
+    if figure.exists() and source.exists() and figure.samefile(source):
+        raise RecordingError(f"{figure}: is the file that is read; choose another name")
+    kind = kind_of(source)
+    with mpl.rc_context(STYLE):
+        page = Figure(figsize=(9.0, 6.4), layout="constrained")
+        if lateness:
+            with Recording(source) as recording:
+                draw_lateness(page, recording)
+        elif kind in KINDS:
+            page.set_size_inches(*KINDS[kind].figure_in)
+            found = load(source)
+            with understood(source, kind):
+                resolve_name(KINDS[kind].draw)(page, found)
+        else:
+            with Recording(source) as recording:
+                if is_check(recording):
+                    draw_check(page, assess(recording))
+                else:
+                    resolve_name(CAMPAIGNS[recording.kind].draw)(page, recording)
+        try:
+            page.savefig(figure)
+        except OSError as error:
+            raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None

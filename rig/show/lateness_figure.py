@@ -1,0 +1,71 @@
+"""Figure of how punctual a loop by the wall clock was: histograms of wake-up, execution and response."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.figures.style import MAIN, REJECTED, SECOND, title
+from rig.recording.reader import Recording
+from rig.show.loop_table import PACED, TIMES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_lateness", "exceedance"]
+
+COLOURS = {"wake_up": MAIN, "execution": "#4f8f4f", "response": SECOND}
+
+
+def draw_lateness(page: "Figure", recording: Recording) -> None:
+    """Blocks by time, and the share of blocks that took longer; all parts together, the deadline dashed.
+
+    Raises `RecordingError` where no loop of the recording ran by the clock.
+    """
+    loops = [part.end["loop"] for part in recording.parts if part.end is not None and "histograms" in part.end["loop"]]
+    if not loops:
+        raise RecordingError(f"{recording.path}: its loop did not run by the clock, there is no lateness to draw")
+    counts, beyond = page.subplots(2, 1, sharex=True)
+    for key, colour in COLOURS.items():
+        edges, blocks = together([loop["histograms"][key] for loop in loops])
+        if not edges.size:
+            continue
+        label = f"{TIMES[key]}, largest {max(loop[f'{key}_us']['largest'] for loop in loops):.0f} µs"
+        counts.step(edges, blocks, where="mid", color=colour)
+        beyond.step(edges, exceedance(blocks), where="post", color=colour, label=label)
+    for deadline_us in sorted({loop["deadline_us"] for loop in loops}):
+        for axis in (counts, beyond):
+            axis.axvline(deadline_us, color=REJECTED, ls="--", lw=0.9)
+    counts.set(yscale="log", ylabel="blocks per bin")
+    beyond.set(
+        xscale="log", yscale="log", xlabel="time, µs (dashed: deadline)", ylabel="share of blocks that took longer"
+    )
+    beyond.legend(fontsize=8, loc="lower left")
+    overruns = sum(loop["overruns"] for loop in loops)
+    specimen = recording.configuration["bench"]["specimen"]["name"]
+    title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, {_pacing(loops)}")
+
+
+def together(histograms: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
+    """Upper edges, us, in rising order and how many blocks each holds, of several histograms."""
+    edges = np.concatenate([np.asarray(one["upper_edge_us"], float) for one in histograms])
+    counts = np.concatenate([np.asarray(one["count"], float) for one in histograms])
+    found, place = np.unique(edges, return_inverse=True)
+    return found, np.bincount(place.ravel(), counts, found.size)
+
+
+def exceedance(counts: np.ndarray) -> np.ndarray:
+    """Share of all that lies beyond each bin; NaN, which is not drawn, where nothing does."""
+    share = 1.0 - np.cumsum(counts) / counts.sum()
+    return np.where(share > 0.5 / counts.sum(), share, np.nan)
+
+
+def _blocks(loop: Mapping[str, Any]) -> int:
+    return int(sum(loop["histograms"]["execution"]["count"]))
+
+
+def _pacing(loops: Sequence[Mapping[str, Any]]) -> str:
+    return " and ".join(
+        sorted({PACED.get(pacing, pacing) for pacing in (loop["real_time"]["pacing"] for loop in loops)})
+    )

@@ -1,0 +1,44 @@
+"""What is recorded of a loop by the wall clock, as a person reads it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rig.text.console import number, print_table
+
+__all__ = ["PACED", "TIMES", "print_loop"]
+
+PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep": "in lockstep with the device"}
+"""What a recorded pacing is called."""
+
+TIMES = {"wake_up": "wake-up", "execution": "execution", "response": "response"}
+"""The times that are counted of every block, and what they are called."""
+
+GRANTED = ("scheduling", "memory", "timer_slack", "processor", "garbage_collector")
+SHARES = {"p50": "p50", "p99": "p99", "p99_9": "p99.9", "largest": "largest"}
+
+
+def print_loop(loop: Mapping[str, Any], counters: Mapping[str, int]) -> None:
+    """Pacing, what the machine granted, lateness, overruns, lost samples, round trips; nothing where no clock paced the loop.
+
+    ``loop`` and ``counters`` are those of a part's end.
+    """
+    said = loop.get("real_time")
+    if not said:
+        return
+    granted = [f"{name.replace('_', ' ')} {said[name]}" for name in GRANTED if name in said]
+    print(f"  {PACED.get(said['pacing'], said['pacing'])}; {'; '.join(granted)}")
+    counted = {name: loop[f"{key}_us"] for key, name in TIMES.items() if f"{key}_us" in loop}
+    rows = [(f"  {name}", *(number(found[key], ".1f") for key in SHARES)) for name, found in counted.items()]
+    print_table(("  of a block, us", *SHARES.values()), rows)
+    blocks = sum(loop["histograms"]["execution"]["count"]) if "histograms" in loop else 0
+    print(
+        f"  {loop['overruns']} overruns in {blocks} blocks (response beyond {loop['deadline_us']:g} us, or left out), "
+        f"{counters.get('lost_samples', 0)} lost samples"
+    )
+    if "round_trip_p50_us" in loop:
+        told = ", ".join(
+            f"{share} {loop[f'round_trip_{share}_us']:.0f} us"
+            for share in ("p50", "p99", "largest")
+            if f"round_trip_{share}_us" in loop
+        )
+        print(f"  round trip to the device: {told}")

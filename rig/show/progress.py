@@ -1,0 +1,128 @@
+"""Progress on the terminal: of a run point by point, of a fit iteration by iteration; quiet lines without a terminal."""
+
+import contextlib
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rig.text.console import number
+from rig.text.printable import printable
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from identification import FitProgress
+    from rig.campaigns.planning.plan import Column
+    from rig.tick.tick import Tick
+
+__all__ = ["FitLines", "RunProgress"]
+
+LOCK_WORDS = ("searching", "acquiring", "locked", "lost")
+
+
+def _in_a_line(column: "Column", point: Mapping[str, Any]) -> str:
+    """A quantity of a point with its unit, and its name where the unit does not say it."""
+    text = f"{number(point.get(column.key), column.pattern, column.scale):>8} {column.unit}".rstrip()
+    return text if column.plain else f"{column.heading} {text}"
+
+
+class RunProgress:
+    """Writes a line for each point, and on a terminal a status line below that follows the loop."""
+
+    def __init__(self, columns: "Sequence[Column]" = ()) -> None:
+        self._columns = columns
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._finished = 0
+
+    def point(self, point: dict[str, Any], number_done: int, total: int) -> None:
+        """Print the point's line."""
+        self._finished = number_done
+        head = f"point {number_done:>3}/{total}  {point['level']:>7.4g} {point['level_unit']}"
+        if any(column.key in point for column in self._columns[-1:]):  # the last is a result, whatever comes first
+            columns = [c for c in self._columns if c.in_line and not (c.optional and point.get(c.key) is None)]
+            shown = "  ".join(_in_a_line(column, point) for column in columns)
+            line = f"{head}  {shown}"
+            if "settle_periods" in point:
+                line += f"  settled in {number(point['settle_periods'], '.0f'):>4} periods"
+            line += "" if point["accepted"] else f"  NOT ACCEPTED: {point['reason']}"
+        else:
+            line = f"{head}  FAILED: {point['reason']}"
+        self._print(line)
+
+    def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
+        """Renew the status line."""
+        if not self._terminal:
+            return
+        last = rows[-1]
+        seconds = tick.sample / tick.bench.sample_rate_hz
+        state = LOCK_WORDS[int(last["lock"])]
+        self._status(
+            f"\r\x1b[2K{seconds:8.1f} s  {float(last['frequency_hz']):9.4f} Hz  "
+            f"{abs(complex(last['command_v'])):7.4f} V  {state}  {self._finished} points done"
+        )
+
+    def remark(self, text: str) -> None:
+        """Print what the driver has to say about the bench."""
+        self._print(f"note: {text}")
+
+    def close(self) -> None:
+        """Clear the status line."""
+        if self._terminal:
+            self._status("\r\x1b[2K")
+
+    def _status(self, text: str) -> None:
+        with contextlib.suppress(OSError):  # whoever read this has gone; the run goes on
+            sys.stderr.write(text)
+            sys.stderr.flush()
+
+    def _print(self, line: str) -> None:
+        self.close()
+        with contextlib.suppress(OSError):
+            print(printable(line), file=sys.stderr, flush=True)
+
+
+class FitLines:
+    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration, or after ten seconds without one.
+
+    ``check`` is called at every iteration and may raise, to end the fit.
+    """
+
+    _EVERY, _LONGEST_S = 10, 10.0
+
+    def __init__(self, check: "Callable[[], None]" = lambda: None) -> None:
+        self._check = check
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._best = (float("inf"), 0)
+        self._stage = ""
+        self._said_s = 0.0
+
+    def __call__(self, at: "FitProgress") -> None:
+        """Say where the fit is, and which iteration is the best so far."""
+        self._check()
+        judged = at.training_error if at.validation_error != at.validation_error else at.validation_error
+        if at.stage != self._stage:
+            self._stage, self._best = at.stage, (float("inf"), 0)
+        self._best = min(self._best, (judged, at.iteration))
+        stage = f"{at.stage}: " if at.stage else ""
+        line = (
+            f"{stage}iteration {at.iteration:>3}/{at.iterations}  training {_percent(at.training_error)}  "
+            f"validation {_percent(at.validation_error)}  best at {self._best[1]}  {at.seconds:.1f} s"
+        )
+        with contextlib.suppress(OSError):
+            if self._terminal:
+                sys.stderr.write(f"\r\x1b[2K{line}")
+                sys.stderr.flush()
+            elif at.iteration % self._EVERY == 0 or at.seconds - self._said_s >= self._LONGEST_S:
+                self._said_s = at.seconds
+                print(line, file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Clear the status line."""
+        if self._terminal:
+            with contextlib.suppress(OSError):
+                sys.stderr.write("\r\x1b[2K")
+                sys.stderr.flush()
+
+
+def _percent(error: float) -> str:
+    return "unbounded" if error == float("inf") else f"{number(error, '.4g', 100.0)} %"

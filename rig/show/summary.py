@@ -1,0 +1,118 @@
+"""What is in a file, as one JSON-able dictionary: the answer of ``rig show``."""
+
+from pathlib import Path
+from typing import Any
+
+from rig.campaigns.evaluation.quality import what_was_skipped
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.campaigns.planning.drift import drift_of
+from rig.campaigns.plans import plan_from
+from rig.campaigns.running.continuation import changed_keys
+from rig.check.assessment import assess, is_check
+from rig.check.report import summary
+from rig.models.files.files import KINDS, load, understood
+from rig.recording.arrays import kind_of
+from rig.recording.layout import file_integrity
+from rig.recording.reader import Recording
+
+__all__ = ["summarise", "summarise_recording"]
+
+BULKY = {"harmonics", "harmonics_std", "residual_rms", "drift"}
+"""What a point holds and a summary leaves in the file."""
+
+QUALITY = (
+    "settled",
+    "accepted",
+    "quality",
+    "reason",
+    "periods",
+    "settle_periods",
+    "warnings",
+    "first_sample",
+    "end_sample",
+)
+
+
+def summarise(path: Path) -> dict[str, Any]:
+    """What a recording, an imported measurement or a model holds; `RecordingError` where it is none of them."""
+    kind = kind_of(path)
+    if kind in KINDS:
+        found = load(path)
+        with understood(path, kind):
+            return {"kind": kind, "integrity": file_integrity(path), **KINDS[kind].summarise(found)}
+    with Recording(path) as recording, understood(path, f"recording of kind {kind}"):
+        if is_check(recording):
+            return {**summary(assess(recording)), "integrity": recording.integrity}
+        return summarise_recording(recording)
+
+
+def summarise_recording(recording: Recording) -> dict[str, Any]:
+    """Points with their quality, statistics of the loop, how each part ended."""
+    bench = recording.configuration["bench"]
+    plan = plan_from(recording.configuration["plan"], "plan of the recording")
+    changed = _changes(recording)
+    parts = [
+        {
+            "rows": part.n_rows,
+            "bytes_lost": part.dropped_bytes,
+            "lost": part.dropped_reason or None,
+            "ended": None if part.end is None else part.end["text"],
+            "tripped": part.end is not None and part.end["tripped"],
+            **{key: (part.end or {}).get(key) for key in ("tripped_at", "likely_cause", "what_to_do")},
+            "changed": changed.get(number, []),
+            "about": part.information.get("about"),
+            "loop": None if part.end is None else part.end["loop"],
+            "counters": None if part.end is None else part.end["counters"],
+        }
+        for number, part in enumerate(recording.parts)
+    ]
+    ends = [part.end for part in recording.parts if part.end is not None]
+    return {
+        "kind": recording.kind,
+        "integrity": recording.integrity,
+        "specimen": bench["specimen"]["name"],
+        "bench": bench["name"],
+        "started": recording.started,
+        "software_version": recording.software_version,
+        "seed": recording.seed,
+        "complete": recording.complete,
+        "points_planned": len(plan.targets()),
+        "skipped": what_was_skipped(recording.latest.values(), len(plan.targets())),
+        "points": [_shown(point, plan.kind) for point in recording.latest.values()],
+        "drift": drift_of(recording.latest.values()),
+        "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
+        "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
+        "counters": {
+            name: sum(end["counters"].get(name, 0) for end in ends)
+            for name in sorted({n for e in ends for n in e["counters"]})
+        },
+        "parts": parts,
+    }
+
+
+def _changes(recording: Recording) -> dict[int, list[str]]:
+    """Keys in which the plan was changed, by the number of the part."""
+    plans = [plan_from(dict(said.plan), "plan of the recording").model_dump() for said in recording.plans]
+    pairs = zip(recording.plans[1:], plans, plans[1:], strict=False)
+    return {said.part: changed_keys(before, after) for said, before, after in pairs}
+
+
+def _shown(point: dict[str, Any], kind: str) -> dict[str, Any]:
+    """A point without what is bulky; what a failed one does not have is None."""
+    expected = dict.fromkeys([*(column.key for column in CAMPAIGNS[kind].columns), *QUALITY])
+    return {**expected, **{key: value for key, value in point.items() if key not in BULKY}}
+
+
+def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, Any]:
+    loops = [end["loop"] for end in ends]
+    busy, wall = sum(loop["busy_s"] for loop in loops), sum(loop["wall_s"] for loop in loops)
+    samples = sum(loop["samples"] for loop in loops)
+    return {
+        "samples": rows,
+        "sample_rate_hz": rate_hz,
+        "overruns": sum(loop["overruns"] for loop in loops),
+        "periods": sum(loop["periods"] for loop in loops),
+        "wall_s": wall,
+        "realtime_factor": samples / rate_hz / busy if busy > 0 else None,
+        "end_to_end_factor": samples / rate_hz / wall if wall > 0 else None,
+    }

@@ -1,0 +1,140 @@
+"""Summaries as a person reads them: one line on how a run ended, tables of recordings, models and measurements."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rig.arming.run_facts import user_name
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.check.report import say
+from rig.models.files.files import KINDS
+from rig.recording.integrity import VERIFIED
+from rig.show.loop_table import print_loop
+from rig.text.console import number, print_table
+from rig.text.printable import printable, printable_strings
+
+__all__ = ["print_summary", "say_how_it_ended"]
+
+
+def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
+    """How a run ended, what it made, how fast it was, and what was counted on the way."""
+    summary = printable_strings(summary)
+    path = Path(printable(str(path)))
+    loop = summary["loop"]
+    accepted = sum(point["accepted"] for point in summary["points"])
+    factor = loop["realtime_factor"]
+    pace = f", {factor:.0f} times real time in the loop" if factor else ""
+    ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
+    print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
+    if summary["skipped"]:
+        print(summary["skipped"])
+    last = summary["parts"][-1] if summary["parts"] else {"tripped": False}
+    _print_advice(last)
+    if last["tripped"] and not summary["complete"]:
+        print(
+            f"what was accepted is kept; then `rig resume {path} --plan PLAN.toml` goes on by a changed plan, "
+            f"`rig resume {path} --retry-tripped` by the same"
+        )
+    elif not summary["complete"]:
+        print(
+            f"what was accepted is kept; `rig resume {path}` measures the rest, with --plan PLAN.toml by a changed plan"
+        )
+    for name, count in summary["counters"].items():
+        if count:
+            print(f"warning: {name.replace('_', ' ')}: {count} samples")
+
+
+def print_summary(summary: dict[str, Any]) -> None:
+    """What `rig.show.summary.summarise` found in a file, whoever has written it."""
+    summary = printable_strings(summary)
+    if summary["integrity"] != VERIFIED:
+        print(summary["integrity"])
+    if summary["kind"] == "check":
+        say(summary)
+        return
+    print(f"{summary['kind']} of {summary['specimen'] or 'an unnamed specimen'}")
+    if summary["kind"] in KINDS:
+        KINDS[summary["kind"]].say(summary)
+        for note in summary["notes"]:
+            print(f"note: {note}")
+        return
+    loop = summary["loop"]
+    print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
+    _print_points(summary["kind"], summary["points"])
+    if summary["skipped"]:
+        print(summary["skipped"])
+    _print_drift(summary["drift"])
+    if summary["former_points"]:
+        print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
+        _print_points(summary["kind"], summary["former_points"])
+    line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
+    if loop["realtime_factor"] is not None:
+        factor = f"{loop['realtime_factor']:.0f} times real time"
+        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {factor}"
+    print(line)
+    for index, part in enumerate(summary["parts"]):
+        changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
+        print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
+        if part["lost"]:
+            print(f"  not readable: {part['lost']}")
+        _print_advice(part)
+        _print_about(part["about"] or {})
+        print_loop(part["loop"] or {}, part["counters"] or {})
+
+
+def _print_advice(part: Mapping[str, Any]) -> None:
+    """After a trip: what it most likely was, and what comes first."""
+    if part.get("likely_cause"):
+        print(f"  likely cause: {part['likely_cause']}\n  what to do: {part['what_to_do']}")
+
+
+def _print_drift(drift: dict[str, Any] | None) -> None:
+    """What has changed from the first point to its repetition at the end."""
+    if drift is None:
+        return
+    told = [
+        f"{name} {number(drift[name], pattern, 100.0)} %"
+        for name, pattern in (("frequency", "+.4f"), ("damping", "+.2f"), ("amplitude", "+.2f"))
+    ]
+    print(f"drift from the first point to the same again (point {drift['again']}): {', '.join(told)}")
+
+
+def _print_about(about: dict[str, Any]) -> None:
+    """Who ran a part on what, where anything was said of it or something physical has moved."""
+    armed = about.get("armed", {})
+    told = any(about.get(key) for key in ("specimen_serial", "notes", "remarks"))
+    if not told and armed.get("how", "virtual") == "virtual" and about.get("operator") == user_name():
+        return
+    for name in ("operator", "specimen_serial"):
+        if about.get(name):
+            print(f"  {name.replace('_', ' ')}: {about[name]}")
+    if armed.get("how", "virtual") != "virtual":
+        print(f"  armed: {armed['how']}, {armed['by']}, {armed['at']}")
+    if about.get("device"):
+        print(f"  device: {', '.join(f'{key} {value}' for key, value in about['device'].items())}")
+    for line in [*armed.get("cautions", ()), *about.get("remarks", ()), *about.get("notes", ())]:
+        print(f"  {line}")
+
+
+def _print_points(kind: str, points: Sequence[dict[str, Any]]) -> None:
+    columns = [
+        column
+        for column in CAMPAIGNS[kind].columns
+        if not column.optional or any(point[column.key] is not None for point in points)
+    ]
+    print_table(
+        ("level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality"),
+        [
+            (
+                f"{p['level']:.4g}",
+                p["level_unit"],
+                *(number(p[column.key], column.pattern, column.scale) for column in columns),
+                {True: "yes", False: "no", None: "-"}[p["settled"]],
+                ("the first again" if p.get("repeats_first") else "ok") if p["accepted"] else p["reason"],
+            )
+            for p in points
+        ],
+    )
+    for p in points:
+        for warning in p["warnings"] or ():
+            print(f"warning: point {p['number']}: {warning}")

@@ -1,0 +1,45 @@
+"""Files of other formats that appear whole or not at all."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rig.errors import RecordingError, RigError
+from rig.system.locking import synchronise_folder
+from rig.text.printable import error_text
+
+__all__ = ["whole_file"]
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Path of an empty file to write to; it takes the place of ``path`` once all is on the disk.
+
+    Raises `RecordingError` where that fails, with the system's reason; ``path`` is then as it was.
+    """
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_bytes(b"")
+        yield part
+        with part.open("rb+") as stream:
+            os.fsync(stream.fileno())
+        part.replace(path)
+        synchronise_folder(path)
+    except RigError:
+        raise
+    except Exception as error:  # the libraries of the formats hide the system's error in one of their own
+        raise RecordingError(f"{path}: cannot be written ({_reason(error)}); nothing was changed") from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def _reason(error: BaseException) -> str:
+    """What the system said, if it said anything, else the error's own text."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and cause.strerror:
+            return cause.strerror
+        cause = cause.__cause__ or cause.__context__
+    return error_text(error)

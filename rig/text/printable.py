@@ -1,0 +1,64 @@
+"""Text for one line of a terminal: nothing that moves a cursor or changes a colour, and not longer than a person reads."""
+
+from collections.abc import Mapping
+from typing import Any
+from unicodedata import category
+
+__all__ = ["LONGEST_LINE", "error_text", "one_line", "printable", "printable_strings", "shown"]
+
+LONGEST_LINE = 800
+"""Characters of a message; what is left out lies in its middle, for it begins with the field and ends with what is allowed."""
+LONGEST_VALUE = 60
+"""Characters of a value inside a message."""
+
+
+def printable(text: str) -> str:
+    """The text with control, escape and other characters that cannot be printed shown by their escape, as Python writes it."""
+    if text.isprintable():
+        return text
+    return "".join(
+        one if one.isprintable() or category(one) == "Zs" else one.encode("unicode_escape").decode("ascii")
+        for one in text
+    )
+
+
+def printable_strings(value: Any) -> Any:
+    """A JSON-able value in which every text, and every key that is one, is `printable`; line ends stay."""
+    if isinstance(value, str):
+        return "\n".join(printable(line) for line in value.split("\n"))
+    if isinstance(value, Mapping):
+        return {printable_strings(key): printable_strings(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [printable_strings(item) for item in value]
+    return value
+
+
+def one_line(text: str, longest: int = LONGEST_LINE) -> str:
+    """The text in one printable line of about so many characters; the same again is left as it is."""
+    if len(text) > 10 * longest:  # the rest would not be seen, and is not to cost time either
+        text = _without_middle(text, 8 * longest)
+    line = printable(" ".join(text.split()))
+    return line if len(line) <= longest + 40 else _without_middle(line, longest)
+
+
+def error_text(error: BaseException) -> str:
+    """The message of a library's error without its line breaks; the error's type where it has no message."""
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _without_middle(text: str, longest: int) -> str:
+    half = longest // 2
+    return f"{text[:half]} ...({len(text) - 2 * half} characters)... {text[-half:]}"
+
+
+def shown(value: Any) -> str:
+    """A value as it stands in a message: its ``repr``, shortened, with its size where it is long."""
+    if isinstance(value, str) and len(value) > LONGEST_VALUE:
+        return f"{value[: LONGEST_VALUE // 2]!r}... ({len(value)} characters)"
+    if isinstance(value, Mapping | list | tuple) and len(value) > LONGEST_VALUE:
+        return f"{'a table' if isinstance(value, Mapping) else 'a list'} ({len(value)} items)"
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError) as error:  # an integer of more digits than Python prints; nested too deeply
+        return f"a value that cannot be shown ({error})"
+    return text if len(text) <= 3 * LONGEST_VALUE else f"{text[: 2 * LONGEST_VALUE]}... ({len(text)} characters)"

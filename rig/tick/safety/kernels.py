@@ -1,0 +1,174 @@
+"""Compiled decisions of the safety room: pure functions of readings, limits and the guard's own state."""
+
+import math
+
+from controller.kernels import wrap
+from rig.bench.cross_checks import OVERTRAVEL_FACTOR
+from rig.tick.safety.layout import ARMED, DISARMED, OFF, RAMPING, EndReason
+from vibrolock.compiled import Record, kernel
+
+FORCE = 0  # `rig.daq.Role.FORCE`
+
+FORCE_LIMIT = int(EndReason.FORCE_LIMIT)
+RESPONSE_LIMIT = int(EndReason.RESPONSE_LIMIT)
+DISPLACEMENT_LIMIT = int(EndReason.DISPLACEMENT_LIMIT)
+OVERTRAVEL = int(EndReason.OVERTRAVEL)
+FREQUENCY_LIMIT = int(EndReason.FREQUENCY_LIMIT)
+SENSOR_OVERLOAD = int(EndReason.SENSOR_OVERLOAD)
+SENSOR_STUCK = int(EndReason.SENSOR_STUCK)
+NON_FINITE_INPUT = int(EndReason.NON_FINITE_INPUT)
+NON_FINITE_OUTPUT = int(EndReason.NON_FINITE_OUTPUT)
+SAMPLES_LOST = int(EndReason.SAMPLES_LOST)
+EMERGENCY_STOP = int(EndReason.EMERGENCY_STOP)
+LEVEL_NOT_FOLLOWED = int(EndReason.LEVEL_NOT_FOLLOWED)
+PLANT_CONTRADICTED = int(EndReason.PLANT_CONTRADICTED)
+
+
+@kernel
+def shut_down(guard: Record, reason: int, channel: int, value: float, sample: int, drop: bool) -> None:
+    """Begin the ramp to 0 V, or drop at once. The first cause is kept; a later one may only turn a ramp into a drop."""
+    if guard.mode == ARMED or guard.mode == DISARMED:
+        guard.reason = reason
+        guard.channel = channel
+        guard.value = value
+        guard.sample = sample
+        guard.ramp_sample = sample
+        guard.ramp_from_v = guard.amplitude_v
+        guard.mode = RAMPING
+    if drop:
+        guard.amplitude_v = 0.0
+        guard.mode = OFF
+        guard.dropped = 1
+
+
+@kernel
+def is_over(guard: Record, lead: int) -> bool:
+    """Whether nothing is left to do: dropped, or ramped down and the ramp's last sample through the device's queue."""
+    return bool(guard.mode == OFF and (guard.dropped == 1 or guard.off_samples > lead))
+
+
+@kernel
+def watch_switch(guard: Record, channel: Record, index: int, volts: float, sample: int) -> None:
+    """Drop to 0 V where the emergency stop is pressed; its reading standing still is in order, its being no number is not."""
+    if not channel.stop_below_v <= volts <= channel.stop_above_v:
+        shut_down(guard, EMERGENCY_STOP, index, volts * channel.unit_per_volt, sample, True)
+
+
+@kernel
+def watch_input(
+    guard: Record, limits: Record, channel: Record, watch: Record, index: int, volts: float, sample: int, driven: bool
+) -> bool:
+    """Check one raw reading (V) before it is used; False where it must not be (not a number)."""
+    if channel.emergency_stop == 1:
+        watch_switch(guard, channel, index, volts, sample)
+        return math.isfinite(volts)
+    if not math.isfinite(volts):
+        shut_down(guard, NON_FINITE_INPUT, index, volts, sample, False)
+        return False
+    watch.overload_samples = watch.overload_samples + 1 if abs(volts) >= channel.overload_v else 0
+    if watch.overload_samples >= limits.overload_samples:
+        shut_down(guard, SENSOR_OVERLOAD, index, volts * channel.unit_per_volt, sample, False)
+    watch.same_samples = watch.same_samples + 1 if driven and volts == watch.last_v else 0
+    watch.last_v = volts
+    watch.alert = 1 if watch.same_samples > 0 or watch.overload_samples > 0 else 0
+    if watch.same_samples >= limits.stuck_samples:
+        shut_down(guard, SENSOR_STUCK, index, volts * channel.unit_per_volt, sample, False)
+    watch_limit(guard, channel, index, volts * channel.unit_per_volt, sample)
+    return True
+
+
+@kernel
+def watch_limit(guard: Record, channel: Record, index: int, value: float, sample: int) -> None:
+    """Check a force or acceleration: beyond its limit it trips, and once a trip's ramp does not help the output drops."""
+    if abs(value) > channel.limit:
+        reason = FORCE_LIMIT if channel.role == FORCE else RESPONSE_LIMIT
+        if guard.mode == ARMED:
+            shut_down(guard, reason, index, value, sample, False)
+        elif guard.mode == RAMPING and guard.reason >= FORCE_LIMIT and abs(value) > OVERTRAVEL_FACTOR * channel.limit:
+            shut_down(guard, reason, index, value, sample, True)
+
+
+@kernel
+def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: float, index: int, sample: int) -> None:
+    """Integrate an acceleration (m/s^2) twice, with a leak that forgets its mean, and check the displacement (m)."""
+    gain, keep = limits.integrator_gain, 1.0 - limits.integrator_leak
+    velocity = keep * watch.velocity + gain * acceleration
+    displacement = keep * watch.displacement + gain * velocity
+    watch.velocity = velocity
+    watch.displacement = displacement
+    travel_m = abs(displacement)
+    if travel_m > OVERTRAVEL_FACTOR * limits.displacement_m:
+        shut_down(guard, OVERTRAVEL, index, travel_m, sample, True)
+    elif travel_m > limits.displacement_m:
+        shut_down(guard, DISPLACEMENT_LIMIT, index, travel_m, sample, False)
+
+
+@kernel
+def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float, omega: float) -> float:
+    """Go on with a motion that is not seen for a sample, as the vibration at ``omega`` (rad/s) that it was.
+
+    Integrated with a hole in it, an acceleration would leave a velocity behind and pass for travel. With the leak l (1/s),
+    ``x' = v - l x``; of ``x'' = -w^2 x`` follows ``v' = l v - (w^2 + l^2) x``, a turn by w dt for any l.
+    Returns the acceleration (m/s^2) that goes with it, ``v' + l v``.
+    """
+    leak = limits.integrator_leak / limits.integrator_gain
+    velocity, displacement = watch.velocity, watch.displacement
+    share = sin_step / omega
+    watch.velocity = cos_step * velocity + share * (leak * velocity - (omega * omega + leak * leak) * displacement)
+    watch.displacement = cos_step * displacement + share * (velocity - leak * displacement)
+    return float(2.0 * leak * velocity - (omega * omega + leak * leak) * displacement)
+
+
+@kernel
+def watch_gap(guard: Record, limits: Record, lost: int, sample: int, dt_s: float) -> None:
+    """Check for how many samples, but for those seen since, nothing has been seen of the rig."""
+    if lost >= limits.lost_samples:
+        shut_down(guard, SAMPLES_LOST, -1, lost * dt_s, sample, False)
+
+
+@kernel
+def watch_frequency(guard: Record, limits: Record, omega: float, sample: int) -> None:
+    """Check the frequency (rad/s) of what is put out."""
+    if guard.mode == ARMED and (omega < limits.lowest_rad_s or omega > limits.highest_rad_s):
+        shut_down(guard, FREQUENCY_LIMIT, -1, omega / (2.0 * math.pi), sample, False)
+
+
+@kernel
+def permitted_turn(limits: Record, turn: float, demanded: float, before_v: float, after_v: float) -> float:
+    """Angle (rad) of the complex command that may follow ``turn`` while its amplitude goes from ``before_v`` to ``after_v``.
+
+    The command's whole change keeps the slew limit s: ``|dU|^2 = da^2 + 4 a_0 a_1 sin^2(d/2) <= da^2 + a_0 a_1 d^2 <= s^2``.
+    The amplitude goes first, the angle d has what is left. It takes the shorter way round.
+    """
+    product = before_v * after_v
+    if demanded == turn or not product > 0.0:
+        return demanded
+    change = after_v - before_v
+    left = max(limits.slew_v_per_sample * limits.slew_v_per_sample - change * change, 0.0)
+    way = wrap(demanded - turn)
+    if way * way * product <= left:
+        return demanded
+    return float(turn + math.copysign(math.sqrt(left / product), way))
+
+
+@kernel
+def permitted_amplitude(guard: Record, limits: Record, demanded_v: float, sample: int) -> float:
+    """Output amplitude (V) that may go out for the ``demanded_v`` of the law: clamped, slew-limited, ramped or zero."""
+    if not math.isfinite(demanded_v):
+        shut_down(guard, NON_FINITE_OUTPUT, -1, demanded_v, sample, True)
+    if guard.mode == ARMED:
+        target = min(max(demanded_v, -limits.voltage_v), limits.voltage_v)
+        step = min(max(target - guard.amplitude_v, -limits.slew_v_per_sample), limits.slew_v_per_sample)
+        guard.amplitude_v += step
+    elif guard.mode == RAMPING:
+        done = (sample - guard.ramp_sample) / limits.ramp_down_samples
+        if done >= 1.0:
+            guard.amplitude_v = 0.0
+            guard.mode = OFF
+        else:
+            guard.amplitude_v = guard.ramp_from_v * 0.5 * (1.0 + math.cos(math.pi * done))
+    else:
+        guard.amplitude_v = 0.0
+    if guard.mode == OFF:
+        guard.off_samples += 1
+    return float(guard.amplitude_v)

@@ -1,0 +1,102 @@
+"""The limits of a bench as the records that the kernels read, and a trip as a sentence."""
+
+import math
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.errors import DaqEmergencyStop, DaqError
+from rig.tick.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_HINT, TEXT, EndReason, GuardMode
+
+INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
+
+__all__ = ["describe_end", "end_reason_of", "guard_record", "input_records", "limits_record", "watch_records"]
+
+
+def limits_record(bench: Bench) -> np.ndarray:
+    """Limits in samples and SI units."""
+    limits, rate = bench.limits, bench.sample_rate_hz
+    out = np.zeros(1, LIMITS)
+    out["voltage_v"] = limits.voltage_v
+    out["displacement_m"] = limits.displacement_m
+    out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in limits.frequency_hz)
+    out["slew_v_per_sample"] = limits.slew_v_per_s / rate
+    out["overload_samples"] = max(1, round(limits.overload_s * rate))
+    out["stuck_samples"] = max(2, round(limits.stuck_s * rate))
+    out["lost_samples"] = max(1, round(limits.lost_s * rate))
+    out["ramp_down_samples"] = max(1, round(limits.ramp_down_s * rate))
+    out["integrator_gain"] = 1.0 / rate
+    out["resonance_rad_s"] = 2.0 * math.pi * bench.specimen.linear_frequency_hz
+    out["integrator_leak"] = -math.expm1(-2.0 * math.pi * INTEGRATOR_CORNER * limits.frequency_hz[0] / rate)
+    return out
+
+
+def input_records(bench: Bench) -> np.ndarray:
+    """One record a channel: scaling, range, limit, skew."""
+    out = np.zeros(len(bench.channels), INPUT)
+    for record, channel in zip(out, bench.channels, strict=True):
+        accelerates = channel.role in ("drive", "response")
+        record["unit_per_volt"] = 1.0 / channel.sensitivity_v_per_unit
+        record["overload_v"] = bench.limits.overload_fraction * channel.range_v
+        record["limit"] = (
+            bench.limits.force_n
+            if channel.role == "force"
+            else bench.limits.acceleration_m_s2
+            if accelerates
+            else math.inf
+        )
+        record["alarm_v"] = min(record["overload_v"], record["limit"] * abs(channel.sensitivity_v_per_unit))
+        record["role"] = channel.role_code
+        record["skew_samples"] = channel.skew_samples
+        record["watch_displacement"] = accelerates
+        stop = bench.emergency_stop
+        if stop is not None and stop.channel == channel.name:
+            record["emergency_stop"] = 1
+            record["stop_below_v"] = -math.inf if stop.below_v is None else stop.below_v
+            record["stop_above_v"] = math.inf if stop.above_v is None else stop.above_v
+            record["alarm_v"] = 0.0  # every reading is looked at, none passes as plainly in order
+    return out
+
+
+def watch_records(n_channels: int) -> np.ndarray:
+    """Fresh running state of the inputs."""
+    out = np.zeros(n_channels, INPUT_WATCH)
+    out["last_v"] = np.nan
+    return out
+
+
+def guard_record(armed: bool) -> np.ndarray:
+    """A fresh guard, armed or not."""
+    out = np.zeros(1, GUARD)
+    out["mode"] = GuardMode.ARMED if armed else GuardMode.DISARMED
+    out["channel"] = -1
+    return out
+
+
+def end_reason_of(error: DaqError) -> EndReason:
+    """What a run ends with when its driver raises this error."""
+    return EndReason.EMERGENCY_STOP if isinstance(error, DaqEmergencyStop) else EndReason.DRIVER_FAILED
+
+
+def describe_end(guard: np.ndarray, bench: Bench) -> str:
+    """One sentence on why the output was brought down: reason, channel, value, sample.
+
+    What to look for is said only where no lock was gained at the start; the likely cause of a trip needs what was measured
+    before it (`rig.campaigns.running.advice`).
+    """
+    reason = EndReason(int(guard["reason"][0]))
+    text = TEXT[reason]
+    if not reason.is_trip:
+        unlocked = reason in (EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK)
+        return f"{text}; {POLARITY_HINT}" if unlocked else text
+    channel = int(guard["channel"][0])
+    sample = int(guard["sample"][0])
+    where = ""
+    if channel >= 0:
+        unit = "m" if reason in (EndReason.DISPLACEMENT_LIMIT, EndReason.OVERTRAVEL) else bench.channels[channel].unit
+        where = f" on channel {bench.channels[channel].name} ({float(guard['value'][0]):.4g} {unit})"
+    elif reason is EndReason.FREQUENCY_LIMIT:
+        where = f" ({float(guard['value'][0]):.4g} Hz)"
+    elif reason is EndReason.SAMPLES_LOST:
+        where = f" ({float(guard['value'][0]):.4g} s, limits.lost_s = {bench.limits.lost_s:g})"
+    return f"{text}{where} at sample {sample} ({sample / bench.sample_rate_hz:.3f} s)"

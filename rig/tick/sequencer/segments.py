@@ -1,0 +1,125 @@
+"""From a list of steps to the table of segments that the compiled sequencer executes, and the settle rule."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from controller import AmplitudeLaw
+from rig.bench.configuration import Configured
+from rig.tick.sequencer.layout import LONGEST_AVERAGE, OUTCOME, SEGMENT, SETTLE_RULE, Drive, OnFailure, SegmentKind
+
+__all__ = ["Excitation", "Segment", "SettleRule", "segment_table"]
+
+
+class SettleRule(Configured):
+    """When a vibration counts as settled at its set-point."""
+
+    phase_deg: float = Field(1.0, gt=0, le=45)
+    """Largest phase error, averaged over `average_periods`, deg."""
+    amplitude: float = Field(0.01, gt=0, le=0.5)
+    """Largest relative change of the averaged response amplitude over `average_periods`, and, with levels in newtons,
+    largest relative error of the averaged force."""
+    average_periods: int = Field(10, ge=1, le=LONGEST_AVERAGE)
+    """Periods that are averaged."""
+    settled_periods: int = Field(20, ge=1, le=10000)
+    """Periods in a row that must keep the rule."""
+    longest_periods: float = Field(600.0, gt=0, le=1e6)
+    """Periods after which a point that has not settled is given up."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.longest_periods < self.shortest_periods:
+            raise ValueError(
+                f"longest_periods = {self.longest_periods:g}: allowed is from {self.shortest_periods}, "
+                "which two averages and the settled periods take at the least"
+            )
+        return self
+
+    @property
+    def shortest_periods(self) -> int:
+        """Whole periods until a point can have settled."""
+        return 2 * self.average_periods + self.settled_periods - 1
+
+    def build(self) -> np.ndarray:
+        """The record that the kernels read."""
+        out = np.zeros(1, SETTLE_RULE)
+        out["phase_rad"] = math.radians(self.phase_deg)
+        out["amplitude"] = self.amplitude
+        out["average_periods"] = self.average_periods
+        out["settled_periods"] = self.settled_periods
+        return out
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What is sent out where the loop does not choose the frequency.
+
+    A tone of ``frequency_hz``, with which the segment ends; a sweep goes there at ``rate``, in Hz/s, or in octaves/s where it
+    is ``logarithmic``. Or the ``waveform`` of that number, whose fundamental is ``frequency_hz``.
+    """
+
+    frequency_hz: float
+    rate: float = 0.0
+    logarithmic: bool = False
+    waveform: int | None = None
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One step of a plan: its kind, the point it belongs to (-1: none), the level (V, N or m) and its length in periods.
+
+    Without an ``excitation`` the phase-locked loop chooses the frequency, for the lag ``lag_deg`` (if not given, the law's).
+    ``amplitude_law`` says what the level is (if not given, the plan's); where it changes, the level begins at what is
+    measured, without a bump. A ``geometric`` ramp goes by the level's logarithm. A sweep is over at its last frequency,
+    whatever its ``periods``.
+    """
+
+    kind: SegmentKind
+    point: int
+    level: float
+    periods: float
+    on_failure: OnFailure = OnFailure.SKIP
+    on_lost_lock: OnFailure = OnFailure.STOP
+    excitation: Excitation | None = None
+    amplitude_law: AmplitudeLaw | None = None
+    lag_deg: float | None = None
+    geometric: bool = False
+
+
+def segment_table(
+    segments: Sequence[Segment],
+    sample_rate_hz: float,
+    amplitude_law: AmplitudeLaw = AmplitudeLaw.VOLTAGE,
+    lag_rad: float = -0.5 * math.pi,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The table of segments, and the table of outcomes that goes with it, all pending.
+
+    ``amplitude_law`` and ``lag_rad`` are those of segments that name none.
+    """
+    table = np.zeros(len(segments), SEGMENT)
+    for row, segment in zip(table, segments, strict=True):
+        row["kind"], row["point"], row["level"] = segment.kind, segment.point, segment.level
+        row["periods"] = segment.periods
+        row["amplitude_law"] = amplitude_law if segment.amplitude_law is None else segment.amplitude_law
+        row["lag_rad"] = lag_rad if segment.lag_deg is None else math.radians(segment.lag_deg)
+        row["geometric"] = segment.geometric
+        row["on_failure"], row["on_lost_lock"] = segment.on_failure, segment.on_lost_lock
+        if segment.excitation is not None:
+            _fill_in(row, segment.excitation, sample_rate_hz)
+    outcomes = np.zeros(len(segments), OUTCOME)
+    outcomes["mean_error_rad"] = np.nan
+    outcomes["drift"] = np.nan
+    return table, outcomes
+
+
+def _fill_in(row: np.void, excitation: Excitation, sample_rate_hz: float) -> None:
+    row["drive"] = Drive.TONE if excitation.waveform is None else Drive.WAVEFORM
+    row["waveform"] = excitation.waveform or 0
+    row["omega"] = 2.0 * math.pi * excitation.frequency_hz
+    row["logarithmic"] = excitation.logarithmic
+    unit = math.log(2.0) if excitation.logarithmic else 2.0 * math.pi
+    row["rate"] = unit * excitation.rate / sample_rate_hz

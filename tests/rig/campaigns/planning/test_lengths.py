@@ -1,0 +1,115 @@
+"""How many points a plan may have, and how long it may take: what is beyond is refused before anything is expanded."""
+
+import time
+
+import numpy as np
+import pytest
+
+from rig.bench import load_bench
+from rig.campaigns.planning.lengths import check_length
+from rig.campaigns.planning.plan import MOST_POINTS
+from rig.campaigns.plans import bench_of, load_plan, plan_from, shipped_plans
+from rig.errors import ConfigurationError
+
+
+def changed(name, **changes):
+    return plan_from({**load_plan(name).model_dump(mode="json", exclude_none=True), **changes}, "plan.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("magnet-beam/backbone", {"levels_v": np.linspace(0.1, 1.0, 10_001).tolist()}, "levels_v: 10001 (levels_v)"),
+        ("magnet-beam/backbone", {"repeats": 1000, "levels_v": [0.1 * n for n in range(1, 12)]}, "repeats: "),
+        (
+            "magnet-beam/backbone",
+            {"levels_v": np.linspace(0.1, 1.0, 5_001).tolist(), "direction": "up-down"},
+            "levels_v",
+        ),
+        ("magnet-beam/stepped-sine-up", {"steps": 100_000}, "steps: "),
+        ("magnet-beam/sweep-1", {"levels_v": np.linspace(0.1, 1.0, 10_001).tolist()}, "levels_v: "),
+        ("magnet-beam/multisine-1", {"realisations": 1000, "levels_rms_v": [0.01 * n for n in range(1, 12)]}, "realis"),
+        (
+            "magnet-beam/response-controlled",
+            {"phase_lags_deg": np.linspace(-170, -10, 9_999).tolist()},
+            "phase_lags_deg",
+        ),
+        ("friction-beam/continuous-backbone", {"levels_m": np.linspace(1e-6, 1e-4, 10_001).tolist()}, "levels_m: "),
+    ],
+)
+def test_more_points_than_anybody_measures_are_refused_at_once_by_key(name, changes, said):
+    began = time.process_time()
+    with pytest.raises(ConfigurationError, match=r"points, allowed are up to 10000") as refused:
+        changed(name, **changes)
+    assert time.process_time() - began < 1.0
+    assert f"plan.toml: {said}" in str(refused.value)
+
+
+@pytest.mark.parametrize("step_deg", [1e-3, 1e-9, 1e-30])
+def test_steps_of_a_lag_are_counted_before_they_are_made(step_deg):
+    with pytest.raises(ConfigurationError, match=r"step_deg: .* points, allowed are up to 10000"):
+        changed("magnet-beam/stepped-phase", phase_lags_deg=None, start_deg=-170.0, stop_deg=-10.0, step_deg=step_deg)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("magnet-beam/backbone", {"levels_v": np.linspace(0.01, 1.0, MOST_POINTS).tolist()}),
+        (
+            "magnet-beam/stepped-phase",
+            {"levels_rms_n": [0.1], "start_deg": -170.0, "stop_deg": -10.0, "step_deg": 0.04, "direction": "up-down"},
+        ),
+        ("magnet-beam/multisine-1", {"levels_rms_v": np.linspace(0.01, 0.1, 2_000).tolist(), "realisations": 5}),
+        (
+            "friction-beam/continuous-backbone",
+            {"levels_m": np.linspace(2e-5, 3e-5, MOST_POINTS).tolist(), "repeats": 1},
+        ),
+        (
+            "magnet-beam/response-controlled",
+            {
+                "levels_m": [1e-3],
+                "phase_lags_deg": np.linspace(-150, -30, 4_999).tolist(),
+                "plant": load_plan("magnet-beam/continuous-backbone").model_dump(mode="json")["plant"],
+            },
+        ),
+    ],
+)
+def test_a_plan_of_the_most_points_is_ready_within_seconds(name, changes):
+    began = time.process_time()
+    plan = changed(name, **changes)
+    bench = bench_of(plan, "")
+    plan.check(bench)
+    assert len(plan.segments(bench.sample_rate_hz)) > 0
+    assert time.process_time() - began < 6.0  # a slow machine's; 47 s when every point took a Fourier transform
+
+
+@pytest.mark.parametrize("name", shipped_plans())
+def test_a_shipped_plan_is_not_too_long(name):
+    plan = load_plan(name)
+    check_length(plan, bench_of(plan, name))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("magnet-beam/backbone", {"record_periods": 1_000_000}, "record_periods: up to 2.2.e.08 samples of one record"),
+        (
+            "magnet-beam/backbone",
+            {"settle": {"longest_periods": 1e6}, "repeats": 700},
+            "settle.longest_periods: the plan may",
+        ),
+        ("magnet-beam/backbone", {"ramp_periods": 1e5, "repeats": 700}, "ramp_periods: the plan may take .* days"),
+        ("magnet-beam/multisine-1", {"periods": 100_000}, "^periods: up to .* samples of one record"),
+    ],
+)
+def test_a_plan_of_absurd_length_is_refused_by_the_key_that_makes_it_so(name, changes, said):
+    with pytest.raises(ConfigurationError, match=said):
+        check_length(changed(name, **changes), load_bench("magnet-beam"))
+
+
+def test_a_run_of_absurd_length_leaves_no_file(tmp_path):
+    import rig
+
+    with pytest.raises(ConfigurationError, match="samples of one record"):
+        rig.run(changed("magnet-beam/backbone", record_periods=1_000_000), output=tmp_path / "run.h5")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,235 @@
+"""The settle rule and the walk through the segments, period by period."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.layout import LOCK, AmplitudeLaw, LockState
+from rig.tick.safety.layout import EndReason, GuardMode
+from rig.tick.safety.limits import guard_record
+from rig.tick.sequencer.kernels import advance, judge_period
+from rig.tick.sequencer.layout import PROGRESS, SETTLING, OnFailure, Outcome, SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
+
+RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)
+
+
+def _judge(periods, locked=True, wanted_force=0.0, saturated=False, open_loop=False):
+    settling = np.zeros(1, SETTLING)
+    rule = RULE.build()
+    for error_deg, response, force in periods:
+        judge_period(
+            settling[0],
+            rule[0],
+            locked,
+            math.radians(error_deg),
+            response,
+            force,
+            wanted_force,
+            force,
+            saturated,
+            False,
+            open_loop,
+        )
+    return settling[0]
+
+
+def test_a_quiet_vibration_settles_after_twice_the_average_and_the_settled_periods():
+    assert _judge([(0.5, 1.0, 1.0)] * (2 * 5 + 8 - 2))["good_periods"] == 7
+    assert _judge([(0.5, 1.0, 1.0)] * (2 * 5 + 8 - 1))["good_periods"] == 8
+
+
+def test_only_the_averaged_error_counts():
+    swinging = [(20.0 * (-1) ** k, 1.0, 1.0) for k in range(40)]
+    assert _judge(swinging)["good_periods"] == 0  # five periods of +-20 deg average to +-4 deg
+    fast = [(20.0 * math.cos(2 * math.pi * k / 5), 1.0, 1.0) for k in range(40)]
+    assert _judge(fast)["good_periods"] > 8
+
+
+@given(st.floats(0.0021, 0.1))
+def test_a_drifting_amplitude_does_not_settle(rate):
+    assert _judge([(0.0, (1.0 + rate) ** k, 1.0) for k in range(60)])["good_periods"] == 0
+
+
+@given(st.floats(0.0, 0.0019))
+def test_a_slow_enough_drift_does(rate):
+    assert _judge([(0.0, (1.0 + rate) ** k, 1.0) for k in range(60)])["good_periods"] > 8
+
+
+def test_nothing_settles_without_a_lock():
+    assert _judge([(0.0, 1.0, 1.0)] * 100, locked=False)["good_periods"] == 0
+
+
+def test_a_force_level_must_be_reached():
+    assert _judge([(0.0, 1.0, 0.98)] * 60, wanted_force=1.0)["good_periods"] == 0
+    assert _judge([(0.0, 1.0, 0.995)] * 60, wanted_force=1.0)["good_periods"] > 8
+
+
+def test_a_level_that_saturates_and_is_not_reached_is_counted():
+    assert _judge([(0.0, 1.0, 0.9)] * 60, wanted_force=1.0, saturated=True)["saturated_periods"] > 20
+    assert _judge([(0.0, 1.0, 0.995)] * 60, wanted_force=1.0, saturated=True)["saturated_periods"] == 0
+
+
+class Walk:
+    """A sequencer without a rig: cycles are dealt out by hand."""
+
+    def __init__(self, *segments):
+        self.table, self.outcomes = segment_table(segments, 5000.0)
+        self.progress = np.zeros(1, PROGRESS)
+        self.progress["segments"] = len(segments)
+        self.settling, self.lock, self.guard = np.zeros(1, SETTLING), np.zeros(1, LOCK), guard_record(True)
+        self.lock["state"] = LockState.LOCKED
+        self.cycle, self.sample, self.levels, self.lags = 0.0, 0, [], []
+
+    def go(self, periods, per_period=50, unreached=False):
+        for _ in range(int(periods * per_period)):
+            advance(
+                self.progress[0], self.table, self.outcomes, self.settling[0], RULE.build()[0], self.lock[0],
+                self.guard[0], self.cycle, self.sample, unreached,
+            )  # fmt: skip
+            self.levels.append(float(self.progress["level"][0]))
+            self.lags.append(float(self.progress["lag"][0]))
+            self.cycle += 1.0 / per_period
+            self.sample += 1
+        return self
+
+    def codes(self):
+        return [Outcome(int(code)).name for code in self.outcomes["outcome"]]
+
+
+def _point(number, level, on_failure=OnFailure.SKIP, on_lost_lock=OnFailure.STOP):
+    return (
+        Segment(SegmentKind.RAMP, number, level, 10.0),
+        Segment(SegmentKind.SETTLE, number, level, 30.0, on_failure, on_lost_lock),
+        Segment(SegmentKind.RECORD, number, level, 20.0, on_failure, on_lost_lock),
+    )
+
+
+def test_a_ramp_is_half_a_cosine_between_the_levels():
+    walk = Walk(Segment(SegmentKind.HOLD, -1, 1.0, 1.0), Segment(SegmentKind.RAMP, 0, 3.0, 10.0)).go(13)
+    ramp = np.array(walk.levels[50:550])
+    expected = 1.0 + 2.0 * 0.5 * (1 - np.cos(np.pi * np.arange(ramp.size) / ramp.size))
+    np.testing.assert_allclose(ramp[5:-5], expected[5:-5], atol=2.0 * np.pi / 500 * 3)
+    assert max(np.abs(np.diff(walk.levels[60:]))) < 0.02
+
+
+def _held(level, periods, **keys):
+    return Segment(SegmentKind.HOLD, -1, level, periods, amplitude_law=AmplitudeLaw.RESPONSE, **keys)
+
+
+def _ramp(level, periods, point=-1, **keys):
+    return Segment(SegmentKind.RAMP, point, level, periods, amplitude_law=AmplitudeLaw.RESPONSE, **keys)
+
+
+def test_a_geometric_ramp_is_half_a_cosine_of_the_logarithm_and_never_leaves_its_ends():
+    walk = Walk(_held(1e-5, 1.0), _ramp(1e-3, 10.0, geometric=True)).go(12)
+    ramp = np.array(walk.levels[51:551])
+    expected = -5 + 2.0 * 0.5 * (1 - np.cos(np.pi * np.arange(ramp.size) / ramp.size))
+    np.testing.assert_allclose(np.log10(ramp), expected, atol=2e-2)
+    assert 1e-5 <= ramp.min() <= ramp.max() <= 1e-3
+
+
+def test_from_rest_a_geometric_ramp_is_a_plain_one():
+    walk = Walk(_ramp(2.0, 10.0, geometric=True)).go(10)
+    assert walk.levels[250] == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_wanted_lag_is_ramped_with_the_level_and_then_held():
+    start, end = math.radians(-150.0), math.radians(-30.0)
+    segments = (_held(1.0, 1.0, lag_deg=-150.0), _ramp(1.0, 10.0, lag_deg=-30.0), _held(1.0, 5.0, lag_deg=-30.0))
+    walk = Walk(*segments).go(15)
+    ramp = np.array(walk.lags[51:551])
+    expected = start + (end - start) * 0.5 * (1 - np.cos(np.pi * np.arange(ramp.size) / ramp.size))
+    np.testing.assert_allclose(ramp, expected, atol=0.02)
+    assert walk.lags[-1] == pytest.approx(end)
+
+
+def test_a_ramp_up_waits_while_its_level_is_not_reached_and_goes_on_where_it_was():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0)).go(6)
+    waiting = walk.levels[-1]
+    walk.go(15, unreached=True)
+    assert walk.levels[-1] == pytest.approx(waiting, abs=0.02)
+    walk.go(4.9)
+    assert waiting < walk.levels[-1] <= 3.0
+    walk.go(1)
+    assert walk.codes() == ["DONE", "DONE"]
+    assert walk.outcomes["periods"][1] == pytest.approx(25.0, abs=0.1)
+
+
+def test_a_ramp_up_that_waits_for_twenty_periods_is_out_of_reach_and_skips_its_point():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0, point=0), *_point(1, 2.0)).go(6).go(21, unreached=True)
+    assert walk.codes()[:3] == ["DONE", "UNREACHABLE", "RUNNING"]
+
+
+def test_a_ramp_down_from_a_level_that_was_not_reached_does_not_wait():
+    walk = Walk(_held(3.0, 1.0), _ramp(1.0, 10.0), _held(1.0, 5.0)).go(1).go(11, unreached=True)
+    assert walk.codes() == ["DONE", "DONE", "RUNNING"]
+    assert walk.levels[-1] == 1.0
+
+
+def test_a_frequency_that_stands_at_its_window_for_twenty_periods_fails_the_point():
+    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(12)
+    walk.settling["clamped_periods"] = 19
+    walk.go(1)
+    assert walk.codes()[1] == "RUNNING"
+    walk.settling["clamped_periods"] = 20
+    walk.go(1)
+    assert walk.codes()[:3] == ["DONE", "OUTSIDE_WINDOW", "SKIPPED"]
+
+
+def test_a_plan_that_settles_is_recorded_and_ends_the_run():
+    walk = Walk(*_point(0, 1.0))
+    walk.go(12)
+    walk.settling["good_periods"] = RULE.settled_periods
+    walk.go(25)
+    assert walk.codes() == ["DONE"] * 3
+    assert EndReason(int(walk.guard["reason"][0])) is EndReason.COMPLETED
+    assert walk.outcomes["periods"][2] == pytest.approx(20.0, abs=0.05)
+
+
+def test_a_point_that_does_not_settle_is_skipped_and_the_next_is_tried():
+    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(42)
+    assert walk.codes()[:3] == ["DONE", "NOT_SETTLED", "SKIPPED"]
+    assert walk.codes()[3] == "RUNNING"
+
+
+def test_a_point_that_does_not_settle_stops_a_plan_that_says_so():
+    walk = Walk(*_point(0, 1.0, OnFailure.STOP), *_point(1, 2.0)).go(60)
+    assert walk.codes() == ["DONE", "NOT_SETTLED", "PENDING", "PENDING", "PENDING", "PENDING"]
+    assert EndReason(int(walk.guard["reason"][0])) is EndReason.PLAN_STOPPED
+
+
+def test_a_lost_lock_fails_the_point_and_is_sought_again_where_the_plan_says_so():
+    skip = OnFailure.SKIP
+    walk = Walk(*_point(0, 1.0, on_lost_lock=skip), *_point(1, 2.0)).go(12)
+    walk.lock["state"] = LockState.LOST
+    walk.go(1)
+    assert walk.codes()[:3] == ["DONE", "LOST_LOCK", "SKIPPED"]
+    assert LockState(int(walk.lock["state"][0])) is LockState.ACQUIRING
+
+
+def test_a_lost_lock_trips_unless_the_plan_says_otherwise():
+    walk = Walk(*_point(0, 1.0), *_point(1, 2.0)).go(12)
+    walk.lock["state"] = LockState.LOST
+    walk.go(1)
+    assert EndReason(int(walk.guard["reason"][0])) is EndReason.LOST_LOCK
+
+
+def test_a_disturbed_record_spoils_the_point():
+    walk = Walk(*_point(0, 1.0)).go(12)
+    walk.settling["good_periods"] = RULE.settled_periods
+    walk.go(1)
+    walk.settling["bad_periods"] = RULE.average_periods
+    walk.go(1)
+    assert walk.codes() == ["DONE", "DONE", "DISTURBED"]
+
+
+def test_a_stop_interrupts_the_segment_under_way():
+    walk = Walk(*_point(0, 1.0)).go(12)
+    walk.guard["stop_requested"] = 1
+    walk.go(1)
+    assert walk.codes() == ["DONE", "INTERRUPTED", "PENDING"]
+    assert GuardMode(int(walk.guard["mode"][0])) is GuardMode.RAMPING

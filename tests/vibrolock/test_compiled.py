@@ -1,0 +1,93 @@
+"""Machine code is found by what goes into it: callees and constants of other files too, comments not."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+CALLER = """
+from {name}_callee import scaled
+from vibrolock.compiled import kernel
+
+@kernel
+def caller(x):
+    return scaled(x) + later(x)
+
+@kernel
+def later(x):
+    return 0.0 * x
+
+print(caller(1.0), sum(caller.stats.cache_hits.values()))
+"""
+CALLEE = """
+from {name}_constants import FACTOR, LEVELS
+from vibrolock.compiled import kernel
+
+@kernel
+def scaled(x):
+    return FACTOR * x + LEVELS[1]
+"""
+CONSTANTS = "import numpy as np\nFACTOR = 2.0\nLEVELS = np.array([0.0, 0.5])\n"
+
+
+@pytest.fixture
+def answer(tmp_path):
+    """Write three modules, with replacements, and call the kernel in a fresh process: its value, and hits of the cache."""
+    for name, text in {"": CALLER, "_callee": CALLEE, "_constants": CONSTANTS}.items():
+        (tmp_path / f"rescaled{name}.py").write_text(text.format(name="rescaled"))
+
+    def ask(file="", old="", new=""):
+        path = tmp_path / f"rescaled{file}.py"
+        assert old in path.read_text()
+        path.write_text(path.read_text().replace(old, new, 1))
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+        out = subprocess.run(
+            [sys.executable, "-c", "import rescaled"], env=environment, capture_output=True, text=True, check=True
+        )
+        value, hits = out.stdout.split()
+        return float(value), int(hits)
+
+    return ask
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "value"),
+    [
+        ("_constants", "2.0", "3.0", 3.5),
+        ("_constants", "0.5", "0.75", 2.75),
+        ("_callee", "FACTOR * x", "FACTOR * x * x", 2.5),
+        ("", "0.0 * x", "1.0 * x", 3.5),
+    ],
+    ids=["constant", "array", "callee", "callee defined below"],
+)
+def test_what_goes_into_a_kernel_compiles_it_anew(answer, file, old, new, value):
+    assert answer() == (2.5, 0)
+    assert answer() == (2.5, 1)
+    assert answer(file, old, new) == (value, 0)
+    assert answer(file, new, old) == (2.5, 1)
+
+
+def test_a_comment_compiles_nothing_anew(answer):
+    assert answer() == (2.5, 0)
+    assert answer("_callee", "def scaled(x):", "def scaled(x):  # by a factor\n    # of two") == (2.5, 1)
+
+
+def test_digests_are_the_same_in_every_process():
+    code = (
+        "import rig.drivers.virtual.kernels as one, identification.pnlss.kernels as two, vibrolock.compiled as c;"
+        "print([c.content_digest(k) for m in (one, two) for k in vars(m).values() if hasattr(k, 'py_func')])"
+    )
+    answers = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(answers) == 1
+    assert len(answers.pop()) > 500

@@ -1,1 +1,0 @@
-"""Vector arithmetic for kernels: eight numbers side by side."""
