@@ -70,7 +70,7 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
 
 
 def _block_rows(responses: FrequencyResponseMatrix, states: int, sample_rate_hz: float) -> list[int]:
-    """Numbers of block rows to try, from the fewest that so many states need to the most that the lines tell apart."""
+    """Numbers of block rows to try, from the fewest that the states need to the most that the lines can resolve."""
     lines, outputs, inputs = responses.value.shape
     z = np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz)
     fewest = -(-states // outputs) + 1
@@ -88,7 +88,7 @@ def _block_rows(responses: FrequencyResponseMatrix, states: int, sample_rate_hz:
 
 
 def reflected(model: StateSpace) -> StateSpace:
-    """The same with eigenvalues outside the unit circle reflected into it (1 / conj), frequencies unchanged."""
+    """The model with eigenvalues outside the unit circle reflected into it (1 / conj), frequencies unchanged."""
     if spectral_radius(model.a) < 1.0:
         return model
     values, vectors = np.linalg.eig(model.a)
@@ -100,8 +100,8 @@ def reflected(model: StateSpace) -> StateSpace:
 def with_independent_states(model: PnlssModel, experiments: Sequence[Experiment]) -> PnlssModel:
     """A linear model in states of variance one, uncorrelated under the inputs of the experiments.
 
-    What freedom is left, a rotation, makes the observability Gramian diagonal, largest first: input-balanced for the inputs
-    as they are. Powers of such states depend on each other as little as they can.
+    The remaining freedom, a rotation, makes the observability Gramian diagonal, largest first: input-balanced for the actual
+    inputs. Powers of such states depend on each other as little as possible.
     """
     states = np.hstack([model.simulate(e.inputs).states[:, e.counted_from :] for e in experiments])
     variance, directions = np.linalg.eigh(states @ states.T / states.shape[1])
@@ -122,9 +122,9 @@ def with_independent_states(model: PnlssModel, experiments: Sequence[Experiment]
 
 
 def hardly_seen_states(model: PnlssModel, experiments: Sequence[Experiment]) -> int:
-    """How many of the states (`with_independent_states`) show in outputs with less than 0.002 of what the first does.
+    """Number of states (`with_independent_states`) that contribute less than 0.002 of the first state's share to the outputs.
 
-    They follow noise or a misfit: states of measured structures beyond the first mode showed with 0.01 and more.
+    Such states follow noise or a misfit: further modes of measured structures contributed 0.01 and more.
     """
     seen = np.diag(_observability(model, experiments))
     return int(np.count_nonzero(seen < _HARDLY**2 * np.max(seen)))
@@ -144,9 +144,9 @@ def linear_pnlss(
     linear: StateSpace | PnlssModel | None = None,
     band_hz: tuple[float, float] | None = None,
 ) -> PnlssModel:
-    """The linear model that a fit begins from, with notes on how near it comes.
+    """The linear model from which a fit starts, with notes on its accuracy.
 
-    Inputs that are constant take no part in the best linear approximation; the fit over time finds what they do. Parameters and
+    Constant inputs take no part in the best linear approximation; the fit over time finds their effect. Parameters and
     errors are those of `identify_pnlss`.
     """
     same_channels(experiments)
@@ -190,7 +190,7 @@ def linear_pnlss(
 
 
 def varying_inputs(experiments: Sequence[Experiment]) -> list[int]:
-    """Numbers of the inputs that are not constant; all if none is, for what is wrong then is said elsewhere."""
+    """Numbers of the inputs that are not constant; all if all are constant, which a later check refuses."""
     low, high = (f([f(e.inputs, axis=1) for e in experiments], axis=0) for f in (np.min, np.max))
     return [int(i) for i in np.flatnonzero(low < high)] or list(range(low.size))
 

@@ -8,7 +8,7 @@ The work goes through joblib, whose backend is the user's choice in one line::
             ...
 
 A fit is mostly small matrices and compiled loops on one core, so that models in parallel gain more than BLAS threads
-within one: ``parallel_config("loky", inner_max_num_threads=1)`` keeps the two from fighting for cores.
+within one: ``parallel_config("loky", inner_max_num_threads=1)`` avoids that both compete for cores.
 """
 
 import time
@@ -70,11 +70,12 @@ def realisation_combinations(
 ) -> tuple[ModelJob, ...]:
     """Jobs of different combinations of the realisations of each level, and of all levels together.
 
-    Every model leaves one realisation out, for its test, and identifies from all others (four of five, nine of ten, as
-    Scheel et al., Section 3.3): of these one chooses the iterate and is not fitted. The paper does not say how twenty models
-    come of five realisations; the ordered pairs of a realisation left out and one that chooses are just twenty (of ten
-    ninety, of which the paper then used thirty). So model k of R realisations leaves out ``k mod R``, and every R models the
-    one that chooses moves on by one. The first R models differ in what is left out, and none of ``R (R - 1)`` is there twice.
+    Every model leaves one realisation out for its test and is identified from all others (four of five, nine of ten, as in
+    Scheel et al., Section 3.3), one of which chooses the iterate and is not fitted. The paper does not say how five
+    realisations give twenty models; there are just twenty ordered pairs of a realisation left out and one that chooses (ninety
+    of ten realisations, of which the paper used thirty). So model k of R realisations leaves out ``k mod R``; after every R
+    models the choosing realisation moves on by one. The first R models leave out different realisations, and all ``R (R - 1)``
+    models differ.
 
     Parameters
     ----------
@@ -83,13 +84,13 @@ def realisation_combinations(
     models
         Number of models of each training set, or one number for each name, ``mixed`` among them; 0 for none.
     mixed
-        Whether there is a training set ``mixed`` of all levels concatenated: of each level combination k.
+        Whether there is a training set ``mixed`` of all levels, whose model k takes combination k of each level.
     most
-        Realisations of each level that a model is fitted to, at most, where all others would take too long: those that follow
-        the one that chooses. None for all.
+        Largest number of realisations of each level that a model is fitted to, to save time: those that follow the choosing
+        one. None for all.
     beside, beside_validation
-        Further experiments that are fitted by every model, backbone segments for instance, and further ones that help to
-        choose its iterate: without, realisations of a low level choose one that knows nothing of high segments.
+        Further experiments that every model fits, such as backbone segments, and further ones that help to choose its
+        iterate. Without the latter, realisations of a low level choose an iterate that ignores segments of high level.
 
     Raises
     ------
@@ -132,7 +133,7 @@ def realisation_combinations(
 
 
 def _job(training_set: str, members: Mapping[str, Sequence[Experiment]], k: int, most: int | None) -> ModelJob:
-    """Combination k."""
+    """Job of combination k of the realisations of every level."""
     training: list[Experiment] = []
     validation: list[Experiment] = []
     left_out: list[Experiment] = []
@@ -184,16 +185,16 @@ def identify_many(
     done: Container[str] = (),
     progress: Callable[[IdentifiedModel[Fit], int, int], None] | None = None,
 ) -> Iterator[IdentifiedModel[Fit]]:
-    """Yield the models of all jobs as they are finished, in whatever order that is.
+    """Yield the models of all jobs in the order in which they finish.
 
     ``identify`` is called as ``identify(training, validation=...)`` with the job's experiments, in another process where
     there are several: `identification.identify_pnlss` with all else bound by `functools.partial`. ``n_jobs`` as in
     joblib: a number of workers, -1 for all cores; None for what `joblib.parallel_config` says, else 1. Jobs whose names are
-    in ``done`` are left out, so that a study whose results were kept as they came is taken up where it ended. ``progress``
+    in ``done`` are skipped, so that an interrupted study can be continued from its stored results. ``progress``
     is called with each result, the number of those finished and that of all.
 
-    A job that fails is a result with its reason, and the others go on. After Ctrl-C, and when the iterator is closed early,
-    what has not begun is dropped. Raises `IdentificationError` where two jobs have the same name.
+    A failed job gives a result with its reason, and the others continue. After Ctrl-C, or if the iterator is closed early,
+    jobs that have not started are dropped. Raises `IdentificationError` if two jobs have the same name.
     """
     given = list(jobs)
     names = [job.name for job in given]

@@ -88,7 +88,7 @@ class Iterates:
 
     @classmethod
     def begin(cls, problem: Problem, vector: Float) -> "Iterates":
-        """At a start."""
+        """The iterates at the start of a fit."""
         damping = problem.settings.damping
         errors = problem.training_error(vector), problem.validation_error(vector)
         return cls(vector, vector, damping, [errors[0]], [errors[1]], [damping], [0.0])
@@ -103,7 +103,7 @@ class Iterates:
 
     @property
     def history(self) -> FitHistory:
-        """As the result holds it."""
+        """History of the fit for its result."""
         return FitHistory(
             training_error=np.array(self.training),
             validation_error=np.array(self.validation),
@@ -118,7 +118,7 @@ class Iterates:
         return problem.every if far else 1
 
     def add(self, problem: Problem, vector: Float, training: float, damping: float) -> None:
-        """One more iterate."""
+        """Append an iterate."""
         validation = problem.validation_error(vector)
         self.vector, self.damping = vector, damping
         self.training.append(training)
@@ -169,7 +169,7 @@ def _reason(iterates: Iterates, settings: FitSettings) -> str | None:
 
 
 def _descend(problem: Problem, steps: Steps, iterates: Iterates) -> tuple[Float, float, float] | None:
-    """The parameters, their training error and the damping of a step that fits better; None if none does.
+    """Parameters, training error and damping of a step that reduces the cost; None if no step does.
 
     A simulation costs far less than sensitivities, so dampings are simply tried: downwards as long as that is better and
     promises to be, and upwards where nothing was.

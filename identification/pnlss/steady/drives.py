@@ -64,7 +64,7 @@ class Sine:
 
     @property
     def size(self) -> int:
-        """No unknowns."""
+        """Zero: a sine has no unknowns."""
         return 0
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
@@ -74,11 +74,11 @@ class Sine:
         return given, np.zeros((coefficients, self.n_inputs, 0))
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """None."""
+        """A sine has no equations: all parts are empty."""
         return Equations(np.zeros(0), np.zeros((0, 0)), np.zeros((0, *outputs.shape)), np.zeros(0), np.zeros(0))
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """No unknowns."""
+        """Empty: a sine has no unknowns."""
         return np.zeros(0)
 
     def voltage(self, own: Float) -> complex:
@@ -98,7 +98,7 @@ class HeldOutput:
 
     @property
     def size(self) -> int:
-        """The amplitude."""
+        """One: the amplitude."""
         return 1
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
@@ -119,7 +119,7 @@ class HeldOutput:
         return np.array([peak_of_level(self.force_n, self.held) / np.abs(response[self.output])])
 
     def voltage(self, own: Float) -> complex:
-        """The unknown."""
+        """The amplitude, which is the unknown."""
         return complex(own[0])
 
 
@@ -129,7 +129,7 @@ def peak_of_level(force_n: float, held: str) -> float:
 
 
 def level_reached(force: Float, held: str, force_n: float, level: float) -> tuple[float, Float]:
-    """``|F_1|^2``, or the mean square of a force's harmonics, over that asked for, minus level^2; by its coefficients."""
+    """``|F_1|^2`` or the mean square of a force over the value asked for, minus level^2; its derivative by the coefficients."""
     weight = np.zeros(force.size)
     if held == "rms":
         weight[1:] = 0.5 / force_n**2
@@ -142,8 +142,8 @@ def level_reached(force: Float, held: str, force_n: float, level: float) -> tupl
 class Coupled:
     """An exciter whose sine of voltage makes the force at one input, with the reaction of the drive point's motion.
 
-    Unknowns are the force's coefficients without a static one, then those of the voltage. The force's fundamental is the
-    reference of the phase; where the voltage is held, the voltage is.
+    Unknowns are the coefficients of the force without its static part, then those of the voltage. The phase reference is the
+    fundamental of the force, or the voltage if that is held.
     """
 
     exciter: Exciter
@@ -151,7 +151,7 @@ class Coupled:
     held: Literal["fundamental", "rms", "voltage"]
     output: int
     order: int
-    """How many times the drive point's displacement was differentiated in that output."""
+    """Order of the time derivative of the drive point's displacement in that output."""
     row: int
     n_inputs: int
     coefficients: int
@@ -175,7 +175,7 @@ class Coupled:
         return self.exciter.force(1.0, 0.0, frequency_hz), np.asarray(per_motion)
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """``F_h = g V delta_h1 + r_h Y_h`` for each harmonic, then what is held, and the phase's reference."""
+        """``F_h = g V delta_h1 + r_h Y_h`` for each harmonic, then the held level and the phase reference."""
         count = self.coefficients - 1
         by_own, by_outputs = np.zeros((self.size, self.size)), np.zeros((self.size, *outputs.shape))
         by_frequency, by_level = np.zeros(self.size), np.zeros(self.size)
@@ -218,5 +218,5 @@ class Coupled:
         return own
 
     def voltage(self, own: Float) -> complex:
-        """The last two unknowns."""
+        """The voltage, from the last two unknowns."""
         return complex(own[-2], -own[-1])

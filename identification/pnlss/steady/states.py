@@ -49,14 +49,14 @@ class SteadyStates:
     multipliers
         complex[n, n_states], of a disturbance over one sample, under the inputs as they are.
     stable
-        bool[n]. Under a given input: every multiplier below 1. Where a force is held: on a part of the curve that a slow
-        change of frequency can hold, and no multiplier above 1 but real ones, which belong to an input that is not held.
+        bool[n]. Under a given input: every multiplier is below 1. With a held force: a slow change of frequency can hold the
+        point, and no multiplier exceeds 1 except real ones, which belong to an input that is not held.
     loss
-        How each is unstable: ``fold``, ``period doubling``, ``Neimark-Sacker``; empty for stable ones.
+        Loss of stability: ``fold``, ``period doubling``, ``Neimark-Sacker``; empty for stable ones.
     state_use, input_use
         float[n, n_states], float[n, n_inputs], largest magnitude over the largest in the training data; NaN where unknown.
     input_channels, output_channels
-        What goes in, and what comes out.
+        Input and output channels.
     """
 
     frequency_hz: Float
@@ -111,7 +111,7 @@ class SteadyStates:
         return np.asarray(found)
 
     def joined(self, other: "SteadyStates") -> "SteadyStates":
-        """The points of both, these first."""
+        """The points of both, those of this one first."""
         arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _ARRAYS}
         return replace(self, **arrays, loss=(*self.loss, *other.loss))
 
@@ -136,7 +136,7 @@ def steady_states(
 ) -> SteadyStates:
     """The vibrations that solutions (float[n, n_unknowns]) of a balance describe.
 
-    ``statically_stable`` (bool[n]) tells, where the force is held, those that a slow change can hold.
+    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that a slow change can hold.
     """
     model, basis = balance.model, balance.basis
     count, harmonics = frequency_hz.size, basis.harmonics + 1
