@@ -157,7 +157,7 @@ def linear_modes(
 
 
 def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
-    """The maximum-likelihood fit from one near it: fits to what is linear about each one, until nothing moves."""
+    """The maximum-likelihood fit from a nearby fit: repeated fits to the linearised problem until no pole moves."""
     for _ in range(_ROUNDS):
         before = fit
         basis = modal_basis(joint.s, fit.poles, normal)
@@ -180,7 +180,7 @@ def _poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
 
 
 def _start(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequence[float] | None) -> Float:
-    """Poles to start from, rad/s and damping ratios."""
+    """Initial poles: rad/s and damping ratios."""
     if wanted is None:
         columns = stable.columns()
         if not columns.size:
@@ -217,7 +217,7 @@ def _without_spurious(
     normal: bool,
     modes: int | Sequence[float] | None,
 ) -> tuple[ModalFit, list[str]]:
-    """Fit; leave out what is no mode, or, if a number was asked for, the least prominent; fit again until all are modes."""
+    """Fit, drop poles that are no modes (or the least prominent if a number was asked for), and repeat until all are modes."""
     notes: list[str] = []
     drive, whole = find_role(band.outputs, "drive"), np.inf
     while True:

@@ -73,7 +73,7 @@ def _entry(value: Any, index: int, walked: str, path: str, where: str) -> Any:
 
 
 def as_levels(value: Any, where: str) -> Sequence[Any]:
-    """``value`` as a list of structures; a single structure is a list of one (MATLAB does not tell them apart)."""
+    """``value`` as a list of structures; a single structure is a list of one (MATLAB does not distinguish them)."""
     if isinstance(value, Mapping):
         return [value]
     if not _is_list(value):
@@ -124,7 +124,7 @@ class ChannelMapping(MappingTable):
     """A channel of the measurement and the unit that its numbers are stored in."""
 
     name: Annotated[str, Field(min_length=1)]
-    """Name of the channel from now on."""
+    """Name of the channel after import."""
     role: Role
     """``force``, ``drive`` (motion where the force acts), ``response`` or ``monitor`` (such as a voltage)."""
     unit: str
@@ -138,7 +138,7 @@ class ChannelMapping(MappingTable):
 
 
 class ComplexPaths(MappingTable):
-    """Where complex numbers are: real and imaginary part, or amplitude and phase."""
+    """Paths of complex numbers: real and imaginary part, or amplitude and phase."""
 
     real: Path | None = None
     """Path of the real parts."""

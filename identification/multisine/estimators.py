@@ -154,7 +154,7 @@ def _noise_covariance(error: Complex) -> Complex | None:
 
 
 def _total_covariance(error: Complex, inputs: int) -> Complex | None:
-    """The same from the scatter of blocks of as many realisations as inputs."""
+    """complex[n_lines, m, m] of the sum, from the scatter of blocks of as many realisations as inputs."""
     means = error.mean(axis=1)
     blocks = means.reshape(-1, inputs, *means.shape[1:]).sum(axis=1)[:, None]
     count = blocks.shape[0]

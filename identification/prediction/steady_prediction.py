@@ -97,7 +97,7 @@ class SteadyPrediction:
 
     @property
     def name(self) -> str:
-        """What was predicted, for tables."""
+        """Label of the prediction for tables."""
         if self.force == "voltage":
             return f"{self.force_n:g} V"
         kind = {"fundamental": "", "rms": " RMS", "pure-sine": " pure sine", "recorded": " recorded"}[self.force]
@@ -126,17 +126,17 @@ class SteadyPrediction:
     def peak(self, channel: str | None = None) -> Peak:
         """Largest amplitude on the main branch, by a parabola through the three highest points.
 
-        Of a response that was cut off it is no peak unless `peak_reached`.
+        If the response was cut off, this is a peak only with `peak_reached`.
         """
         main = self.branch == 0
         columns = (self.amplitude_m(channel), self.frequency_hz, self.phase_lag_deg(channel), self.modal_amplitude)
         return Peak(*peak_of(*(column[main] for column in columns)))
 
     def peak_reached(self, channel: str | None = None, *, order: int = 0) -> bool:
-        """Whether the largest amplitude is a peak: not so where a response was cut off on its way up.
+        """Whether the largest amplitude is a peak, and not the end of a response that was cut off on its way up.
 
-        That is where the largest of all branches, of the displacement differentiated ``order`` times, is the last point of
-        one, or not on the main one, of which alone `peak` tells.
+        It is no peak if the largest value of the displacement differentiated ``order`` times, over all branches, is the last
+        point of a branch, or lies off the main branch, which alone `peak` describes.
         """
         if self.complete:
             return True

@@ -57,11 +57,11 @@ class Conditions:
     out, as piezoelectric sensors see none. ``response``: peak of the drive point's displacement, fundamental (m).
     ``voltage``: its amplitude (V)."""
     level: float
-    """Its value."""
+    """Value of the level."""
     at: Literal["lag", "frequency"]
     """Lag ``arg F_1 - arg A_1`` of the drive-point acceleration behind the force (rad), or frequency (rad/s)."""
     value: float
-    """Its value."""
+    """Value of the lag or frequency."""
 
     def halfway_to(self, goal: "Conditions") -> "Conditions":
         """Geometric mean of the levels, arithmetic of lag or frequency."""
@@ -119,7 +119,7 @@ def positive(name: str, values: ArrayLike) -> Real:
 def levels(
     forces_n: ArrayLike | None, voltages_v: ArrayLike | None, amplitudes_m: ArrayLike | None
 ) -> tuple[Literal["force", "voltage", "response"], Real]:
-    """Which of the three is given, and its values."""
+    """The one of the three quantities that is given, and its values."""
     if forces_n is not None and voltages_v is None and amplitudes_m is None:
         return "force", positive("forces_n", forces_n)
     if voltages_v is not None and forces_n is None and amplitudes_m is None:
@@ -141,7 +141,7 @@ def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Real:
 
 
 def checked_harmonics(harmonics: int, samples: int) -> tuple[int, int]:
-    """Highest harmonic and samples per period, which must resolve it and the products of the sites."""
+    """Highest harmonic and samples per period; the samples must resolve it and the products of the sites."""
     for name, value in (("harmonics", harmonics), ("samples", samples)):
         if not isinstance(value, int | np.integer):
             raise ValueError(f"{name} = {value!r}: allowed is a whole number")

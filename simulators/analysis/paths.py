@@ -26,10 +26,11 @@ _LARGEST_LEVEL_RATIO = 4.0
 
 
 def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solution:
-    """The vibration at ``goal`` that a level raised from zero leads to; its lag or frequency is held meanwhile.
+    """The vibration at ``goal`` that is reached from rest as the level rises at constant lag or frequency.
 
-    It starts at ``omega_rad_s``: the frequency of the goal, or that of resonance, from which the lag is then turned. A
-    response is raised at resonance and turned after: away from it takes more force, and there are more vibrations.
+    It starts at ``omega_rad_s``: the frequency of the goal, or that of resonance, from which the lag is then turned. With a
+    held response the level rises at resonance and the lag is turned afterwards, because away from resonance the response takes
+    more force and more vibrations exist.
     """
     low = replace(goal, level=_NEARLY_LINEAR * goal.level)
     if goal.held == "response" and goal.at == "lag":
@@ -41,7 +42,7 @@ def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solutio
 
 
 def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -> Solution:
-    """The vibration at ``goal`` on the branch of ``here``; `NotConvergedError` where the branch does not reach it."""
+    """The vibration at ``goal`` on the branch of ``here``; raises `NotConvergedError` if the branch does not reach it."""
     now = here.conditions
     if _far(now, goal):
         return follow(balance, follow(balance, here, now.halfway_to(goal)), goal)
@@ -58,7 +59,7 @@ def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -
 
 
 def _far(now: Conditions, goal: Conditions) -> bool:
-    """Whether a step is to be halved before it is tried."""
+    """Whether a step is too large to be tried as a whole."""
     ratio = abs(math.log(goal.level / now.level))
     return ratio > math.log(_LARGEST_LEVEL_RATIO) or (
         goal.at == "lag" and abs(goal.value - now.value) > _LARGEST_LAG_STEP

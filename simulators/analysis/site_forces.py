@@ -1,6 +1,6 @@
 """Forces of all nonlinear sites under a periodic motion: alternating frequency-time (Cameron & Griffin 1989).
 
-Here are the Fourier series that this takes, and the hysteresis loops of friction joints that it gives.
+The file also holds the Fourier series that this method needs and the hysteresis loops of friction joints that it gives.
 """
 
 from functools import cached_property
@@ -65,7 +65,7 @@ class Series:
 
 
 class SiteWaves(NamedTuple):
-    """Forces of the sites over one period, and how they change with the coefficients of the motion."""
+    """Forces of the sites over one period, and their derivatives by the coefficients of the motion."""
 
     forces: Real
     """Forces on the structure [n_site, N], minus the linear parts that the linear plant holds."""

@@ -159,7 +159,7 @@ def _corner(exciter: Exciter) -> float:
 
 @contextmanager
 def computable(parts: str) -> Iterator[None]:
-    """Turn what arithmetic cannot do, and numbers that are none, into a `ValueError` that names the parts they come from."""
+    """Turn arithmetic errors and non-finite numbers into a `ValueError` that names the parts they come from."""
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             yield
@@ -171,7 +171,7 @@ def computable(parts: str) -> Iterator[None]:
 
 
 def check_elements(elements: Sequence[Element], plant: LinearPlant) -> None:
-    """`ValueError` where an element's coordinate does not move, or a stop stands behind a magnet."""
+    """Raise `ValueError` if an element's coordinate does not move or a stop stands behind a magnet."""
     for i, element in enumerate(elements):
         if element.at == element.to:
             raise ValueError(f"elements[{i}].to = {element.to!r}: allowed is another point than at")
@@ -194,7 +194,7 @@ def _check_stop(i: int, stop: Clearance, magnet: Magnet) -> None:
 
 
 def check_plant(plant: LinearPlant) -> None:
-    """`ValueError` where the linear plant does not return to rest."""
+    """Raise `ValueError` if the linear plant does not return to rest."""
     stiffness = np.linalg.eigvalsh(plant.modal_stiffness)
     if stiffness[0] < -1e-9 * max(abs(stiffness)):
         message = "allowed is no more than the structure has there"
@@ -211,10 +211,10 @@ def check_plant(plant: LinearPlant) -> None:
 
 
 def check_step(elements: Sequence[Element], plant: LinearPlant, rate_hz: float, substeps: int) -> None:
-    """`ValueError` where the slope of an element is too steep for the integration step; says which step would do.
+    """Raise `ValueError`, with a sufficient step, if the slope of an element is too steep for the integration step.
 
-    Only the linear plant is integrated exactly. What an element adds is followed by a second-order predictor-corrector, whose
-    step h must resolve ``w_e^2 = k_e sum_i row_i^2``, or ``c_e sum_i row_i^2`` for an element of velocity.
+    Only the linear plant is integrated exactly. The force of an element takes a second-order predictor-corrector, whose step h
+    must resolve ``w_e^2 = k_e sum_i row_i^2``, or ``c_e sum_i row_i^2`` for an element of velocity.
     """
     for i, element in enumerate(elements):
         mobility = float(plant.site_rows[i] @ plant.site_rows[i])

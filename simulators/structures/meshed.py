@@ -139,7 +139,7 @@ class MeshedBeam(Part):
 
 
 def check_rising(frequencies_hz: Sequence[float]) -> None:
-    """`ValueError` where a frequency is below the one before it: shapes and damping would go with another mode."""
+    """Raise `ValueError` if frequencies do not rise: shapes and damping would belong to another mode."""
     for index, (before_hz, next_hz) in enumerate(pairwise(frequencies_hz), start=1):
         if next_hz < before_hz:
             raise ValueError(f"frequency_hz[{index}] = {next_hz:g}: allowed is from {before_hz:g} on, lowest first")

@@ -149,7 +149,7 @@ def pnlss_steady_state(
     near: SteadyStates | None = None,
     largest_range_use: float = 3.0,
 ) -> SteadyStates:
-    """The periodic vibration at one force and frequency: that which rest leads to as the force rises, or one ``near`` another.
+    """The periodic vibration at one force and frequency: reached from rest as the force rises, or ``near`` another one.
 
     Parameters are those of `pnlss_response`; of ``near`` the first point is the start of Newton's method, which may leave the
     range. Raises `IdentificationError` if it finds none.

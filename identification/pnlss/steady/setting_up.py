@@ -36,7 +36,7 @@ _BAND = (0.85, 1.15)
 
 
 def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> tuple[int, NDArray[np.float64]]:
-    """The row of the input that is driven, and float[n_inputs], the constants that all others have.
+    """Row of the driven input, and the constant values of all other inputs, float[n_inputs].
 
     Driven is the one force, or the one input that is not held. Raises `IdentificationError` where there is none such, or an
     input beside it has no value.
@@ -72,7 +72,7 @@ def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> t
 def drive_of(
     model: PnlssModel, level: float, held: Held, exciter: Exciter | None, coefficients: int, row: int
 ) -> Drive:
-    """The drive at input ``row``; raises `IdentificationError` where model, exciter and what is held do not go together."""
+    """The drive at input ``row``; raises `IdentificationError` if model, exciter and held quantity do not match."""
     if held not in get_args(Held):
         raise IdentificationError(f"force: is '{held}', allowed are {', '.join(get_args(Held))}")
     amplitude = positive("force_n", level, "V" if held == "voltage" else "N")
