@@ -1,6 +1,6 @@
 """What a kind of campaign declares: all that the rest of the program asks of it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -24,6 +24,9 @@ class Campaign:
     """``module:function`` that draws a recording on an empty page, ``(page, recording)``; loaded when a figure is wanted."""
     in_one_go: bool = False
     """Whether points are measured together: ``(bench, plan, targets, rows, passages, ended) -> points``."""
+    watch: Callable[[Any, Sequence[Mapping[str, Any]], dict[str, Any]], tuple[dict[str, Any], str]] | None = None
+    """``(plan, points so far, point) -> (point, why to stop)``: what a new point tells beside those before it. The run is
+    brought down where the text is not empty."""
     identity: tuple[str, ...] = ()
     """Keys of a plan that make all its points other vibrations where they are changed."""
     fixed: tuple[str, ...] = ()

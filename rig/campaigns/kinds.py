@@ -2,6 +2,7 @@
 
 from rig.campaigns.backbone.campaign import BACKBONE
 from rig.campaigns.continuous_backbone.campaign import CONTINUOUS_BACKBONE
+from rig.campaigns.dwell.campaign import DWELL
 from rig.campaigns.multisine.campaign import MULTISINE
 from rig.campaigns.response_controlled.campaign import RESPONSE_CONTROLLED
 from rig.campaigns.stepped_phase.campaign import STEPPED_PHASE
@@ -20,6 +21,7 @@ KINDS = {
         STEPPED_SINE,
         SWEEP,
         MULTISINE,
+        DWELL,
     )
 }
 """Every kind by its name."""
