@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 TANH = 0
-"""Codes of the functions g in features ``g(w . v + b) - g(b)``; `identification.pnlss.features.FUNCTIONS` declares them."""
+"""Code of a function g in features ``g(w . v + b) - g(b)``; `identification.pnlss.features.FUNCTIONS` declares all of them."""
 
 
 class Table(NamedTuple):
@@ -82,13 +82,13 @@ def within_limits(table: Table, v: np.ndarray) -> bool:
 
 @inner_kernel
 def function_value(code: int, s: float) -> float:
-    """``g(s)`` of the function g with this code; a further function is a branch ahead of the last one."""
+    """``g(s)`` of the function g with this code. A further function is a branch ``if code == ...`` ahead of tanh."""
     return float(np.tanh(s))
 
 
 @inner_kernel
 def function_slope(code: int, s: float, value: float) -> float:
-    """``g'(s)``, given ``value = g(s)``."""
+    """``g'(s)``, given ``value = g(s)``; branches as in `function_value`."""
     return 1.0 - value**2
 
 
@@ -116,7 +116,7 @@ def feature_values(table: Table, v: np.ndarray, phi: np.ndarray) -> None:
         phi[i] = product
     for i in range(table.weights.shape[0]):
         total = table.weights[i, v.size]
-        for j in range(v.size):  # `weighted_sum`, as a call 5 % of a simulation
+        for j in range(v.size):  # not `weighted_sum`: the call costs 5 % of a simulation
             total += table.weights[i, j] * v[j]
         phi[count + i] = function_value(table.codes[i], total) - table.at_rest[i]
 
