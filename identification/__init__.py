@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from identification.mapping.response_matrix import ResponseMatrixMapping, map_response_matrix
     from identification.mapping.stepped_sine import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
-    from identification.multisine.best_linear_approximation import best_linear_approximation
-    from identification.multisine.coherences import coherence
+    from identification.multisine.best_linear_approximation import best_linear_approximation, coherence
     from identification.multisine.design import MultisineDesign
     from identification.multisine.distortion import DistortionLevels, distortion_levels
     from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
@@ -268,7 +267,7 @@ _MODULE_OF = {
     "VoltageSweep": "prediction.sweep_inputs",
     "best_linear_approximation": "multisine.best_linear_approximation",
     "best_linear_responses": "pnlss.best_linear",
-    "coherence": "multisine.coherences",
+    "coherence": "multisine.best_linear_approximation",
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
     "compare_sweep": "prediction.sweep_prediction",

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from identification.errors import IdentificationError
+from identification.pnlss.best_linear import check_periodic
 from identification.pnlss.experiment import Experiment, same_channels, same_data
 from identification.pnlss.fitting.normal_equations import BLOCK
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.periods import check_periodic
 
 __all__ = [
     "available_bytes",
