@@ -26,7 +26,7 @@ Float = NDArray[np.float64]
 _DIFFERENCE = 0.3
 """Largest RMS difference of two periods relative to the signal; a larger one is not noise, or noise that hides the signal."""
 _SETTLED_PART = 32
-"""Before the counted part, 1/32 of a period must equal the same part one period later, whatever the transient."""
+"""Just before the counted part, 1/32 of a period is compared with the same part one period later."""
 _EXCITED = 1e-2
 """A line counts as excited above this share of the strongest line of the same input."""
 
@@ -57,8 +57,8 @@ def periodic_ones(experiments: Sequence[Experiment]) -> tuple[list[Experiment], 
 def check_periodic(experiment: Experiment, name: str) -> None:
     """Raise `IdentificationError` unless the counted periods repeat each other, and what is just before them repeats too.
 
-    Two neighbouring periods may differ by 0.3 of the signal (RMS, mean removed) in every channel. Of what is put ahead, as much
-    as 1/32 of a period is held against the same a period later: there the transient must have decayed.
+    Two neighbouring periods may differ by 0.3 of the signal (RMS, mean removed) in every channel. The last
+    1/32 of a period before the counted part must be as close to the same part one period later: the transient has decayed.
     """
     n, begin = experiment.period_samples, experiment.counted_from
     channels = (*experiment.input_channels, *experiment.output_channels)
