@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["draw"]
 
+NEAR = 0.2  # of a limit, from which on it is drawn: further away it would hide the course
+
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw the accepted means over the cycles; limits are dashed, means that were not accepted are marked below."""
@@ -49,5 +51,5 @@ def _limits(axis: "Axes", values: np.ndarray, plan: dict[str, Any], watched: str
     sign = -1.0 if np.nanmean(values) < values[0] else 1.0
     for name, colour in (("alarm", REJECTED), ("abort", SECOND)):
         limit = plan[name].get(watched)
-        if limit is not None:
+        if limit is not None and np.nanmax(np.abs(values / values[0] - 1.0)) > NEAR * limit:
             axis.axhline(values[0] * (1.0 + sign * limit), color=colour, lw=0.9, ls="--", label=f"{name}.{watched}")
