@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simulators.kernels import run_observed
 from simulators.layout import Flag, RigArrays, RigState
-from simulators.plant.discretise import pad
+from simulators.plant.compilation import pad
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["Simulation", "TimeSeries"]

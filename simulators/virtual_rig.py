@@ -12,8 +12,7 @@ from simulators.exciter import Exciter, Stinger
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
-from simulators.plant.assembly import LinearPlant, assemble
-from simulators.plant.checks import check_elements, check_plant, check_step, computable
+from simulators.plant.assembly import LinearPlant, assemble, check_elements, check_plant, check_step, computable
 from simulators.plant.compilation import at_rest, rediscretised, rig_arrays
 from simulators.scatter import Deviation, Scatter, deviated
 from simulators.sensing.filters import channel_delays, filter_delay

@@ -14,7 +14,7 @@ from simulators.scatter import Deviation, Scatter
 from simulators.sensing.parts import Converter, Sensor
 from simulators.sites.elements import Clearance, Cubic, Magnet, User
 from simulators.sites.friction import IwanSite, JenkinsSite
-from simulators.structures.attachments import LumpedMass, Support
+from simulators.structures.meshed import LumpedMass, Support
 from simulators.structures.structure import BeamStructure, LapJointedBeam, ModalStructure
 from simulators.virtual_rig import VirtualRig
 from simulators.wear import Wear

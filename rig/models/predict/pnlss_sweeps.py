@@ -14,7 +14,7 @@ from identification import (
     compare_sweep,
 )
 from identification.channels import find_role
-from identification.prediction.simulated_runs import estimated_initial_state
+from identification.pnlss.errors import estimated_initial_state
 from rig.campaigns.evaluation.gaps import bridged, lost_rows
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of
