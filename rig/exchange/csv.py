@@ -14,8 +14,8 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.exchange.mat import ImportFailed
-from rig.measurements.contents import Contents
 from rig.system.text_files import read_text
+from rig.text.contents import Contents
 
 __all__ = ["read_csv", "table_of_ours", "write_csv"]
 

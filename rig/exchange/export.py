@@ -9,8 +9,8 @@ from rig.exchange.kinds import taken_apart
 from rig.exchange.mat import write_mat
 from rig.exchange.sources import read_objects
 from rig.exchange.uff.writing import write_uff
-from rig.measurements.contents import Contents
 from rig.system.whole_file import whole_file
+from rig.text.contents import Contents
 
 __all__ = ["export_file", "write_contents"]
 

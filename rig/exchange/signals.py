@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import Channel, Transient
 from rig.exchange.time_data import TimeData
-from rig.measurements.contents import Contents
+from rig.text.contents import Contents
 
 __all__ = ["time_data_from", "time_data_parts", "transient_from", "transient_parts"]
 
