@@ -5,11 +5,12 @@ from typing import Protocol
 import numpy as np
 
 from controller.amplitude import AMPLITUDE, AMPLITUDE_STATE, AmplitudeLaw, AmplitudeSettings, amplitude_state
-from controller.detector import DETECTOR, DETECTOR_STATE, VIBRATION, DetectorSettings
+from controller.detector import DETECTOR, DETECTOR_STATE, VIBRATION, DetectorSettings, phase_error
 from controller.frequency import FREQUENCY, FREQUENCY_STATE
 from controller.lock import LOCK, THRESHOLDS, LockRule
 from controller.period import PERIOD
-from controller.rest import REST, REST_STATE
+from controller.rest import REST, REST_STATE, see_rest, take_as_measured
+from vibrolock.compiled import Record, kernel
 
 __all__ = ["CONTROL", "LAW", "Law", "OpenLoop", "control_state"]
 
@@ -83,3 +84,24 @@ class OpenLoop(DetectorSettings, AmplitudeSettings):
         out["amplitude"] = self.build_amplitude(amplitude_law, largest_v, 1.0 / sample_rate_hz, gain, False)
         out["lock"] = self.lock.build()
         return out
+
+
+@kernel
+def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_skew: float, by_loop: bool) -> bool:
+    """Behind the detector, once a sample: whether there is a phase to be read, its error, and the force at rest.
+
+    ``wanted_lag`` and ``lag_of_skew`` (by which the force's channel is later) in rad; ``by_loop``: the frequency law gives the
+    frequency. Returns whether the loop is closed: it gives the frequency, and force and motion are present.
+    """
+    vibration = control.vibration
+    present = vibration.force_n >= law.lock.smallest_force_n and vibration.drive_m_s2 >= law.lock.smallest_response
+    closed = bool(present and by_loop)
+    vibration.present = 1 if present else 0
+    vibration.error_rad = 0.0
+    if closed:
+        vibration.error_rad = phase_error(law.detector, control.detector, vibration, wanted_lag, lag_of_skew)
+    if by_loop:
+        see_rest(law.rest, control.rest, vibration, control.frequency.omega, wanted_lag, lag_of_skew)
+    else:
+        take_as_measured(control.rest, vibration)
+    return closed

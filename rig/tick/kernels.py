@@ -9,11 +9,11 @@ import math
 import numpy as np
 
 from controller.amplitude import FORCE_RMS, VOLTAGE, demand, held_size, see_output, take_over
-from controller.detector import ADAPTIVE, detect, force_rms, phase_error
+from controller.detector import ADAPTIVE, detect, force_rms
 from controller.frequency import follow
+from controller.law import measure_phase
 from controller.period import add_sample
 from controller.primitives import TWO_PI, advance_phase, size
-from controller.rest import see_rest, take_as_measured
 from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
 from rig.tick.measure import pass_over, take_in
@@ -66,23 +66,6 @@ def judge_by_exciter(t: TickArrays, seen: Record) -> None:
     if contradicts_exciter(t.expected[0], following, sent, vibration.force, vibration.drive, gain, loop.dt_s):
         ratio = size(following.needed) / max(size(following.late_sent), SMALLEST_V)
         shut_down(guard, PLANT_CONTRADICTED, -1, ratio, loop.sample, False)
-
-
-@kernel
-def measure_phase(t: TickArrays) -> bool:
-    """Phase error and force at rest; returns whether the loop is closed: it drives, and force and motion are present."""
-    law, control, loop, lag = t.law[0], t.control[0], t.loop[0], t.progress[0].lag
-    vibration, by_loop = control.vibration, loop.drive == LOOP_DRIVE
-    there = vibration.force_n >= law.lock.smallest_force_n and vibration.drive_m_s2 >= law.lock.smallest_response
-    vibration.present = 1 if there else 0
-    closed = bool(there and by_loop)
-    lag_of_skew = control.frequency.omega * loop.skew_samples * loop.dt_s
-    vibration.error_rad = phase_error(law.detector, control.detector, vibration, lag, lag_of_skew) if closed else 0.0
-    if by_loop:
-        see_rest(law.rest, control.rest, vibration, control.frequency.omega, lag, lag_of_skew)
-    else:
-        take_as_measured(control.rest, vibration)
-    return closed
 
 
 @kernel
@@ -209,7 +192,8 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         measure_rms(t, amplitude.law)
         if t.expected[0].known == 1:
             judge_by_exciter(t, seen)
-    closed = measure_phase(t)
+    lag_of_skew = frequency.omega * loop.skew_samples * loop.dt_s
+    closed = measure_phase(law, control, progress.lag, lag_of_skew, loop.drive == LOOP_DRIVE)
 
     if theta_in < loop.theta_in:
         loop.cycles += 1
