@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rig
-from controller.layout import LOCK, LockState
+from controller.lock import LOCK, LockState
 from rig.campaigns.plans import load_plan
 from rig.tick.sequencer.kernels import CLAMPED_PERIODS, FAR_PERIODS, start_verdict
 from rig.tick.sequencer.layout import SETTLING, Outcome

@@ -25,7 +25,7 @@ STOP, TAKEN, PUBLISHED = range(3)
 CONTROL_WORDS = 8
 TIMES = ("wake_up", "execution", "response")
 """What is counted of every block: lateness of its beginning, time it took, and both."""
-CONSTANTS = 8  # of the fields of `TickArrays`, the first are constants of the run
+CONSTANTS = 7  # of the fields of `TickArrays`, the first are constants of the run
 SNAPSHOT = tuple(name for name in TickArrays._fields[CONSTANTS:] if name != "history")
 HEAD = ("rows", "samples", "overruns", "busy_ns", "wall_ns")
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from controller.layout import LOCKED, LOST, SEARCHING, VOLTAGE
-from controller.lock.kernels import reacquire
+from controller.amplitude import VOLTAGE
+from controller.lock import LOCKED, LOST, SEARCHING, reacquire
 from rig.tick.safety.kernels import shut_down
 from rig.tick.safety.layout import ARMED, EndReason
 from rig.tick.sequencer.layout import (
@@ -59,32 +59,22 @@ def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
 
 @kernel
 def judge_period(
-    settling: Record,
-    rule: Record,
-    locked: bool,
-    error: float,
-    response: float,
-    force: float,
-    wanted: float,
-    controlled: float,
-    saturated: bool,
-    clamped: bool,
-    watch_force: bool,
+    settling: Record, rule: Record, period: Record, wanted: float, locked: bool, watch_force: bool
 ) -> None:
-    """Take in one period's means and apply the settle rule.
+    """Take in the means of a ``period`` (of `controller.period.PERIOD`) and apply the settle rule.
 
     Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the
     averaged response amplitude within ``amplitude`` (relative) of what it was that many periods before, for
-    ``settled_periods`` in a row. Where a loop holds the level, what it controls must on average be within ``amplitude`` of
+    ``settled_periods`` in a row. Where a loop holds the level, what it holds must on average be within ``amplitude`` of
     what is ``wanted`` (0: there is no loop). With ``watch_force`` (open loop, held response) the force must keep still too.
     """
     n = rule.average_periods
     slot = settling.count % (2 * LONGEST_AVERAGE)
-    settling.errors[slot] = error
-    settling.responses[slot] = response
-    settling.forces[slot] = force
-    settling.controlled[slot] = controlled
-    settling.clamped_in_row = settling.clamped_in_row + 1 if clamped else 0
+    settling.errors[slot] = period.error_rad
+    settling.responses[slot] = period.drive_m_s2
+    settling.forces[slot] = period.force_n
+    settling.controlled[slot] = period.held
+    settling.clamped_in_row = settling.clamped_in_row + 1 if period.clamped == 1 else 0
     last = settling.count
     settling.count += 1
     if settling.count < 2 * n:
@@ -105,9 +95,9 @@ def judge_period(
         off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
     settling.good_periods = settling.good_periods + 1 if locked and off <= 1.0 else 0
     settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
-    unreached = saturated and abs(drift) > 2.0 * rule.amplitude
+    unreached = period.saturated == 1 and abs(drift) > 2.0 * rule.amplitude
     settling.saturated_periods = settling.saturated_periods + 1 if unreached else 0
-    settling.clamped_periods = settling.clamped_periods + 1 if clamped else 0
+    settling.clamped_periods = settling.clamped_periods + 1 if period.clamped == 1 else 0
 
 
 @kernel
@@ -173,14 +163,12 @@ def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
 
 
 @kernel
-def close_segment(
-    progress: Record, outcomes: np.ndarray, settling: Record, outcome: int, cycle: float, sample: int
-) -> None:
+def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outcome: int) -> None:
     """Write down how the present segment ended and move to the next."""
     entry = outcomes[progress.segment]
     entry.outcome = outcome
-    entry.end_sample = sample
-    entry.periods = cycle - progress.start_cycle
+    entry.end_sample = progress.sample
+    entry.periods = progress.cycle - progress.start_cycle
     entry.mean_error_rad = settling.mean_error_rad
     entry.drift = settling.drift
     progress.segment += 1
@@ -188,14 +176,14 @@ def close_segment(
 
 
 @kernel
-def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, sample: int) -> None:
+def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray) -> None:
     """Pass over what is left of a failed point."""
     point = segments[progress.segment - 1].point
     while progress.segment < progress.segments and segments[progress.segment].point == point:
         entry = outcomes[progress.segment]
         entry.outcome = SKIPPED
-        entry.first_sample = sample
-        entry.end_sample = sample
+        entry.first_sample = progress.sample
+        entry.end_sample = progress.sample
         progress.segment += 1
 
 
@@ -214,25 +202,23 @@ def give_up(
     lock: Record,
     guard: Record,
     failure: int,
-    cycle: float,
-    sample: int,
 ) -> None:
     """The present segment has failed: on to the next point, or end the run, as its plan wants it.
 
     A loop that never had a lock and is as far off as one that feeds back the wrong way ends it, before the level rises.
     """
     segment = segments[progress.segment]
-    elapsed = cycle - progress.start_cycle
-    close_segment(progress, outcomes, settling, failure, cycle, sample)
+    elapsed = progress.cycle - progress.start_cycle
+    close_segment(progress, outcomes, settling, failure)
     far_off = failure == OUTSIDE_WINDOW or was_always_far(lock, elapsed)
     if segment.kind == START or (progress.unlocked == 1 and segment.drive == LOOP_DRIVE and far_off):
         progress.finished = 1
-        shut_down(guard, NO_LOCK_IN_WINDOW if failure == OUTSIDE_WINDOW else NO_LOCK, -1, 0.0, sample, False)
+        shut_down(guard, NO_LOCK_IN_WINDOW if failure == OUTSIDE_WINDOW else NO_LOCK, -1, 0.0, progress.sample, False)
     elif (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
         progress.finished = 1
-        shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, sample, False)
+        shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, progress.sample, False)
     else:
-        skip_point(progress, segments, outcomes, sample)
+        skip_point(progress, segments, outcomes)
 
 
 @kernel
@@ -274,28 +260,26 @@ def advance(
     rule: Record,
     lock: Record,
     guard: Record,
-    cycle: float,
-    sample: int,
-    unreached: bool,
 ) -> None:
     """One sample of the sequencer: sets level, lag and frequency, moves on when a segment is over, ends the run after the last.
 
-    ``cycle`` is the number of oscillator periods seen by the inputs so far, with its fraction. ``unreached``: the output stands
-    at its limit and the level of the moment is not reached; a ramp that goes up waits then.
+    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``; where a level is unreached, a ramp that goes up
+    waits.
     """
+    cycle, sample = progress.cycle, progress.sample
     if progress.finished:
         return
     if guard.stop_requested == 1 and guard.mode == ARMED:
-        shut_down(guard, STOP_REQUESTED, -1, 0.0, sample, False)
+        shut_down(guard, STOP_REQUESTED, -1, 0.0, progress.sample, False)
     if guard.mode != ARMED:
         guard.lock = lock.state
         if progress.entered:
-            close_segment(progress, outcomes, settling, INTERRUPTED, cycle, sample)
+            close_segment(progress, outcomes, settling, INTERRUPTED)
         progress.finished = 1
         return
     if progress.segment >= progress.segments:
         progress.finished = 1
-        shut_down(guard, COMPLETED, -1, 0.0, sample, False)
+        shut_down(guard, COMPLETED, -1, 0.0, progress.sample, False)
         return
     segment = segments[progress.segment]
     if not progress.entered:
@@ -313,7 +297,7 @@ def advance(
             reacquire(lock)
         if segment.kind == SETTLE:
             forget_periods(settling)
-    if unreached and is_ramp(segment.kind) and segment.level > progress.level:
+    if progress.unreached == 1 and is_ramp(segment.kind) and segment.level > progress.level:
         progress.frozen_cycles += cycle - progress.last_cycle
     progress.last_cycle = cycle
     if lock.state == LOCKED:
@@ -326,36 +310,36 @@ def advance(
         progress.lag = between(progress.start_lag, segment.lag_rad, rise)
         progress.omega = between(progress.start_omega, segment.omega, rise)
         if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
-            close_segment(progress, outcomes, settling, DONE, cycle, sample)
+            close_segment(progress, outcomes, settling, DONE)
         elif progress.unlocked == 1 and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE:
-            give_up(progress, segments, outcomes, settling, lock, guard, OUTSIDE_WINDOW, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, OUTSIDE_WINDOW)
         elif progress.frozen_cycles >= SATURATED_PERIODS:
-            give_up(progress, segments, outcomes, settling, lock, guard, UNREACHABLE, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, UNREACHABLE)
         return
     progress.level = segment.level
     if segment.kind == SWEEP:
         progress.omega = swept(segment, progress.start_omega, sample - progress.start_sample)
         if progress.omega == segment.omega:
-            close_segment(progress, outcomes, settling, DONE, cycle, sample)
+            close_segment(progress, outcomes, settling, DONE)
         return
     progress.omega = segment.omega
     progress.lag = segment.lag_rad
     if segment.kind == SETTLE and settling.good_periods >= rule.settled_periods:
-        close_segment(progress, outcomes, settling, DONE, cycle, sample)
+        close_segment(progress, outcomes, settling, DONE)
         return
     if segment.kind == SETTLE or segment.kind == RECORD:
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
         if failure != RUNNING:
-            give_up(progress, segments, outcomes, settling, lock, guard, failure, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, failure)
             return
     if segment.kind == START and elapsed >= segment.periods:
         verdict = start_verdict(settling, lock, elapsed)
         if verdict == DONE:
-            close_segment(progress, outcomes, settling, DONE, cycle, sample)
+            close_segment(progress, outcomes, settling, DONE)
         elif verdict != RUNNING:
-            give_up(progress, segments, outcomes, settling, lock, guard, verdict, cycle, sample)
+            give_up(progress, segments, outcomes, settling, lock, guard, verdict)
         return
     over = sample - progress.start_sample >= segment.samples if segment.samples > 0 else elapsed >= segment.periods
     if segment.kind != SETTLE and over and not (segment.kind == RECORD and is_slipping(lock)):
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
-        close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE, cycle, sample)
+        close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE)

@@ -136,6 +136,9 @@ PROGRESS = np.dtype(
     [
         ("segment", "i8"),
         ("segments", "i8"),
+        ("cycle", "f8"),
+        ("sample", "i8"),
+        ("unreached", "i8"),
         ("start_cycle", "f8"),
         ("last_cycle", "f8"),
         ("frozen_cycles", "f8"),
@@ -151,5 +154,6 @@ PROGRESS = np.dtype(
         ("unlocked", "i8"),
     ]
 )
-"""Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow,
-``unlocked``: no lock was ever gained."""
+"""Where in the plan the run stands (one record). ``cycle``: oscillator periods that the inputs have seen so far, with the
+fraction; ``unreached``: the output stands at its limit and the level of the moment is not reached; ``frozen_cycles`` of a ramp
+that its level could not follow; ``unlocked``: no lock was ever gained."""

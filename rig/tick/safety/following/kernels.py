@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from controller.kernels import TWO_PI, size
-from controller.layout import RESPONSE
+from controller.amplitude import RESPONSE
+from controller.primitives import TWO_PI, size
 from vibrolock.compiled import Record, kernel
 
 LARGEST_RISE = 2.0  # of the output above what last sufficed, and so also within one period

@@ -1,4 +1,4 @@
-"""Compiled demodulation: from samples to complex amplitudes, and from these to a lag."""
+"""Compiled adaptive filter: several harmonics and the mean of a signal at once (least mean squares; Hippold et al. 2024)."""
 
 import math
 
@@ -6,17 +6,8 @@ import numpy as np
 
 from vibrolock.compiled import kernel
 
-
-@kernel
-def demodulate(estimate: complex, value: float, cos_theta: float, sin_theta: float, gain: float) -> complex:
-    """Two-phase (synchronous) demodulation: low-passed ``2 y exp(-i theta)``, which settles on Y_1.
-
-    Passes a ripple at 2 Omega of relative size a/(2 Omega), and harmonics h of y likewise at (h +- 1) Omega.
-    """
-    return complex(
-        estimate.real + gain * (2.0 * value * cos_theta - estimate.real),
-        estimate.imag + gain * (-2.0 * value * sin_theta - estimate.imag),
-    )
+MOST_HARMONICS = 12
+"""Highest harmonic that an adaptive filter may follow."""
 
 
 @kernel
@@ -30,7 +21,7 @@ def turn_phasors(phasors: np.ndarray, cos_theta: float, sin_theta: float) -> Non
 
 @kernel
 def adapt(coefficients: np.ndarray, phasors: np.ndarray, value: float, gain: float) -> None:
-    """Adaptive filter (least mean squares; Hippold et al. 2024): one step towards all harmonics and the mean at once.
+    """One step of the filter towards all harmonics and the mean of a signal.
 
     ``y_hat = Re sum C_h exp(i h theta)``, ``C_h <- C_h + 2 gain exp(-i h theta) (y - y_hat)``, the mean with half the step.
     On average every C_h follows its Y_h through the first-order low-pass of ``gain = 1 - exp(-w_LP dt)``; what the model
@@ -55,22 +46,3 @@ def root_mean_square(coefficients: np.ndarray) -> float:
         c = coefficients[order]
         total += c.real * c.real + c.imag * c.imag
     return math.sqrt(0.5 * total)
-
-
-@kernel
-def sign_product(force: float, acceleration: float) -> float:
-    """Sign detector: sign(force) sign(displacement-like signal), the acceleration's sign reversed standing for displacement.
-
-    For two sines its mean is ``(2/pi) e`` with the phase error e to phase resonance. Harmonics of either signal move
-    the zero crossings and bias it.
-    """
-    if force == 0.0 or acceleration == 0.0:
-        return 0.0
-    return -1.0 if (force > 0.0) == (acceleration > 0.0) else 1.0
-
-
-@kernel
-def phase_lag(force: complex, response: complex) -> float:
-    """Phase lag ``arg F_1 - arg Y_1`` in rad, in [-pi, pi)."""
-    product = force * complex(response.real, -response.imag)
-    return math.atan2(product.imag, product.real)

@@ -1,4 +1,4 @@
-"""Primitives of the control law against closed forms and scipy."""
+"""Primitives, detectors and lock of the control law against closed forms and scipy."""
 
 import math
 
@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from controller.demodulation.kernels import demodulate, phase_lag, sign_product
-from controller.kernels import advance_phase, proportional_integral, track, wrap
-from controller.layout import LOCK, THRESHOLDS, LockState
-from controller.lock.kernels import next_lock_state
+from controller.detector import demodulate, phase_lag, sign_product
+from controller.lock import LOCK, THRESHOLDS, LockState, next_lock_state
+from controller.primitives import advance_phase, proportional_integral, track, wrap
 
 FS = 5000.0
 

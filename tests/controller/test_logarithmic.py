@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import signal
 from scipy.integrate import solve_ivp
 
-from controller.amplitude.kernels import LARGEST_ERROR, log_proportional_integral, log_ratio
+from controller.primitives import LARGEST_ERROR, log_proportional_integral, log_ratio
 
 LOWEST, HIGHEST = 1e-4, 5.0
 

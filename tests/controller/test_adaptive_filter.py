@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from controller.demodulation.kernels import adapt, root_mean_square, turn_phasors
-from controller.demodulation.settings import Demodulation
-from controller.layout import LAW, MOST_HARMONICS
+from controller.adaptive_filter import MOST_HARMONICS, adapt, root_mean_square, turn_phasors
+from controller.detector import DetectorSettings
 
 FS = 5000.0
 OMEGA = 2 * math.pi * 24.37
@@ -102,15 +101,11 @@ def test_the_filter_is_stable_up_to_the_bound_and_not_beyond(harmonics):
 @pytest.mark.parametrize("harmonics", [1, 5, MOST_HARMONICS])
 def test_settings_keep_half_way_off_the_bound_and_name_the_largest_bandwidth(harmonics):
     largest = -math.log1p(-1.0 / (2 * harmonics + 1)) * FS
-    law = np.zeros(1, LAW)
-    Demodulation(detector="adaptive", harmonics_followed=harmonics, low_pass_rad_s=0.999 * largest).fill_demodulation(
-        law, FS
-    )
-    assert law["demodulator_gain"][0] * (2 * harmonics + 1) == pytest.approx(0.999, rel=5e-3)
+    near = DetectorSettings(detector="adaptive", harmonics_followed=harmonics, low_pass_rad_s=0.999 * largest)
+    assert near.build_detector(FS)["gain"][0] * (2 * harmonics + 1) == pytest.approx(0.999, rel=5e-3)
+    beyond = near.model_copy(update={"low_pass_rad_s": 1.001 * largest})
     with pytest.raises(ValueError, match=r"low_pass_rad_s = .*allows up to"):
-        Demodulation(
-            detector="adaptive", harmonics_followed=harmonics, low_pass_rad_s=1.001 * largest
-        ).fill_demodulation(law, FS)
+        beyond.build_detector(FS)
 
 
 def test_the_root_mean_square_is_that_of_the_signal_without_its_mean():
