@@ -11,9 +11,10 @@ import rig
 from rig.arming.arming import ArmingRequest, asked_once, unguarded_text
 from rig.arming.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.arming.run_facts import About
+from rig.arming.run_options import RunOptions
 from rig.bench import Bench
 from rig.check.run import check
-from rig.cli.arming import ask
+from rig.cli.run_options import ask
 from rig.daq import DAQ, Capabilities
 from rig.errors import ConfigurationError, DaqDisconnected, DaqRefused, NotArmed, RecordingError
 from rig.loop.session import LocalSession
@@ -165,7 +166,7 @@ def test_a_check_needs_arming_and_is_remembered_with_what_failed(tmp_path, monke
     with pytest.raises(NotArmed):
         check(bench(), tmp_path / "check.h5")
     asked = []
-    check(bench(), tmp_path / "check.h5", arm=lambda request: asked.append(request.what) or True)
+    check(bench(), tmp_path / "check.h5", RunOptions(arm=lambda request: asked.append(request.what) or True))
     assert asked == ["check"]
     memory = memory_of(bench())
     assert memory.check.failed == ("polarity acc_magnet",)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rig
-from rig.campaigns.running.execution import Silent
+from rig.arming.run_options import Silent
 from rig.cli import main
 from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path

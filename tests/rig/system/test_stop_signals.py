@@ -7,7 +7,7 @@ import pytest
 import typer
 
 import rig
-from rig.campaigns.running.execution import Silent
+from rig.arming.run_options import Silent
 from rig.cli import _carry
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
