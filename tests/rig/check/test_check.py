@@ -27,7 +27,7 @@ def sound(tmp_path_factory):
 
 def checked(tmp_path, monkeypatch, rewiring, name="magnet-beam", **options):
     rewire(monkeypatch, rewiring)
-    return check(bench_with(BLOCK, name), tmp_path / "check.h5", RunOptions(seed=2), **options)
+    return check(bench_with(BLOCK, name), tmp_path / "check.h5", RunOptions(seed=2, overwrite=True), **options)
 
 
 def finding(found, name, channel) -> Finding:
@@ -116,7 +116,7 @@ def test_against_a_reference_gains_are_compared_and_turned_drives_seen(tmp_path,
     def turned(volts, bench):
         volts *= -1.2
 
-    found = checked(tmp_path, monkeypatch, turned, reference=sound.recording, overwrite=True)
+    found = checked(tmp_path, monkeypatch, turned, reference=sound.recording)
     assert {f.channel for f in found.findings if f.name == "polarity" and f.verdict == "fail"} == {
         channel.name for channel in found.bench.channels
     }
