@@ -132,4 +132,6 @@ def neglected(found: PeriodicResponses) -> str:
     highest = found.force_harmonics_n.shape[1] - 1
     percent = 100.0 * float(np.max(found.neglected_share))
     text = f"up to {percent:.2g} %" if percent >= _WORTH_A_NUMBER else f"less than {_WORTH_A_NUMBER:g} %"
-    return f"force above harmonic {highest} is left out: {text} of the fundamental (--harmonics)"
+    return (
+        f"force above harmonic {highest} is left out: {text} of the fundamental; balance more harmonics to include it"
+    )

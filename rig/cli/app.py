@@ -14,6 +14,7 @@ from rig.cli.check import check_
 from rig.cli.conformance import conformance
 from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
+from rig.cli.flags import with_flags
 from rig.cli.identify import identify, predict
 from rig.cli.list import list_
 from rig.cli.options import Json, Output, say_what_is_imported, show_file
@@ -234,7 +235,7 @@ def _one_line(error: Exception) -> str:
 
     text = str(error)
     if isinstance(error, RigError | IdentificationError):
-        return text
+        return with_flags(text, app)
     if isinstance(error, OSError) and error.filename is not None:
         return f"{os.fsdecode(error.filename)}: cannot be used ({error.strerror})"
     return f"unexpected {type(error).__name__}: {text} (run again with --debug for the details)"

@@ -20,8 +20,9 @@ def tune_(
     *,
     bench: Annotated[str, typer.Option(help="Shipped bench or TOML file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Plan to write: a TOML file.")],
-    level: Annotated[
-        float | None, typer.Option(metavar="V", help="RMS voltage of the multisine; found by itself if left out.")
+    level_rms_v: Annotated[
+        float | None,
+        typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found by itself if left out."),
     ] = None,
     law: Annotated[
         str, typer.Option(help="frequency-error (levels in metres) or phase (levels in volts).")
@@ -48,7 +49,7 @@ def tune_(
     from rig.tuning.tuning import TuningRequest, tune
 
     load_bench(bench)
-    request = TuningRequest(level_rms_v=level, law=law, from_m=from_m, to_m=to_m, points=points)
+    request = TuningRequest(level_rms_v=level_rms_v, law=law, from_m=from_m, to_m=to_m, points=points)
     if output.suffix != ".toml":
         raise ConfigurationError(f"-o {output}: plans are written as .toml")
     keep_existing([], output, options.overwrite)

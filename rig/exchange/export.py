@@ -29,7 +29,7 @@ def export_file(
     except IdentificationError as error:
         raise RecordingError(f"{source}: {error}") from None
     if item and not 1 <= item <= len(found):
-        raise RecordingError(f"--item = {item}: {source} holds 1 to {len(found)}")
+        raise RecordingError(f"`item` = {item}: {source} holds 1 to {len(found)}")
     chosen = [found[item - 1]] if item else found
     loose = next((one for one in chosen if not one.rows), None)
     if loose is not None and format_ != "mat":

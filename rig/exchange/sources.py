@@ -42,7 +42,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
         If the file cannot be read, holds no such point or nothing of that kind.
     """
     if data not in DATA:
-        raise ConfigurationError(f"--data = {data!r}: allowed is {' or '.join(DATA)}")
+        raise ConfigurationError(f"`data` = {data!r}: allowed is {' or '.join(DATA)}")
     kind = kind_of(path)
     if kind in _RESULTS:
         with Recording(path) as recording:

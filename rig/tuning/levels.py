@@ -87,7 +87,7 @@ def choose_levels(
     lowest = lowest_n / needed_n(plant, 1.0) if from_m is None else from_m
     if highest > reach:
         raise ConfigurationError(
-            f"--to-m = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "
+            f"`to_m` = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "
             f"linear plant (it would need {needed_v(plant, highest):.3g} V)"
         )
     if not 0.0 < lowest < highest:

@@ -156,7 +156,7 @@ def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str,
     if test.distortion > NONLINEAR:
         out.append(
             f"the multisine at {test.level_rms_v:.3g} V RMS shows {100.0 * test.distortion:.2g} % of nonlinear distortion: "
-            "frequency and damping are those of that level (--level sets a lower one)"
+            "frequency and damping are those of that level; tune at a lower one for those of the linear plant"
         )
     limit, highest = bench.limits.voltage_v, levels.needed_v[-1]
     if highest > PART * limit * 1.001:

@@ -22,7 +22,7 @@ def make_way(output: Path, overwrite: bool) -> None:
             raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
         for path in (output, journal_path(output)):
             if path.exists() and not overwrite:
-                raise RecordingError(f"{path}: exists already; choose another name, or --overwrite")
+                raise RecordingError(f"{path}: exists already; choose another name, or `overwrite`")
         if output.exists():
             kind_of(output)  # only what is ours is overwritten
     except OSError as error:

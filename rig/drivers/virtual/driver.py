@@ -57,7 +57,7 @@ class VirtualDAQ(DAQ):
         self._queue_options = validated(Queue, queue, "driver.options")
         converter = {"sample_rate_hz": bench.sample_rate_hz, "dac_range_v": bench.output_range_v}
         if "seed" in options:
-            raise ConfigurationError("driver.options.seed: is given to the run (--seed), not to the bench")
+            raise ConfigurationError("driver.options.seed: is given to the run (`seed`), not to the bench")
         given = options.get("converter", {})
         if not isinstance(given, dict):
             raise ConfigurationError(f"driver.options.converter = {given!r}: allowed is a table")

@@ -162,7 +162,7 @@ def test_units_of_dataset_164_divide(tmp_path):
 def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
     path = written(tmp_path / "mixed.uff", units(5, 1000.0, 1.0), response(np.ones(20), label="m/s^2", force_label="N"))
     with pytest.raises(
-        ImportFailed, match=r"mixed units: the ordinate is labelled m/s\^2 .* dataset 164 says MM .*--units"
+        ImportFailed, match=r"mixed units: the ordinate is labelled m/s\^2 .* dataset 164 says MM .*`units`"
     ):
         import_file(path)
     np.testing.assert_allclose(import_file(path, units=choice).value, factor)
@@ -171,7 +171,7 @@ def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
 @pytest.mark.parametrize(
     ("datasets", "message"),
     [
-        ([response(np.ones(20))], r"the ordinate has no unit.*--units si"),
+        ([response(np.ones(20))], r"the ordinate has no unit.*`units` si"),
         ([units(), response(np.ones(20), label="furlong")], r"is 'furlong', understood are m, mm"),
         ([units(), units(2, 3.28, 0.22), response(np.ones(20))], r"units \(dataset 164\): 2 different ones"),
         ([units(), response(np.ones(20)), response(np.ones(20))], r"a second response of 1\+Z to 1\+Z"),

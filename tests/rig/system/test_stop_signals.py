@@ -89,8 +89,8 @@ class Stopping(Silent):
 
 def test_a_run_that_did_not_complete_fails_whatever_signal_comes_at_its_end(tmp_path, monkeypatch):
     monkeypatch.setattr("rig.campaigns.running.runner.forget_before", lambda path: signal.raise_signal(signal.SIGTERM))
+    stopping = RunOptions(progress=Stopping())
     with pytest.raises(typer.Exit) as ended:
-        stopping = RunOptions(progress=Stopping())
         _carry("backbone", RunOptions(), lambda _: carry_out(PLAN, BENCH, tmp_path / "run.h5", stopping), json=False)
     assert ended.value.exit_code == 1
 

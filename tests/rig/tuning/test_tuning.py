@@ -120,12 +120,12 @@ def test_a_linear_frequency_that_is_30_percent_off_is_refused_with_the_measured_
     ("request_", "said"),
     [
         ({"level_rms_v": 5.0}, "allows above 0 and up to 9.5 V"),
-        ({"level_rms_v": -1.0}, "--level = -1 V RMS: allowed is above 0"),
+        ({"level_rms_v": -1.0}, "`level_rms_v` = -1 V RMS: allowed is above 0"),
         ({"law": "pid"}, "allowed is frequency-error, phase"),
         ({"to_m": 0.02}, "up to 0.00377 m: a channel's mode_shape moves 1.59 times as far"),
-        ({"to_m": 0.005}, "--to-m = 0.005 m"),
-        ({"from_m": 0.002, "to_m": 0.001}, "--from-m = 0.002 m: allowed is below"),
-        ({"points": 0}, "--points = 0"),
+        ({"to_m": 0.005}, "`to_m` = 0.005 m"),
+        ({"from_m": 0.002, "to_m": 0.001}, "`from_m` = 0.002 m: allowed is below"),
+        ({"points": 0}, "`points` = 0"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_moves(request_, said, tmp_path):
