@@ -183,7 +183,7 @@ def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
             [units(), response(np.ones(20)), response(np.ones(20), rsp=(2, 3), x=FREQUENCY + 1)],
             r"frequencies are not those",
         ),
-        ([units(), signal(np.ones(10))], r"holds time data; say by --mapping"),
+        ([units(), signal(np.ones(10))], r"holds time data; say by `mapping`"),
         ([units()], r"holds neither frequency responses"),
     ],
 )
@@ -261,8 +261,8 @@ def test_a_modal_mass_in_other_units_is_converted(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "drive", "message"),
     [
-        ({}, "", r"--drive: is '', .*allowed are 1\+Z, 7\+Y, 7\+Z"),
-        ({}, "3+X", r"--drive: is '3\+X'"),
+        ({}, "", r"`drive`: is '', .*allowed are 1\+Z, 7\+Y, 7\+Z"),
+        ({}, "3+X", r"`drive`: is '3\+X'"),
         ({"modal_m": 0.0}, "1+Z", r"modal mass 0, wanted is a real shape and a modal mass above zero"),
         ({axis: np.array([1j, 1.0]) for axis in ("r1", "r2", "r3")}, "1+Z", r"wanted is a real shape"),
     ],
