@@ -15,11 +15,10 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
-    from identification.linear.analysis import ModalAnalysis
     from identification.linear.extrapolation import extrapolated_to_zero
-    from identification.linear.modal_analysis import linear_modes
-    from identification.linear.mode_correlation import mac_matrix
-    from identification.linear.modes import LinearModes
+    from identification.linear.modal_analysis import ModalAnalysis, linear_modes
+    from identification.linear.mode_shapes import ModeShapes, mac
+    from identification.linear.modes import LinearModes, mac_matrix
     from identification.linear.response_matrix import FrequencyResponseMatrix
     from identification.linear.stabilisation import StabilisationDiagram, stabilisation
     from identification.linear.state_space_fit import StateSpaceFit, fit_state_space
@@ -31,12 +30,10 @@ if TYPE_CHECKING:
     from identification.mapping.response_matrix import ResponseMatrixMapping, map_response_matrix
     from identification.mapping.stepped_sine import FrequencyResponseMapping, map_frequency_responses
     from identification.measurements import PeriodicVibration
-    from identification.multisine.best_linear_approximation import best_linear_approximation
-    from identification.multisine.coherences import coherence
+    from identification.multisine.best_linear_approximation import best_linear_approximation, coherence
     from identification.multisine.design import MultisineDesign
     from identification.multisine.distortion import DistortionLevels, distortion_levels
     from identification.multisine.spectra import InstrumentResponse, PeriodicSpectra, periodic_spectra
-    from identification.nonlinear.mode_shapes import ModeShapes, mac
     from identification.nonlinear.nonlinear_modes import NonlinearMode
     from identification.nonlinear.phase_resonance import nonlinear_mode
     from identification.nonlinear.repeatability import Repeatability, combined, repeatability
@@ -45,7 +42,13 @@ if TYPE_CHECKING:
     from identification.pnlss.best_linear import best_linear_responses
     from identification.pnlss.coupled.run import CoupledRun, pnlss_coupled_run
     from identification.pnlss.error_table import ErrorTable
-    from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
+    from identification.pnlss.errors import (
+        PnlssErrors,
+        error_spectra,
+        estimated_initial_state,
+        pnlss_errors,
+        simulated_run,
+    )
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
     from identification.pnlss.fitting.fit import fit_pnlss
@@ -53,13 +56,11 @@ if TYPE_CHECKING:
     from identification.pnlss.fitting.settings import FitProgress, FitSettings
     from identification.pnlss.identify import identify_pnlss
     from identification.pnlss.linear_model import linear_pnlss
-    from identification.pnlss.many import IdentifiedModel, identify_many
+    from identification.pnlss.many import IdentifiedModel, ModelJob, identify_many, realisation_combinations
     from identification.pnlss.model import PnlssModel
-    from identification.pnlss.model_jobs import ModelJob, realisation_combinations
     from identification.pnlss.simulation import Simulation
     from identification.pnlss.steady.response import pnlss_frequency_response, pnlss_response, pnlss_steady_state
-    from identification.pnlss.steady.result import PnlssResponse
-    from identification.pnlss.steady.states import SteadyStates
+    from identification.pnlss.steady.states import PnlssResponse, SteadyStates
     from identification.prediction.comparison import Comparison, PredictionError, compare, error_table
     from identification.prediction.exciter import Exciter, VoltagePath
     from identification.prediction.exciter_fit import identify_exciter
@@ -67,7 +68,7 @@ if TYPE_CHECKING:
     from identification.prediction.predictions import Predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
-    from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun, error_spectra, simulated_run
+    from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun
     from identification.prediction.steady_prediction import SteadyPrediction
     from identification.prediction.sweep_inputs import VoltageSweep
     from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
@@ -231,10 +232,10 @@ _MODULE_OF = {
     "IdentifiedModel": "pnlss.many",
     "InstrumentResponse": "multisine.spectra",
     "LinearModes": "linear.modes",
-    "ModalAnalysis": "linear.analysis",
+    "ModalAnalysis": "linear.modal_analysis",
     "ModalProperties": "prediction.properties",
-    "ModeShapes": "nonlinear.mode_shapes",
-    "ModelJob": "pnlss.model_jobs",
+    "ModeShapes": "linear.mode_shapes",
+    "ModelJob": "pnlss.many",
     "MultisineDesign": "multisine.design",
     "MultisineMapping": "mapping.multisine",
     "NonlinearMode": "nonlinear.nonlinear_modes",
@@ -245,7 +246,7 @@ _MODULE_OF = {
     "PnlssFit": "pnlss.fitting.result",
     "PnlssMapping": "mapping.pnlss",
     "PnlssModel": "pnlss.model",
-    "PnlssResponse": "pnlss.steady.result",
+    "PnlssResponse": "pnlss.steady.states",
     "PredictionError": "prediction.comparison",
     "Predictions": "prediction.predictions",
     "Repeatability": "nonlinear.repeatability",
@@ -266,7 +267,7 @@ _MODULE_OF = {
     "VoltageSweep": "prediction.sweep_inputs",
     "best_linear_approximation": "multisine.best_linear_approximation",
     "best_linear_responses": "pnlss.best_linear",
-    "coherence": "multisine.coherences",
+    "coherence": "multisine.best_linear_approximation",
     "combined": "nonlinear.repeatability",
     "compare": "prediction.comparison",
     "compare_sweep": "prediction.sweep_prediction",
@@ -274,7 +275,7 @@ _MODULE_OF = {
     "decimated": "signals.decimation",
     "demodulate": "signals.transients",
     "distortion_levels": "multisine.distortion",
-    "error_spectra": "prediction.simulated_runs",
+    "error_spectra": "pnlss.errors",
     "error_table": "prediction.comparison",
     "estimated_initial_state": "pnlss.errors",
     "extrapolated_to_zero": "linear.extrapolation",
@@ -288,8 +289,8 @@ _MODULE_OF = {
     "identify_pnlss": "pnlss.identify",
     "linear_modes": "linear.modal_analysis",
     "linear_pnlss": "pnlss.linear_model",
-    "mac": "nonlinear.mode_shapes",
-    "mac_matrix": "linear.mode_correlation",
+    "mac": "linear.mode_shapes",
+    "mac_matrix": "linear.modes",
     "map_backbone": "mapping.backbone",
     "map_frequency_responses": "mapping.stepped_sine",
     "map_multisine": "mapping.multisine",
@@ -306,12 +307,12 @@ _MODULE_OF = {
     "pnlss_response": "pnlss.steady.response",
     "pnlss_steady_state": "pnlss.steady.response",
     "predict_sweep": "prediction.sweeps",
-    "realisation_combinations": "pnlss.model_jobs",
+    "realisation_combinations": "pnlss.many",
     "recorded_force_response": "prediction.recorded_force",
     "repeatability": "nonlinear.repeatability",
     "response_band": "prediction.uncertainty",
     "short_point": "slow_flows.short_points",
-    "simulated_run": "prediction.simulated_runs",
+    "simulated_run": "pnlss.errors",
     "single_point_mode": "nonlinear.single_points",
     "slow_flow": "slow_flows.slow_flow",
     "stabilisation": "linear.stabilisation",

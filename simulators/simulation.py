@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simulators.kernels import run_observed
 from simulators.layout import Flag, RigArrays, RigState
-from simulators.plant.discretise import pad
+from simulators.plant.compilation import pad
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["Simulation", "TimeSeries"]
@@ -44,7 +44,8 @@ class Simulation:
         self.rig = rig
         self.arrays: RigArrays
         self.state: RigState
-        self.arrays, self.state = rig.build(seed)
+        self._realised = rig.realised(seed)
+        self.arrays, self.state = self._realised.build(seed)
         self._points = tuple(dict.fromkeys(_points(rig)))
         rows = [rig.plant.force_row(), *(rig.plant.displacement_row(rig.shape(at)) for at in self._points)]
         self._observe = pad(np.array(rows).T)
@@ -58,7 +59,11 @@ class Simulation:
         readings_v = np.empty((voltage_v.size, len(self.rig.sensors)))
         truth = np.empty((voltage_v.size, self._observe.shape[1]))
         flags = np.empty(voltage_v.size, np.int64)
-        run_observed(self.arrays, self.state, self._observe, voltage_v, readings_v, truth, flags)
+        for arrays, part in self._realised.pieces(self.arrays, first, voltage_v.size):
+            self.arrays = arrays
+            run_observed(
+                self.arrays, self.state, self._observe, voltage_v[part], readings_v[part], truth[part], flags[part]
+            )
         measured = (readings_v / self.rig.sensitivities_v_per_unit).T
         return TimeSeries(
             time_s=(first + np.arange(voltage_v.size)) / self.rig.converter.sample_rate_hz,

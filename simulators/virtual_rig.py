@@ -1,5 +1,6 @@
 """A virtual rig: structure, elements, joints, exciter, stinger, sensors and converters, from a table to compiled arrays."""
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -11,9 +12,8 @@ from simulators.exciter import Exciter, Stinger
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
-from simulators.plant.assembly import LinearPlant, assemble
-from simulators.plant.checks import check_elements, check_plant, check_step, computable
-from simulators.plant.compilation import at_rest, rig_arrays
+from simulators.plant.assembly import LinearPlant, assemble, check_elements, check_plant, check_step, computable
+from simulators.plant.compilation import at_rest, rediscretised, rig_arrays
 from simulators.scatter import Deviation, Scatter, deviated
 from simulators.sensing.filters import channel_delays, filter_delay
 from simulators.sensing.parts import Converter, Sensor
@@ -21,6 +21,7 @@ from simulators.shipped import merged, specimen_table
 from simulators.sites.elements import Element, Magnet
 from simulators.sites.friction import FrictionSite
 from simulators.structures.structure import ModalStructure, Structure
+from simulators.wear import Wear
 
 __all__ = ["VirtualRig"]
 
@@ -55,6 +56,8 @@ class VirtualRig(Part):
     """By how much the modes of this specimen deviate from those of its structure."""
     scatter: Scatter = Scatter()
     """How specimens differ from run to run and from assembly to assembly; nothing scatters by default."""
+    wear: Wear = Wear()
+    """How the modes of the specimen change within a run; nothing does by default."""
     noise_scale: Annotated[float, Field(ge=0.0)] = 1.0
     """Multiplies the noise of every sensor; 0 for none, 10 for a bad day."""
     seed: Annotated[int, Field(ge=0)] = 0
@@ -86,8 +89,9 @@ class VirtualRig(Part):
         with computable("structure, elements, friction, exciter, stinger"):
             check_elements(self.elements, self.plant)
             check_plant(self.plant)
-            self._check_joints()
+            self._check_joints(self.plant)
             check_step(self.elements, self.plant, self.converter.sample_rate_hz, self.converter.substeps)
+            self._check_wear()
         self._check_low_passes()
         return self
 
@@ -108,16 +112,30 @@ class VirtualRig(Part):
             if joint.relative_to_mode_1 and self.structure.shape(joint.at, joint.quantity)[0] == 0.0:
                 raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
 
-    def _check_joints(self) -> None:
+    def _check_joints(self, plant: LinearPlant) -> None:
         """Refuse joints that are stiffer than the structure they are part of: slipping, it would not hold together."""
-        slipping = self.plant.modal_stiffness.copy()
-        for joint, row in zip(self.friction, self.plant.site_rows[self.plant.n_local :], strict=True):
-            coordinate = row[: self.plant.n_mode]
+        slipping = plant.modal_stiffness.copy()
+        for joint, row in zip(self.friction, plant.site_rows[plant.n_local :], strict=True):
+            coordinate = row[: plant.n_mode]
             slipping -= joint.stuck_stiffness * np.outer(coordinate, coordinate)
         lowest = np.linalg.eigvalsh(slipping)[0]
-        if lowest < -1e-9 * np.max(np.abs(self.plant.modal_stiffness)):
+        if lowest < -1e-9 * np.max(np.abs(plant.modal_stiffness)):
             total = sum(joint.stuck_stiffness for joint in self.friction)
             raise ValueError(f"friction: stiffness {total:.6g} in all, allowed is less than the structure has there")
+
+    def _check_wear(self) -> None:
+        """Refuse wear that is for other modes, goes in steps of less than a sample, or leaves less than holds together."""
+        self._worn_deviation(0.0)
+        if self.wear.every_s * self.converter.sample_rate_hz < 1.0:
+            shortest_s = 1.0 / self.converter.sample_rate_hz
+            raise ValueError(f"wear.every_s = {self.wear.every_s:g}: allowed is from {shortest_s:g}, one sample")
+        if self.wear.wears and self.wear.until_s is not None:
+            worn = self._worn_plant(self.wear.until_s)
+            try:
+                check_plant(worn)
+                self._check_joints(worn)
+            except ValueError as error:
+                raise ValueError(f"wear.until_s = {self.wear.until_s:g}: then {error}, or less wear") from None
 
     def _check_low_passes(self) -> None:
         half_hz = 0.5 * self.converter.internal_rate_hz
@@ -150,6 +168,8 @@ class VirtualRig(Part):
 
     def realised(self, seed: int | None = None) -> "VirtualRig":
         """The specimen that a run with this seed gets, of the assembly that ``scatter`` names; nothing in it scatters."""
+        if not self.scatters:
+            return self
         frequency, damping = self.scatter.modal_factors(self.seed if seed is None else seed, self.plant.n_mode)
         changes: dict[str, Any] = {"scatter": Scatter()}
         if self.scatter.run_scatters:
@@ -158,13 +178,64 @@ class VirtualRig(Part):
             magnets = iter(self.scatter.magnets([part for part in self.elements if isinstance(part, Magnet)]))
             changes["elements"] = [next(magnets) if isinstance(part, Magnet) else part for part in self.elements]
             changes["friction"] = self.scatter.joints(self.friction)
+        return self._changed(changes)
+
+    def worn(self, time_s: float) -> "VirtualRig":
+        """The specimen as it is at a time (s) of a run, which does not wear: the truth for what is measured then.
+
+        It has the plant that a run has at the sample nearest to that time: that of the last multiple of ``wear.every_s``.
+        Raises `ValueError` for a time below 0.
+        """
+        deviation = self._worn_deviation(time_s)
+        if time_s > 0.0 and self.wear.wears:
+            rate_hz = self.converter.sample_rate_hz
+            deviation = self._worn_deviation(self.wear.held_s(round(time_s * rate_hz), rate_hz))
+        return self._changed({"deviation": deviation, "wear": Wear()})
+
+    def pieces(self, arrays: RigArrays, first: int, n: int) -> Iterator[tuple[RigArrays, slice]]:
+        """The next ``n`` samples of a run, from sample ``first`` on, in pieces over each of which the plant is held.
+
+        Yields the arrays of a piece and its slice of the n; ``arrays`` are those of the sample before, or those built. At
+        least one piece, the whole where nothing wears. Of a rig that scatters, ask what is `realised`.
+        """
+        if not self.wear.wears:
+            yield arrays, slice(0, n)
+            return
+        step = self.wear.step_samples(self.converter.sample_rate_hz)
+        start, stop = 0, -1
+        while stop < n:
+            stop = min(n, start + step - (first + start) % step)
+            if (first + start) % step == 0:
+                arrays = self._rediscretised(arrays, first + start)
+            yield arrays, slice(start, stop)
+            start = stop
+
+    def _rediscretised(self, arrays: RigArrays, sample: int) -> RigArrays:
+        """The arrays with the plant that is held from a sample on; the same ones where it is that of the sample before."""
+        rate_hz = self.converter.sample_rate_hz
+        time_s = self.wear.held_s(sample, rate_hz)
+        if sample == 0 or time_s == self.wear.held_s(sample - 1, rate_hz):
+            return arrays
+        plant = self._worn_plant(time_s)
+        outputs = [self._row(plant, sensor) for sensor in self.sensors]
+        return rediscretised(arrays, plant, len(self.friction), outputs, self.converter)
+
+    def _worn_deviation(self, time_s: float) -> Deviation:
+        worn = self.wear.deviation(time_s, self._nominal_plant.n_mode, self.deviation)
+        return worn if self.wear.wears else self.deviation
+
+    def _worn_plant(self, time_s: float) -> LinearPlant:
+        return deviated(self._nominal_plant, self.structure.omega_rad_s, self._worn_deviation(time_s))
+
+    def _changed(self, changes: dict[str, Any]) -> "VirtualRig":
         return VirtualRig.model_validate({name: getattr(self, name) for name in VirtualRig.model_fields} | changes)
 
     def output_row(self, sensor: Sensor) -> NDArray[np.float64]:
         """What a sensor senses (SI), as a row over the input vector ``[x, u, f]``."""
-        if sensor.at is None:
-            return self.plant.force_row()
-        return self.plant.acceleration_row(self.shape(sensor.at))
+        return self._row(self.plant, sensor)
+
+    def _row(self, plant: LinearPlant, sensor: Sensor) -> NDArray[np.float64]:
+        return plant.force_row() if sensor.at is None else plant.acceleration_row(self.shape(sensor.at))
 
     def shape(self, at: str) -> NDArray[np.float64]:
         """Mode shapes (kg^-1/2) of the structure at a named point, turned so that the drive point moves forward."""
@@ -193,8 +264,12 @@ class VirtualRig(Part):
     @cached_property
     def plant(self) -> LinearPlant:
         """Linear part of the coupled plant."""
-        nominal = assemble(self.structure, self.elements, self.friction, self.exciter, self.stinger)
-        return deviated(nominal, self.structure.omega_rad_s, self.deviation)
+        return deviated(self._nominal_plant, self.structure.omega_rad_s, self.deviation)
+
+    @cached_property
+    def _nominal_plant(self) -> LinearPlant:
+        """The plant before any deviation."""
+        return assemble(self.structure, self.elements, self.friction, self.exciter, self.stinger)
 
     @cached_property
     def linear_modes(self) -> LinearModes:

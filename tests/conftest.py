@@ -3,6 +3,10 @@
 import os
 import signal
 
+# One thread for linear algebra, before numpy is imported. The matrices of the tests are small: on a busy machine threads that
+# wait for each other make an identification ten times slower.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import settings
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.plant.discretise import aligned, pad
+from simulators.plant.compilation import aligned, pad
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["Rk4Arrays", "Rk4State", "build"]

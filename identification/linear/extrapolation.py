@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.linear.mode_correlation import mac_matrix
-from identification.linear.modes import LinearModes
+from identification.linear.modes import LinearModes, mac_matrix
 from identification.validation import one_specimen
 
 __all__ = ["extrapolated_to_zero"]

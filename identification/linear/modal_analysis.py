@@ -1,7 +1,8 @@
-"""Experimental modal analysis in one call: from frequency responses to mass-normalised modes with their errors."""
+"""Experimental modal analysis in one call: from frequency responses to mass-normalised modes with errors."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,7 @@ from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
 from identification.linear.errors_in_variables import DrivenResponses, driven_responses, is_driven, over_force
-from identification.linear.modal_notes import modal_notes
-from identification.linear.modal_parameters import accepted, as_linear_modes
+from identification.linear.modal_parameters import accepted, as_linear_modes, modal_notes
 from identification.linear.modes import LinearModes
 from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
 from identification.linear.response_matrix import FrequencyResponseMatrix
@@ -19,19 +19,71 @@ from identification.linear.stabilisation import StabilisationDiagram
 from identification.linear.stabilisation import diagram as stability
 from identification.validation import finite_array
 
-__all__ = ["linear_modes"]
+__all__ = ["ModalAnalysis", "linear_modes"]
 
 Float = NDArray[np.float64]
 
 _NEEDED = 2.0
-"""A pole whose loss multiplies the misfit by this is a mode, however few are asked for."""
+"""A pole counts as a mode if the misfit without it grows by this factor, whatever number of modes is asked for."""
 _NEAR = 0.05
-"""A starting frequency takes the nearest pole of the diagram within this part of it."""
+"""A starting frequency takes the nearest pole of the diagram within this relative distance."""
 _ROUNDS = 20
 _AT_REST_STD = 0.01
-"""Part of its standard error by which no pole moves any more."""
+"""The rounds end once no pole moves by more than this share of its standard error."""
 _START_DAMPING = 0.005
-"""Damping ratio to start with where the diagram has no pole near."""
+"""Initial damping ratio where the diagram has no pole nearby."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModalAnalysis:
+    """Result of a linear modal analysis.
+
+    Parameters
+    ----------
+    modes
+        The modal model.
+    responses
+        The responses it was fitted to; None if the modes come from elsewhere.
+    stabilisation
+        The diagram in which the modes were found; None if starting values were given.
+    """
+
+    modes: LinearModes
+    responses: FrequencyResponseMatrix | None = None
+    stabilisation: StabilisationDiagram | None = None
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays by name, a group for each part, and the attributes (ready for JSON) that go with them."""
+        arrays, attributes = _grouped("modes", self.modes)
+        if self.responses is not None:
+            more, attributes_of_responses = _grouped("responses", self.responses)
+            arrays, attributes = arrays | more, attributes | attributes_of_responses
+        if self.stabilisation is not None:
+            arrays |= {
+                f"stabilisation/{f.name}": getattr(self.stabilisation, f.name) for f in fields(self.stabilisation)
+            }
+        return arrays, attributes
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "ModalAnalysis":
+        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        diagram = {name: np.asarray(values) for name, values in _group(arrays, "stabilisation").items()}
+        return cls(
+            LinearModes.from_arrays(_group(arrays, "modes"), attributes.get("modes", {})),
+            FrequencyResponseMatrix.from_arrays(_group(arrays, "responses"), attributes["responses"])
+            if "responses" in attributes
+            else None,
+            StabilisationDiagram(**diagram) if diagram else None,
+        )
+
+
+def _grouped(name: str, part: LinearModes | FrequencyResponseMatrix) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    arrays, attributes = part.to_arrays()
+    return {f"{name}/{key}": values for key, values in arrays.items()}, {name: attributes}
+
+
+def _group(arrays: Mapping[str, NDArray[Any]], name: str) -> dict[str, NDArray[Any]]:
+    return {key.removeprefix(f"{name}/"): values for key, values in arrays.items() if key.startswith(f"{name}/")}
 
 
 def linear_modes(
@@ -105,7 +157,7 @@ def linear_modes(
 
 
 def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
-    """The maximum-likelihood fit from one near it: fits to what is linear about each one, until nothing moves."""
+    """The maximum-likelihood fit from a nearby fit: repeated fits to the linearised problem until no pole moves."""
     for _ in range(_ROUNDS):
         before = fit
         basis = modal_basis(joint.s, fit.poles, normal)
@@ -128,7 +180,7 @@ def _poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
 
 
 def _start(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequence[float] | None) -> Float:
-    """Poles to start from, rad/s and damping ratios."""
+    """Initial poles: rad/s and damping ratios."""
     if wanted is None:
         columns = stable.columns()
         if not columns.size:
@@ -165,7 +217,7 @@ def _without_spurious(
     normal: bool,
     modes: int | Sequence[float] | None,
 ) -> tuple[ModalFit, list[str]]:
-    """Fit; leave out what is no mode, or, if a number was asked for, the least prominent; fit again until all are modes."""
+    """Fit, drop poles that are no modes (or the least prominent if a number was asked for), and repeat until all are modes."""
     notes: list[str] = []
     drive, whole = find_role(band.outputs, "drive"), np.inf
     while True:

@@ -1,4 +1,4 @@
-"""A linear modal model as a modal analysis gives it: poles, mass-normalised shapes, residual terms, their errors.
+"""A linear modal model from a modal analysis: poles, mass-normalised shapes, residual terms, their errors, MAC of two models.
 
 The accelerance is, with ``s = i W``,
 
@@ -21,11 +21,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
+from identification.linear.mode_shapes import ModeShapes
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.nonlinear.mode_shapes import ModeShapes
 from identification.validation import finite_array
 
-__all__ = ["LinearModes"]
+__all__ = ["LinearModes", "mac_matrix"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -217,3 +217,19 @@ class LinearModes:
             return cls(channels=channels, **values, specimen=attributes["specimen"], notes=tuple(attributes["notes"]))
         except (KeyError, TypeError) as error:
             raise IdentificationError(f"linear modes: {error} is missing or unknown") from None
+
+
+def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:
+    """float[n_modes of a, n_modes of b]: ``(x^T y)^2 / (x^T x y^T y)`` of the shapes at the channels that both have.
+
+    Raises `IdentificationError` where they have no channel in common.
+    """
+    names = [channel.name for channel in b.channels]
+    common = [(row, names.index(channel.name)) for row, channel in enumerate(a.channels) if channel.name in names]
+    if not common:
+        raise IdentificationError(
+            f"channels: {', '.join(c.name for c in a.channels)} and {', '.join(names)} share none"
+        )
+    x, y = a.shapes[[i for i, _ in common]], b.shapes[[j for _, j in common]]
+    product = np.outer(np.sum(x**2, axis=0), np.sum(y**2, axis=0))
+    return np.asarray((x.T @ y) ** 2 / np.where(product > 0.0, product, 1.0))

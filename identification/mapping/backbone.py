@@ -7,8 +7,16 @@ from pydantic import Field
 
 from identification.backbones import Backbone
 from identification.errors import IdentificationError
-from identification.mapping.base import ChannelMapping, ComplexPaths, MappingTable, Path, complex_at, in_si
-from identification.mapping.nested import numbers, value_at
+from identification.mapping.base import (
+    ChannelMapping,
+    ComplexPaths,
+    MappingTable,
+    Path,
+    complex_at,
+    in_si,
+    numbers,
+    value_at,
+)
 from identification.measurements import PeriodicVibration
 
 __all__ = ["BackboneMapping", "map_backbone"]

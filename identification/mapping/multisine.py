@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from identification.errors import IdentificationError
-from identification.mapping.base import ChannelMapping, MappingTable, Path, in_si
-from identification.mapping.nested import as_levels, numbers, value_at
+from identification.mapping.base import ChannelMapping, MappingTable, Path, as_levels, in_si, numbers, value_at
 from identification.multisine.design import MultisineDesign
 from identification.multisine.spectra import PeriodicSpectra, periodic_spectra
 

@@ -5,8 +5,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.mapping.base import MappingTable, Path
-from identification.mapping.nested import numbers, value_at
+from identification.mapping.base import MappingTable, Path, numbers, value_at
 from identification.mapping.units import si_of
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 

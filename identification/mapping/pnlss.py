@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from identification.errors import IdentificationError
-from identification.mapping.base import ChannelMapping, MappingTable, Path, in_si
-from identification.mapping.nested import value_at
+from identification.mapping.base import ChannelMapping, MappingTable, Path, in_si, value_at
 from identification.pnlss.features import Features
 from identification.pnlss.model import PnlssModel
 

@@ -7,8 +7,16 @@ from pydantic import Field
 
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.mapping.base import ChannelMapping, ComplexPaths, MappingTable, Path, complex_at, in_si
-from identification.mapping.nested import numbers, value_at
+from identification.mapping.base import (
+    ChannelMapping,
+    ComplexPaths,
+    MappingTable,
+    Path,
+    complex_at,
+    in_si,
+    numbers,
+    value_at,
+)
 
 __all__ = ["ResponseMatrixMapping", "map_response_matrix"]
 

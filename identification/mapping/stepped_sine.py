@@ -15,8 +15,7 @@ from pydantic import Field
 from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
 from identification.errors import IdentificationError
 from identification.frequency_responses import Controlled, FrequencyResponse
-from identification.mapping.base import MappingTable, Path
-from identification.mapping.nested import as_levels, numbers, value_at
+from identification.mapping.base import MappingTable, Path, as_levels, numbers, value_at
 from identification.mapping.units import si_of
 
 __all__ = ["FrequencyResponseMapping", "LevelSet", "PhaseConvention", "Units", "map_frequency_responses"]

@@ -1,39 +1,24 @@
-"""Best linear approximation from periodic spectra, with its covariance from noise and with nonlinear distortion.
+"""Best linear approximation and coherence from periodic spectra.
 
-Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 2 (H1, H2, instrumental
-variables), 3 and 4 (robust method, several inputs). Every estimate is, line by line and over realisations r,
-
-    H = S_YZ S_UZ^-1,    S_YZ = sum_r Y_r Z_r^H,    S_UZ = sum_r U_r Z_r^H,
-
-Y_r and U_r means over the periods; they differ in Z. ``instrument`` takes what is known without noise and drives the
-inputs, such as the voltage: noise and nonlinear distortion of a force that the structure makes itself leave no bias. ``H1``
-takes Z = U (noise of the inputs biases it low where they are small, near resonance), ``H2`` takes Z = Y, each output for
-itself (noise of the outputs biases it high, near antiresonance). With a noiseless input, ``instrument`` with the input as
-its own instrument and ``H1`` are the same.
-
-To first order the error is ``sum_r (Y_r - H U_r) Z_r^H S_UZ^-1``. What of ``Y - H U`` differs from period to period is noise;
-what differs between realisations is noise and nonlinear distortion. Noise that is common to input and output counts once.
+`identification.multisine.estimators` has the equations of the approximation and its covariance.
 """
 
 from collections.abc import Sequence
-from typing import Literal, get_args
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.channels import Channel, Role, find_name
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.multisine.estimators import Estimator, chosen, estimated_responses
 from identification.multisine.spectra import PeriodicSpectra
 
-__all__ = ["Estimator", "best_linear_approximation", "chosen"]
+__all__ = ["Estimator", "best_linear_approximation", "coherence"]
 
-Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
-Estimator = Literal["instrument", "H1", "H2"]
 
-_DEPENDENT = 1e-9  # smallest singular value of S_UZ, scaled to a unit diagonal, below which rounding is all there is
-_SILENT = 1e-12  # amplitude against the strongest line
+_DEPENDENT = 1e-9  # smallest singular value of the inputs' powers, scaled to a unit diagonal
 
 
 def best_linear_approximation(
@@ -50,7 +35,7 @@ def best_linear_approximation(
     Parameters
     ----------
     spectra
-        What was recorded. With several inputs, every ``len(inputs)`` realisations in turn are the experiments of one block
+        Recorded spectra. With several inputs, every ``len(inputs)`` realisations in turn are the experiments of one block
         (`MultisineDesign.orthogonal_realisation`), and blocks are independent; the total covariance is unbiased for
         orthogonal blocks.
     outputs, inputs
@@ -68,147 +53,66 @@ def best_linear_approximation(
         On channels that are missing or named twice, realisations that do not fill blocks, lines without power at an input or
         its instrument, inputs that do not move independently.
     """
-    if estimator not in get_args(Estimator):
-        raise IdentificationError(f"estimator: is '{estimator}', allowed are {', '.join(get_args(Estimator))}")
-    rows = chosen("outputs", spectra.channels, outputs, ("drive", "response"))
-    columns = chosen("inputs", spectra.channels, inputs, ("force",))
-    values = spectra.spectra[..., spectra.excited]
-    y, u = values[:, :, rows], values[:, :, columns]
-    names = [spectra.channels[column].name for column in columns]
-    if y.shape[0] % len(names):
-        raise IdentificationError(
-            f"realisations: are {y.shape[0]}, need a multiple of the {len(names)} inputs {', '.join(names)}"
-        )
-    z, label = _instruments(spectra.channels, values.mean(axis=1), rows, columns, estimator, instruments)
-    weights = _weights(u.mean(axis=1), z, spectra.frequency_hz[spectra.excited], label)
-    value = np.einsum(
-        "rok,roik->koi", y.mean(axis=1), np.broadcast_to(weights, (y.shape[0], len(rows), *weights.shape[2:]))
-    )
-    error = (y - np.einsum("koi,rpik->rpok", value, u))[:, :, :, None] * weights[:, None]
-    error = error.reshape(*y.shape[:2], len(rows) * len(columns), -1)
-    noise, total = _noise_covariance(error), _total_covariance(error, len(columns))
-    return FrequencyResponseMatrix(
-        outputs=tuple(spectra.channels[row] for row in rows),
-        inputs=tuple(spectra.channels[column] for column in columns),
-        frequency_hz=spectra.frequency_hz[spectra.excited],
-        value=value,
-        noise_covariance=noise,
-        total_covariance=total,
+    found = estimated_responses(
+        spectra.channels,
+        spectra.frequency_hz[spectra.excited],
+        spectra.spectra[..., spectra.excited],
+        outputs=outputs,
+        inputs=inputs,
         estimator=estimator,
-        input_rms=tuple(spectra.rms(name) for name in names),
+        instruments=instruments,
+    )
+    return replace(
+        found,
+        input_rms=tuple(spectra.rms(channel.name) for channel in found.inputs),
         specimen=specimen,
-        notes=(*spectra.notes, *_mixed([spectra.channels[row] for row in rows]), *_notes(error, len(columns))),
+        notes=(*spectra.notes, *found.notes),
     )
 
 
-def chosen(what: str, channels: Sequence[Channel], names: Sequence[str] | None, roles: tuple[Role, ...]) -> list[int]:
-    """Rows of the channels called ``names``, or of all with one of ``roles``; refuses none and twice the same."""
-    if isinstance(names, str):
-        names = (names,)
-    if names is None:
-        rows = [row for row, channel in enumerate(channels) if channel.role in roles]
-    else:
-        rows = [find_name(channels, name) for name in names]
-    if not rows or len(set(rows)) < len(rows):
-        asked = f"no channel of role {' or '.join(roles)}" if names is None else ", ".join(names) or "none given"
+def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str] | None = None) -> Float:
+    """Part of the output's power that is linear in the inputs, every period of every realisation counted as one record.
+
+    ``S_yU S_UU^-1 S_Uy / S_yy`` (Bendat and Piersol, *Random Data*, 4th ed., section 7.3): ordinary with one input,
+    multiple with several. Neither noise nor distortion leaves it at 1, and few records bring it up: n records of pure noise
+    show ``n_inputs / n`` on average.
+
+    Parameters
+    ----------
+    spectra
+        Recorded spectra.
+    output
+        Name of a channel.
+    inputs
+        Name or names of channels; None for all forces.
+
+    Returns
+    -------
+    float[n_excited]
+        Coherence at the excited lines, in [0, 1].
+
+    Raises
+    ------
+    IdentificationError
+        On channels that are missing, fewer records than inputs and one, lines without power, inputs that depend on each other.
+    """
+    rows = chosen("inputs", spectra.channels, inputs, ("force",))
+    lines = spectra.spectra[..., spectra.excited].reshape(-1, len(spectra.channels), int(spectra.excited.sum()))
+    if lines.shape[0] <= len(rows):
         raise IdentificationError(
-            f"{what}: {asked}; needs one or more, each once, of {', '.join(channel.name for channel in channels)}"
+            f"periods, realisations: make {lines.shape[0]} records, a coherence with {len(rows)} inputs needs more than that"
         )
-    return rows
-
-
-def _instruments(
-    channels: Sequence[Channel],
-    means: Complex,
-    rows: list[int],
-    columns: list[int],
-    estimator: Estimator,
-    instruments: Sequence[str],
-) -> tuple[Complex, str]:
-    """Z of every realisation, complex[n_realisations, n_outputs or 1, n_inputs, n_lines], and what to call it."""
-    if estimator == "H2":
-        if len(columns) > 1:
-            raise IdentificationError(
-                f"estimator: is 'H2' with {len(columns)} inputs, allowed is one; H1 takes several"
-            )
-        return means[:, rows, None], "outputs"
-    if estimator == "H1":
-        return means[:, None, columns], "inputs"
-    known = chosen("instruments", channels, instruments, ())
-    if len(known) != len(columns):
-        raise IdentificationError(
-            f"instruments: are {len(known)} ({', '.join(channels[row].name for row in known)}), needs one per input, "
-            f"{len(columns)}"
-        )
-    label = "instrument " if len(known) == 1 else "instruments "
-    return means[:, None, known], label + ", ".join(f"'{channels[row].name}'" for row in known)
-
-
-def _weights(u: Complex, z: Complex, frequency_hz: Float, label: str) -> Complex:
-    """``Z_r^H S_UZ^-1``, complex[n_realisations, n_outputs or 1, n_inputs, n_lines]: ``H = sum_r Y_r (Z_r^H S_UZ^-1)``."""
-    size_u, size_z = np.sqrt(np.sum(np.abs(u) ** 2, axis=0)), np.sqrt(np.sum(np.abs(z) ** 2, axis=0))
-    silent = np.any(size_u <= _SILENT * size_u.max(axis=-1, keepdims=True), axis=0)
-    silent |= np.any(size_z <= _SILENT * size_z.max(axis=-1, keepdims=True), axis=(0, 1))
-    if np.any(silent):
-        where = frequency_hz[int(np.argmax(silent))]
-        raise IdentificationError(
-            f"{label}: gives no input at {where:g} Hz, an excited line; is the design what was played?"
-        )
-    scaled_u, scaled_z = u / size_u, np.conj(z / size_z)
-    cross = np.einsum("rik,rojk->okij", scaled_u, scaled_z)
-    dependent = np.linalg.svd(cross, compute_uv=False).min(axis=-1) < _DEPENDENT
+    y, u = lines[:, spectra.index(output)], lines[:, rows]
+    sizes = np.sqrt(np.sum(np.abs(lines) ** 2, axis=0))[[spectra.index(output), *rows]]
+    if np.any(sizes == 0.0):
+        where = spectra.frequency_hz[spectra.excited][int(np.argmax(np.any(sizes == 0.0, axis=0)))]
+        raise IdentificationError(f"{output}, inputs: have no power at {where:g} Hz, an excited line")
+    y, u = y / sizes[0], u / sizes[1:]
+    powers = np.einsum("rik,rjk->kij", u, np.conj(u))
+    cross = np.einsum("rk,rik->ki", y, np.conj(u))
+    dependent = np.linalg.eigvalsh(powers)[:, 0] < _DEPENDENT
     if np.any(dependent):
-        where = frequency_hz[int(np.argmax(dependent.any(axis=0)))]
-        raise IdentificationError(
-            f"{label}: does not move the {u.shape[1]} inputs independently of each other at {where:g} Hz; needs as many "
-            "realisations with other phases at each input, best orthogonal ones"
-        )
-    scaled = np.einsum("rojk,okji->roik", scaled_z, np.linalg.inv(cross))
-    return np.asarray(scaled / size_u)
-
-
-def _noise_covariance(error: Complex) -> Complex | None:
-    """complex[n_lines, m, m] of the sum over realisations, from complex[n_realisations, n_periods, m, n_lines]."""
-    periods = error.shape[1]
-    return _products(error - error.mean(axis=1, keepdims=True)) / (periods * (periods - 1)) if periods > 1 else None
-
-
-def _total_covariance(error: Complex, inputs: int) -> Complex | None:
-    """The same from the scatter of blocks of as many realisations as inputs."""
-    means = error.mean(axis=1)
-    blocks = means.reshape(-1, inputs, *means.shape[1:]).sum(axis=1)[:, None]
-    count = blocks.shape[0]
-    return _products(blocks) * (count / (count - 1)) if count > 1 else None
-
-
-def _products(samples: Complex) -> Complex:
-    """Sum of ``x x^H`` over the first two axes, complex[n_lines, m, m]."""
-    columns = np.moveaxis(samples.reshape(-1, *samples.shape[2:]), 0, -1).swapaxes(0, 1)
-    return np.asarray(columns @ np.conj(columns.swapaxes(1, 2)))
-
-
-def _mixed(outputs: list[Channel]) -> list[str]:
-    """A note on outputs that are different motions."""
-    motions = {channel.name: channel.motion for channel in outputs if channel.role in ("drive", "response")}
-    if len(set(motions.values())) < 2:
-        return []
-    named = ", ".join(f"{name} {motion}" for name, motion in motions.items())
-    return [f"outputs are different motions ({named}): their responses do not compare"]
-
-
-def _notes(error: Complex, inputs: int) -> list[str]:
-    """What is missing of the covariances, and why."""
-    realisations, periods, paths = error.shape[:3]
-    blocks = realisations // inputs
-    plural = "s" if blocks > 1 else ""
-    scatter = f"{blocks} realisation{plural}" if inputs == 1 else f"{blocks} block{plural} of {inputs} realisations"
-    found = []
-    for name, rank, reason in (
-        ("noise", realisations * (periods - 1), f"{realisations} x {periods} period{'s' if periods > 1 else ''}"),
-        ("total", blocks - 1, scatter),
-    ):
-        if rank == 0:
-            found.append(f"{name} covariance unknown: {reason} only")
-        elif rank < paths:
-            found.append(f"{name} covariance of {paths} paths has rank {rank} ({reason}): single paths only")
-    return found
+        where = spectra.frequency_hz[spectra.excited][int(np.argmax(dependent))]
+        raise IdentificationError(f"inputs: depend on each other at {where:g} Hz, their shares cannot be separated")
+    found = np.einsum("ki,kij,kj->k", cross, np.linalg.inv(powers), np.conj(cross)).real
+    return np.asarray(np.clip(found, 0.0, 1.0))

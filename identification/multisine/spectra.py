@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.channels import Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.multisine.design import MultisineDesign
+from identification.multisine.estimators import estimated_responses
 from identification.validation import finite_array
 
 __all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
@@ -67,7 +68,7 @@ class PeriodicSpectra:
         complex[n_realisations, n_periods, n_channels, n_lines], peak, in the unit of each channel: ``y = Re sum Y_k
         exp(2 pi i f_k t)`` with t from the start of the period.
     notes
-        What a user should know about these numbers, one line each.
+        Notes for the user, one line each.
 
     Raises
     ------
@@ -146,10 +147,16 @@ class PeriodicSpectra:
         One path of `best_linear_approximation`. Raises `IdentificationError` where a channel is missing or the instrument
         does not move the input at a line.
         """
-        from identification.multisine.best_linear_approximation import best_linear_approximation
-
         force = input if input is not None else self.channels[find_role(self.channels, "force")].name
-        found = best_linear_approximation(self, outputs=(output,), inputs=(force,), instruments=(instrument,))
+        found = estimated_responses(
+            self.channels,
+            self.frequency_hz[self.excited],
+            self.spectra[..., self.excited],
+            outputs=(output,),
+            inputs=(force,),
+            estimator="instrument",
+            instruments=(instrument,),
+        )
         return InstrumentResponse(
             frequency_hz=found.frequency_hz,
             value=found.path(output),

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from identification.backbones import Backbone
 from identification.errors import IdentificationError
+from identification.linear.mode_shapes import ModeShapes, mac
 from identification.linear.modes import LinearModes
-from identification.nonlinear.mode_shapes import ModeShapes, mac
 
 __all__ = ["shapes_for"]
 

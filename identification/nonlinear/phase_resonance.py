@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 from identification.backbones import Backbone
 from identification.channels import find_role
 from identification.errors import IdentificationError
+from identification.linear.mode_shapes import ModeShapes
 from identification.linear.modes import LinearModes
 from identification.measurements import PeriodicVibration, wrapped_deg
 from identification.nonlinear.basis import shapes_for
-from identification.nonlinear.mode_shapes import ModeShapes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.nonlinear.properties import States, properties
 from identification.nonlinear.uncertainty import ErrorModel, propagated

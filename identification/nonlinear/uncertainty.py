@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from identification.backbones import Backbone
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
+from identification.linear.mode_shapes import ModeShapes
 from identification.measurements import PeriodicVibration
-from identification.nonlinear.mode_shapes import ModeShapes
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
 from identification.nonlinear.properties import States, properties
 from identification.signals.fourier import batches_of

@@ -1,9 +1,10 @@
-"""Best linear approximation of experiments, where the identification of a nonlinear state-space model begins.
+"""Best linear approximation of the periodic experiments, from which a nonlinear state-space model is identified.
 
-Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 3 and 4; the estimate itself is
-that of `identification.multisine.best_linear_approximation`.
+Experiments are checked first: whether they are periodic and settled. Pintelon and Schoukens, *System Identification: A
+Frequency Domain Approach*, 2nd ed., chapters 3 and 4; the estimate is `identification.multisine.best_linear_approximation`.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,16 +16,76 @@ from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.spectra import PeriodicSpectra
-from identification.pnlss.experiment import Experiment
-from identification.pnlss.experiment_groups import excited_band, same_channels
-from identification.pnlss.periods import periodic_ones
+from identification.pnlss.experiment import Experiment, excited_band, same_channels
 
-__all__ = ["best_linear_responses"]
+__all__ = ["best_linear_responses", "check_periodic", "periodic_ones"]
 
 Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
 
+_DIFFERENCE = 0.3
+"""Largest RMS difference of two periods relative to the signal; a larger one is not noise, or noise that hides the signal."""
+_SETTLED_PART = 32
+"""Just before the counted part, 1/32 of a period is compared with the same part one period later."""
 _EXCITED = 1e-2
-"""Amplitude of a line, relative to the strongest of the same input, from which on it counts as excited."""
+"""A line counts as excited above this share of the strongest line of the same input."""
+
+
+def periodic_ones(experiments: Sequence[Experiment]) -> tuple[list[Experiment], tuple[str, ...]]:
+    """The periodic experiments of the commonest period, checked, and notes on those that are left out.
+
+    Experiments that are not periodic are left out without a note. Raises `IdentificationError` where none is periodic, and
+    where one is not what it claims (`check_periodic`).
+    """
+    claimed = [experiment for experiment in experiments if experiment.period_samples]
+    if not claimed:
+        raise IdentificationError(
+            "experiments: none is periodic, which the best linear approximation needs; add multisine periods "
+            "(period_samples), or give a linear model to begin from"
+        )
+    for index, experiment in enumerate(claimed):
+        check_periodic(experiment, experiment.name or f"periodic one number {index + 1}")
+    samples: Counter[int] = Counter()
+    for experiment in claimed:
+        samples[experiment.period_samples] += experiment.counted
+    period = max(samples, key=lambda size: (samples[size], size))
+    left = len(claimed) - sum(experiment.period_samples == period for experiment in claimed)
+    notes = [f"periodic experiments left out: {left} of other periods than {period} samples"] if left else []
+    return [experiment for experiment in claimed if experiment.period_samples == period], tuple(notes)
+
+
+def check_periodic(experiment: Experiment, name: str) -> None:
+    """Raise `IdentificationError` unless the counted periods repeat each other, and what is just before them repeats too.
+
+    Two neighbouring periods may differ by 0.3 of the signal (RMS, mean removed) in every channel. The last
+    1/32 of a period before the counted part must be as close to the same part one period later: the transient has decayed.
+    """
+    n, begin = experiment.period_samples, experiment.counted_from
+    channels = (*experiment.input_channels, *experiment.output_channels)
+    for channel, signal in zip(channels, np.vstack([experiment.inputs, experiment.outputs]), strict=True):
+        counted = signal[begin:].reshape(-1, n)
+        size = float(np.std(counted))
+        if size == 0.0:
+            continue
+        if len(counted) > 1:
+            difference = np.sqrt(np.mean(np.diff(counted, axis=0) ** 2, axis=1)) / size
+            worst = int(np.argmax(difference))
+            if difference[worst] > _DIFFERENCE:
+                raise IdentificationError(
+                    f"experiment '{name}', channel '{channel.name}': periods {worst + 1} and {worst + 2} of {n} samples "
+                    f"differ by {difference[worst]:.2g} of the signal's RMS, allowed is {_DIFFERENCE:g}; count later, "
+                    "settled periods, check period_samples, or set it to 0 (not periodic)"
+                )
+        reach = min(begin, max(n // _SETTLED_PART, 1))
+        if reach:
+            off = float(np.sqrt(np.mean((signal[begin - reach : begin] - counted[0, n - reach :]) ** 2))) / size
+            if off > _DIFFERENCE:
+                raise IdentificationError(
+                    f"experiment '{name}', channel '{channel.name}': the {reach} samples before sample {begin}, where "
+                    f"counting begins, differ from those a period later by {off:.2g} of the signal's RMS, allowed is "
+                    f"{_DIFFERENCE:g}; count from a settled period, put a repeat of the period ahead "
+                    "(Experiment.periodic), or set period_samples to 0 (not periodic)"
+                )
 
 
 def best_linear_responses(

@@ -10,8 +10,8 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
+from identification.pnlss.many import ModelJob
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.model_jobs import ModelJob
 
 __all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest"]
 
@@ -75,11 +75,11 @@ class ErrorCell:
         return self.range_use > 1.0
 
     def row(self) -> dict[str, Any]:
-        """The numbers by name, ready for JSON: None for what there is none of."""
+        """Numbers by name, ready for JSON; None for numbers that are not finite."""
         return {name: value if np.isfinite(value) else None for name, value in vars(self).items()}
 
     def __str__(self) -> str:
-        """As the paper writes it: mean and, in brackets, deviation; what is unbounded is counted and not called unstable.
+        """Mean and, in brackets, standard deviation, as in the paper; unbounded runs are counted and not called unstable.
 
         An asterisk says that a bounded run went beyond the range of the training data.
         """

@@ -1,4 +1,4 @@
-"""How far simulations of a model are from experiments, and whether it was asked beyond what it knows."""
+"""Errors of a model simulated with the inputs of experiments, its use of the trained range, and initial states."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.checks import belongs, check_not_zero
-from identification.pnlss.fitting.initial_states import SAMPLES, fitted_initial_state
 from identification.pnlss.fitting.parameters import Parameters
-from identification.pnlss.fitting.records import records_of
+from identification.pnlss.fitting.records import SAMPLES, fitted_initial_state, records_of
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.simulation import Simulation
+from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun
 from identification.validation import read_only
 
-__all__ = ["PnlssErrors", "estimated_initial_state", "pnlss_errors"]
+__all__ = ["PnlssErrors", "error_spectra", "estimated_initial_state", "pnlss_errors", "simulated_run"]
 
 Float = NDArray[np.float64]
 
 _ENOUGH = 1e3
-"""Growth of what outputs see of the states, relative to the largest before, that ends the search for their sizes."""
+"""The search for sizes of states ends once the outputs' response to them exceeds this multiple of the largest so far."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,7 +70,7 @@ class PnlssErrors:
 
 
 def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, samples: int = SAMPLES) -> PnlssErrors:
-    """Simulate each experiment and compare; initial states that are to be estimated are so from the first ``samples``.
+    """Simulate each experiment and compare; initial states are estimated from the first ``samples`` where asked for.
 
     Raises `IdentificationError` on experiments of other channels or another sample rate, none at all, an output that is zero
     where it counts.
@@ -105,11 +106,93 @@ def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, sample
     )
 
 
+def simulated_run(
+    model: PnlssModel, experiment: Experiment, *, initial_state: Float | None = None, use: str = "test"
+) -> SimulatedRun:
+    """Simulate an experiment from rest, or from ``initial_state``; it is estimated where the experiment asks for it.
+
+    Raises `IdentificationError` where the channels or rates of the two differ, and where an output is zero where it counts.
+    """
+    check_channels(model, experiment)
+    check_not_zero(experiment, f"experiment '{experiment.name}'")
+    run = _simulated(model, experiment, initial_state)
+    measured = experiment.counted_outputs
+    size = np.linalg.norm(measured, axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.linalg.norm(run.outputs[:, experiment.counted_from :] - measured, axis=1) / size
+    at = run.unbounded_at
+    return SimulatedRun(
+        name=experiment.name,
+        level=experiment.level,
+        outputs=tuple(channel.name for channel in experiment.output_channels),
+        error=error if at is None else np.full(error.size, np.inf),
+        range_use=run.range_use,
+        unbounded_at_s=None if at is None else at / experiment.sample_rate_hz,
+        use=use,
+    )
+
+
+def error_spectra(model: PnlssModel, linear: PnlssModel | None, experiment: Experiment) -> ErrorSpectra:
+    """Amplitudes by line of a periodic experiment: the measurement, the errors of a model and of its linear start.
+
+    Raises `IdentificationError` for an experiment that is not periodic.
+    """
+    period = experiment.period_samples
+    if not period:
+        raise IdentificationError(f"experiment '{experiment.name}': is not periodic and has no lines")
+
+    def lines(values: Float) -> Float:
+        mean = values.reshape(values.shape[0], -1, period).mean(axis=1)
+        return np.abs(np.fft.rfft(mean, axis=1))[:, 1 : (period + 1) // 2] * (2.0 / period)
+
+    def error(one: PnlssModel | None) -> Float:
+        run = None if one is None else _simulated(one, experiment, None)
+        if run is None or not run.bounded:
+            return np.full(measured.shape, np.nan)
+        return lines(run.outputs[:, experiment.counted_from :] - experiment.counted_outputs)
+
+    measured = lines(experiment.counted_outputs)
+    return ErrorSpectra(
+        name=experiment.name,
+        outputs=tuple(channel.name for channel in experiment.output_channels),
+        frequency_hz=np.arange(1, measured.shape[1] + 1) * experiment.sample_rate_hz / period,
+        measured=measured,
+        linear_error=error(linear),
+        error=error(model),
+    )
+
+
+def _simulated(model: PnlssModel, experiment: Experiment, initial_state: Float | None) -> Simulation:
+    check_channels(model, experiment)
+    if initial_state is None and experiment.initial_state == "estimated":
+        initial_state = estimated_initial_state(model, experiment)
+    return model.simulate(experiment.inputs, initial_state=initial_state)
+
+
+def check_channels(model: PnlssModel, experiment: Experiment) -> None:
+    """Raise `IdentificationError` unless the experiment has the model's channels and rate."""
+    for what, mine, theirs in (
+        ("inputs", model.inputs, experiment.input_channels),
+        ("outputs", model.outputs, experiment.output_channels),
+    ):
+        names: Sequence[str] = [channel.name for channel in mine]
+        others = [channel.name for channel in theirs]
+        if names != others:
+            raise IdentificationError(
+                f"experiment '{experiment.name}': {what} are {', '.join(others)}, the model's {', '.join(names)}"
+            )
+    if abs(model.sample_rate_hz / experiment.sample_rate_hz - 1.0) > 1e-9:
+        raise IdentificationError(
+            f"experiment '{experiment.name}': sampled at {experiment.sample_rate_hz:g} Hz, the model at "
+            f"{model.sample_rate_hz:g} Hz"
+        )
+
+
 def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, samples: int = SAMPLES) -> Float:
     """float[n_states] before the first sample, by least squares on the first ``samples`` that count, each output over its RMS.
 
-    What outputs do not tell of stays near zero, in states of which each alone moves the outputs alike: whatever the units of
-    the states are, and whether or not their range is known.
+    Combinations of states that the outputs do not show stay near zero. The states are scaled for this so that each alone
+    moves the outputs alike, so the result depends neither on the units of the states nor on a known range.
 
     Raises `IdentificationError` on other channels, another sample rate, too few samples.
     """
@@ -132,7 +215,7 @@ def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, sample
 def _seen_alike(model: PnlssModel, outputs: Float, samples: int) -> Float:
     """float[n_states]: sizes at which each state alone, near rest, makes an output reach its own size within so many samples.
 
-    Of a state that outputs do not see its range; where that is unknown, the smallest size of the others.
+    For a state that no output shows: its trained range or, where that is unknown, the smallest size of the others.
     """
     rest = np.zeros((model.states + len(model.inputs), 1))
     by_state, by_output = (

@@ -11,7 +11,7 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
-__all__ = ["Experiment", "InitialState"]
+__all__ = ["Experiment", "InitialState", "excited_band", "same_channels", "same_data"]
 
 Float = NDArray[np.float64]
 InitialState = Literal["zero", "estimated"]
@@ -30,7 +30,7 @@ class Experiment:
     input_channels, output_channels
         One per row.
     counted_from
-        First sample that counts in errors; those before let transients decay: they are simulated and not compared.
+        First sample that counts in errors; earlier ones let transients decay: they are simulated and not compared.
     period_samples
         Samples of a period, of which the counted part holds a whole number; 0 for a record that is not periodic.
     initial_state
@@ -38,14 +38,14 @@ class Experiment:
     weight
         Weight of its squared errors beside those of other experiments.
     name
-        What it is, for tables and messages.
+        Name for tables and messages.
     level
-        Its level (RMS or peak of what was set), by which tables sort; NaN if it has none.
+        Level (RMS or peak as set) by which tables sort; NaN if it has none.
     specimen
-        Name of what was tested.
+        Name of the test specimen.
     excited_hz
-        Lowest and highest frequency that was excited; None if that is unknown. What a structure makes of it beyond, such as
-        harmonics in a measured force, is no excitation.
+        Lowest and highest excited frequency; None if unknown. Frequencies that the structure adds, such as harmonics in a
+        measured force, do not count.
 
     Raises
     ------
@@ -121,9 +121,9 @@ class Experiment:
         specimen: str = "",
         excited_hz: tuple[float, float] | None = None,
     ) -> "Experiment":
-        """One settled period (float[n_channels, n_period]), with so many samples of the period before put ahead of it.
+        """One settled period (float[n_channels, n_period]), preceded by ``transient_samples`` samples of the same period.
 
-        They let the transient of a simulation from rest decay, and are not compared. They may be more than a period.
+        The transient of a simulation from rest decays in these samples, which are not compared. They may exceed a period.
         """
         both: list[Float] = []
         for values in (inputs, outputs):
@@ -160,10 +160,10 @@ class Experiment:
         return np.asarray(self.outputs[:, self.counted_from :])
 
     def averaged(self, *, transient_samples: int | None = None) -> "Experiment":
-        """The mean over the counted periods as one settled period, with so many samples of it put ahead (`periodic`).
+        """The mean over the counted periods as one settled period, preceded by samples of it (`periodic`).
 
-        A fit to it comes to the same as one to all periods, noise being alike in all of them, in a fraction of the time.
-        ``transient_samples`` are as many as counting began after if None. Raises `IdentificationError` if it is not periodic.
+        A fit to the mean gives the same model as a fit to all periods, if these are equally noisy, in a fraction of the time.
+        None for ``transient_samples`` keeps as many as were not counted. Raises `IdentificationError` if it is not periodic.
         """
         if not self.period_samples:
             raise IdentificationError(
@@ -179,10 +179,10 @@ class Experiment:
         return replace(self, inputs=means[0], outputs=means[1], counted_from=ahead)
 
     def with_constant_input(self, value: float = 1.0) -> "Experiment":
-        """The same with one more input, ``constant``, which has one value throughout: what it does makes up for offsets.
+        """The experiment with one more input, ``constant``, of one value throughout, whose effect compensates offsets.
 
-        Offsets of sensors and amplifiers are no small matter to a polynomial, and rarely known well enough to be subtracted.
-        Give it the same value in all experiments, those that are predicted included.
+        Offsets of sensors and amplifiers disturb polynomials much and are rarely known well enough to be subtracted. Give the
+        input the same value in all experiments, predicted ones included.
         """
         return replace(
             self,
@@ -191,5 +191,38 @@ class Experiment:
         )
 
     def weighted(self, weight: float) -> "Experiment":
-        """The same with another weight."""
+        """The experiment with another weight."""
         return replace(self, weight=weight)
+
+
+def excited_band(experiments: Sequence[Experiment]) -> tuple[float, float] | None:
+    """Lowest and highest frequency that any experiment excites; None if no experiment states a band."""
+    bands = [experiment.excited_hz for experiment in experiments if experiment.excited_hz is not None]
+    return (min(low for low, _ in bands), max(high for _, high in bands)) if bands else None
+
+
+def same_data(one: Experiment, other: Experiment) -> bool:
+    """Whether two experiments hold the same samples: one object, or the same file read twice."""
+    if one is other:
+        return True
+    pairs = ((one.inputs, other.inputs), (one.outputs, other.outputs))
+    return all(a.shape == b.shape for a, b in pairs) and all(np.array_equal(a, b) for a, b in pairs)
+
+
+def same_channels(experiments: Sequence[Experiment]) -> None:
+    """Raise `IdentificationError` unless there is at least one and all have the same channels and sample rate."""
+    if not experiments:
+        raise IdentificationError("experiments: none given, needs one at least")
+    first = experiments[0]
+    for index, other in enumerate(experiments):
+        what = f"experiments[{index}]{f' ({other.name})' if other.name else ''}"
+        if abs(other.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
+            raise IdentificationError(
+                f"{what}: sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one"
+            )
+        for name in ("input_channels", "output_channels"):
+            mine, theirs = (tuple(c.name for c in getattr(e, name)) for e in (other, first))
+            if mine != theirs:
+                raise IdentificationError(
+                    f"{what}: {name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}"
+                )

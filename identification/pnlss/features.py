@@ -1,33 +1,53 @@
-"""Nonlinear features of states and inputs: monomials, and saturating functions of linear combinations.
+"""Nonlinear features of states and inputs: monomials, and functions of weighted sums.
 
-A model is linear in what its features give (`identification.pnlss.model`). Simulation and harmonic balance ask the kernels
-`feature_values` and `feature_derivatives` for them; the fit, which needs derivatives at every sample, gathers those of
-monomials beforehand and has those of saturating features in `identification.pnlss.fitting.kernels`. A further kind of feature
-is a further loop in each of these.
-Monomials as in Paduart et al., Automatica 46, 2010; saturating features are the nonlinear feedback of an NL-LFR model
-(Schoukens and Toth, IFAC-PapersOnLine 53, 2020), with tanh.
+A model is linear in its features (`identification.pnlss.model`). Simulation and harmonic balance get values and derivatives
+from the kernels `feature_values` and `feature_derivatives`. The fit needs derivatives at every sample: it gathers those of
+monomials beforehand and computes those of functions in `identification.pnlss.fitting.kernels`.
+
+A feature ``g(w . v + b) - g(b)`` applies a function g to a weighted sum of the variables. A further g is a line in
+`FUNCTIONS` with its code, and a branch with that code in the kernels `function_value` and `function_slope`
+(`identification.pnlss.kernels`); simulation, fit, harmonic balance, files and names take it from there.
+
+Monomials are those of Paduart et al., Automatica 46, 2010. With tanh the functions saturate, as the nonlinear feedback of an
+NL-LFR model does (Schoukens and Toth, IFAC-PapersOnLine 53, 2020).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.kernels import Table, feature_derivatives, feature_values
+from identification.pnlss.kernels import TANH, Table, feature_derivatives, feature_values
 from identification.validation import finite_array, read_only
 
-__all__ = ["Features"]
+__all__ = ["FUNCTIONS", "FeatureFunction", "Features", "with_weights"]
 
 Float = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+class FeatureFunction(NamedTuple):
+    """A function g of weighted sums."""
+
+    code: int
+    """Its code in the kernels."""
+    of: Callable[[Float], Float]
+    """g of an array, for its values at rest."""
+
+
+FUNCTIONS: dict[str, FeatureFunction] = {
+    "tanh": FeatureFunction(TANH, np.tanh),
+}
+"""Functions by name; the name stands in files and in the names of features."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Features:
-    """Features ``phi(v)`` of the variables ``v = (x, u)``: first monomials, then saturating ones.
+    """Features ``phi(v)`` of the variables ``v = (x, u)``: first monomials, then functions of weighted sums.
 
     Parameters
     ----------
@@ -36,20 +56,24 @@ class Features:
     exponents
         int[n_monomials, variables], powers of each monomial, of degree two at least.
     weights
-        float[n_saturating, variables + 1]: feature ``tanh(w . v + b) - tanh(b)``, zero at rest, b in the last column.
+        float[n_functions, variables + 1]: feature ``g(w . v + b) - g(b)``, zero at rest, b in the last column.
+    functions
+        Name of g in `FUNCTIONS` for every row of ``weights``; empty if all are ``tanh``.
     limits
-        float[variables], magnitude beyond which a variable counts as just that much in monomials; inf for none. With them
-        the features are bounded; the model is the same where no variable is beyond its own.
+        float[variables], magnitude at which monomials hold a variable; inf for none. With limits the features are bounded;
+        within them nothing changes.
 
     Raises
     ------
     IdentificationError
-        On shapes that do not agree, negative powers, monomials below degree two or given twice, limits not above zero.
+        On shapes that do not agree, negative powers, monomials below degree two or given twice, limits not above zero,
+        unknown functions.
     """
 
     variables: int
     exponents: Integers = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
     weights: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    functions: tuple[str, ...] = ()
     limits: Float = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
@@ -66,6 +90,14 @@ class Features:
         if limits.shape != (self.variables,) or not np.all(limits > 0.0):
             raise IdentificationError(f"limits: {limits}, needs {self.variables} values above zero")
         object.__setattr__(self, "limits", read_only(limits, np.float64))
+        functions = tuple(self.functions)
+        object.__setattr__(self, "functions", () if set(functions) <= {"tanh"} else functions)
+        unknown = [name for name in functions if name not in FUNCTIONS]
+        if unknown or len(functions) not in (0, len(self.weights)):
+            raise IdentificationError(
+                f"functions: are {', '.join(functions)} for {len(self.weights)} rows of weights, needs one of "
+                f"{', '.join(FUNCTIONS)} for each"
+            )
         if np.any(self.exponents < 0) or np.any(self.exponents.sum(axis=1) < 2):
             raise IdentificationError("exponents: have a negative power or a degree below 2, which is the linear part")
         if len({tuple(row) for row in self.exponents.tolist()}) < len(self.exponents):
@@ -77,8 +109,8 @@ class Features:
     ) -> "Features":
         """All monomials of the given degrees, of all states and inputs or of the variables ``of`` alone.
 
-        States alone are ``of=range(states)``. Raises `IdentificationError` on a degree below two or a variable that is not
-        there.
+        ``of=range(states)`` selects the states alone. Raises `IdentificationError` on a degree below two or an unknown
+        variable.
         """
         chosen = list(range(states + inputs) if of is None else of)
         wrong = [j for j in chosen if not 0 <= j < states + inputs]
@@ -99,7 +131,7 @@ class Features:
 
     @classmethod
     def saturating(cls, weights: ArrayLike) -> "Features":
-        """``tanh(w . v + b) - tanh(b)`` with weights float[n_saturating, n_variables + 1], b last."""
+        """``tanh(w . v + b) - tanh(b)`` with weights float[n_functions, n_variables + 1], b last."""
         array = finite_array("weights", weights, np.float64, 2)
         return cls(variables=array.shape[1] - 1, weights=array)
 
@@ -110,18 +142,25 @@ class Features:
 
     @property
     def parameters(self) -> int:
-        """Number of parameters inside the features: the weights and biases of saturating ones."""
+        """Number of parameters inside the features: weights and biases."""
         return int(self.weights.size)
 
     @property
     def table(self) -> Table:
-        """The same as the kernels take it."""
+        """The features as the kernels take them."""
         degree = int(self.exponents.sum(axis=1).max(initial=0))
         factors = np.full((len(self.exponents), degree), -1, dtype=np.int64)
         for row, powers in zip(factors, self.exponents, strict=True):
             used = np.repeat(np.arange(self.variables), powers)
             row[: used.size] = used
-        return Table(factors, np.array(self.limits), np.array(self.weights), np.tanh(self.weights[:, -1]))
+        codes = np.array([FUNCTIONS[name].code for name in self._functions], dtype=np.int64)
+        table = Table(factors, np.array(self.limits), self.weights, np.zeros(len(codes)), codes)
+        return with_weights(table, np.array(self.weights))
+
+    @property
+    def _functions(self) -> tuple[str, ...]:
+        """Name of the function of every row of weights."""
+        return self.functions or ("tanh",) * len(self.weights)
 
     def names(self, states: int) -> tuple[str, ...]:
         """One per feature: ``x1^2 x2``, ``u1 x1``, ``tanh 1``."""
@@ -130,7 +169,7 @@ class Features:
         for powers in self.exponents:
             used = [(name, power) for name, power in zip(variables, powers, strict=True) if power]
             found.append(" ".join(name if power == 1 else f"{name}^{power}" for name, power in used))
-        return (*found, *(f"tanh {index + 1}" for index in range(len(self.weights))))
+        return (*found, *(f"{name} {index + 1}" for index, name in enumerate(self._functions)))
 
     def values(self, v: ArrayLike) -> Float:
         """float[n_features, n] at variables float[n_variables, n]."""
@@ -149,9 +188,9 @@ class Features:
         return np.moveaxis(found, 0, -1)
 
     def scaled(self, scale: ArrayLike) -> tuple["Features", Float]:
-        """Features of ``v / scale``, and the factors float[n_features] by which theirs are to be multiplied to be these.
+        """Features of ``v / scale``, and the factors float[n_features] that turn their values into those of these features.
 
-        Raises `IdentificationError` unless there is a scale above zero for every variable.
+        Raises `IdentificationError` unless every variable has a scale above zero.
         """
         size = np.asarray(scale, dtype=float)
         if size.shape != (self.variables,) or not np.all((size > 0.0) & np.isfinite(size)):
@@ -162,7 +201,7 @@ class Features:
         return replace(self, weights=weights, limits=self.limits / size), factors
 
     def bounded(self, limits: ArrayLike) -> "Features":
-        """The same with variables held at ``limits`` (float[n_variables]) in monomials."""
+        """The same features whose monomials hold variables at ``limits`` (float[n_variables])."""
         return replace(self, limits=np.asarray(limits, dtype=float))
 
     def _points(self, v: ArrayLike) -> Float:
@@ -170,3 +209,12 @@ class Features:
         if array.shape[0] != self.variables:
             raise IdentificationError(f"v: shape {array.shape}, needs {self.variables} rows")
         return np.ascontiguousarray(array.T)
+
+
+def with_weights(table: Table, weights: Float) -> Table:
+    """The table with other weights (float[n_functions, n_variables + 1])."""
+    at_rest = np.empty(len(weights))
+    for function in FUNCTIONS.values():
+        own = table.codes == function.code
+        at_rest[own] = function.of(weights[own, -1])
+    return table._replace(weights=weights, at_rest=at_rest)

@@ -2,8 +2,7 @@
 
     x(k+1) = A x(k) + B u(k) + E phi(x(k), u(k)),    y(k) = C x(k) + D u(k) + F chi(x(k), u(k)),
 
-Paduart et al., Automatica 46, 2010; Scheel et al., Eq. (1). What the features phi and chi may be is said in
-`identification.pnlss.features`.
+Paduart et al., Automatica 46, 2010; Scheel et al., Eq. (1). `identification.pnlss.features` lists the features phi and chi.
 """
 
 from collections.abc import Mapping
@@ -17,9 +16,9 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
 from identification.pnlss.features import Features
-from identification.pnlss.kernels import Matrices
+from identification.pnlss.kernels import Matrices, simulate, workspace
 from identification.pnlss.model_arrays import MATRICES, model_arrays, model_values
-from identification.pnlss.simulation import Simulation, simulated_run
+from identification.pnlss.simulation import Simulation, use_of
 from identification.validation import finite_array, positive, read_only
 
 __all__ = ["PnlssModel"]
@@ -27,7 +26,7 @@ __all__ = ["PnlssModel"]
 Float = NDArray[np.float64]
 
 _UNBOUNDED = 1e4
-"""A state this many times the largest of the training data has left every range in which a model says anything."""
+"""A simulation counts as unbounded once a state exceeds this multiple of its largest value in the training data."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -45,15 +44,15 @@ class PnlssModel:
     sample_rate_hz
         Rate of the model.
     inputs, outputs
-        What goes in, and what comes out.
+        Input and output channels.
     state_range, input_range
         float[n_states], float[n_inputs]: largest magnitudes in the training data; NaN if unknown.
     excited_hz
         Band in which the training data was excited; None if unknown.
     training
-        What it was trained on, one line per experiment.
+        Names of the training experiments, one line each.
     specimen
-        Name of what was tested.
+        Name of the test specimen.
     notes
         What a user should know about the model, one line each.
 
@@ -190,14 +189,14 @@ class PnlssModel:
         )
 
     def bounded(self, factor: float = 1.0) -> "PnlssModel":
-        """The same with every variable held at ``factor`` times its range in the monomials.
+        """The same model whose monomials hold every variable at ``factor`` times its trained range.
 
-        Nothing changes inside the range of the training data. Beyond it the features stay finite, and so does a run whose
-        linear part is stable: but bounded is not accurate. Raises `IdentificationError` where the range is unknown.
+        Inside the trained range the model is unchanged. Beyond it the features stay finite, so a simulation stays bounded if
+        the linear part is stable; it need not be accurate. Raises `IdentificationError` where the range is unknown.
         """
         limits = positive("factor", factor) * np.concatenate([self.state_range, self.input_range])
         if not np.all(np.isfinite(limits)):
-            raise IdentificationError("state_range: is unknown, and so where to hold the states")
+            raise IdentificationError("state_range: is unknown, so the states have no limits to be held at")
         return replace(
             self,
             state_features=self.state_features.bounded(limits),
@@ -207,10 +206,27 @@ class PnlssModel:
     def simulate(self, inputs: ArrayLike, *, initial_state: ArrayLike | None = None) -> Simulation:
         """Response to ``inputs`` (float[n_inputs, n]) from an initial state (float[n_states]; rest if None).
 
-        A run that leaves all bounds is no error: it ends there, and `Simulation` says where. Raises `IdentificationError` on
-        NaN or inf, and on shapes that do not agree.
+        A simulation that becomes unbounded ends at that sample, and `Simulation.unbounded_at` records it. Raises
+        `IdentificationError` on NaN or inf, and on shapes that do not agree.
         """
-        return simulated_run(self, inputs, initial_state)
+        u = finite_array("inputs", inputs, np.float64, 2)
+        if u.shape[0] != len(self.inputs):
+            raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
+        begin = np.zeros(self.states) if initial_state is None else initial_state
+        x0 = np.array(finite_array("initial_state", begin, np.float64, 1))
+        if x0.size != self.states:
+            raise IdentificationError(f"initial_state: has {x0.size} values, needs {self.states}")
+        x, y = np.empty((u.shape[1], self.states)), np.empty((u.shape[1], len(self.outputs)))
+        m, tables = self.matrices, (self.state_features.table, self.output_features.table)
+        count = simulate(m, *tables, np.ascontiguousarray(u.T), x0, self.bound, workspace(m), x, y)
+        x[count:], y[count:] = np.nan, np.nan
+        return Simulation(
+            outputs=y.T,
+            states=x.T,
+            state_use=use_of(np.max(np.abs(x[:count]), axis=0, initial=0.0), self.state_range),
+            input_use=use_of(np.max(np.abs(u), axis=1, initial=0.0), self.input_range),
+            unbounded_at=None if count == u.shape[1] else int(count),
+        )
 
     @property
     def bound(self) -> Float:
@@ -219,7 +235,7 @@ class PnlssModel:
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Arrays by name, and the attributes (ready for JSON) that go with them."""
-        return model_arrays(self)
+        return model_arrays(vars(self))
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "PnlssModel":

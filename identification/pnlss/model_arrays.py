@@ -1,16 +1,13 @@
-"""Nonlinear state-space models as arrays and attributes, and back: what files hold."""
+"""Fields of a nonlinear state-space model as arrays and attributes for a file, and back."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.pnlss.features import Features
-
-if TYPE_CHECKING:
-    from identification.pnlss.model import PnlssModel
 
 __all__ = ["MATRICES", "model_arrays", "model_values"]
 
@@ -19,30 +16,33 @@ _FEATURES = ("state_features", "output_features")
 _PARTS = ("exponents", "weights", "limits")
 
 
-def model_arrays(model: "PnlssModel") -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Arrays by name, and the attributes (ready for JSON) that go with them."""
-    arrays: dict[str, NDArray[Any]] = {name: getattr(model, name) for name in (*MATRICES, "state_range", "input_range")}
+def model_arrays(fields: Mapping[str, Any]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Arrays by name and attributes (ready for JSON) from the fields of a `PnlssModel` by name."""
+    arrays: dict[str, NDArray[Any]] = {name: fields[name] for name in (*MATRICES, "state_range", "input_range")}
     for name in _FEATURES:
-        arrays |= {f"{name}/{part}": getattr(getattr(model, name), part) for part in _PARTS}
+        arrays |= {f"{name}/{part}": getattr(fields[name], part) for part in _PARTS}
+    functions = {f"{name}/functions": list(fields[name].functions) for name in _FEATURES if fields[name].functions}
     return arrays, {
-        "sample_rate_hz": model.sample_rate_hz,
-        "inputs": [vars(channel) for channel in model.inputs],
-        "outputs": [vars(channel) for channel in model.outputs],
-        "excited_hz": None if model.excited_hz is None else list(model.excited_hz),
-        "training": list(model.training),
-        "specimen": model.specimen,
-        "notes": list(model.notes),
+        **functions,
+        "sample_rate_hz": fields["sample_rate_hz"],
+        "inputs": [vars(channel) for channel in fields["inputs"]],
+        "outputs": [vars(channel) for channel in fields["outputs"]],
+        "excited_hz": None if fields["excited_hz"] is None else list(fields["excited_hz"]),
+        "training": list(fields["training"]),
+        "specimen": fields["specimen"],
+        "notes": list(fields["notes"]),
     }
 
 
 def model_values(arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """What the model is made with, from what `model_arrays` gave; raises `IdentificationError` if something is missing."""
+    """Inverse of `model_arrays`: fields of a `PnlssModel`; raises `IdentificationError` if something is missing."""
     try:
         values: dict[str, Any] = {name: arrays[name] for name in (*MATRICES, "state_range", "input_range")}
         variables = int(values["a"].shape[0] + values["b"].shape[1])
         for name in _FEATURES:
             parts: dict[str, Any] = {part: arrays[f"{name}/{part}"] for part in _PARTS}
-            values[name] = Features(variables=variables, **parts)
+            functions = tuple(attributes.get(f"{name}/functions", ()))
+            values[name] = Features(variables=variables, functions=functions, **parts)
         for name in ("inputs", "outputs"):
             values[name] = tuple(Channel(**channel) for channel in attributes[name])
         for name in ("training", "notes"):

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
-from identification.prediction.peaks import peak_of
 from identification.prediction.properties import FLAGGED_BEYOND
-from identification.prediction.steady_prediction import SteadyPrediction
+from identification.prediction.steady_prediction import SteadyPrediction, peak_of
 
 __all__ = ["Comparison", "Over", "PredictionError", "compare", "error_table"]
 

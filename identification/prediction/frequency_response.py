@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
-from identification.prediction.motion import fundamental_motion, range_notes
 from identification.prediction.properties import HIGHER_LEVELS, ExtrapolationError, ModalProperties
 from identification.prediction.steady_prediction import SteadyPrediction
-from identification.prediction.steady_states import OneMode, Path
+from identification.prediction.steady_states import OneMode, Path, fundamental_motion, range_notes
 from identification.validation import positive
 
 __all__ = ["HeldForce", "frequency_response", "steady_predictions"]

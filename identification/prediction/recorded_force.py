@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from identification.frequency_responses import FrequencyResponse
 from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
-from identification.prediction.motion import fundamental_motion, range_notes
 from identification.prediction.properties import HIGHER_LEVELS, REFUSED_BEYOND, ExtrapolationError, ModalProperties
 from identification.prediction.steady_prediction import SteadyPrediction
-from identification.prediction.steady_states import OneMode
+from identification.prediction.steady_states import OneMode, fundamental_motion, range_notes
 
 __all__ = ["recorded_force_response"]
 

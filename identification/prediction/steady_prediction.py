@@ -1,4 +1,4 @@
-"""A predicted frequency response at constant force, as data."""
+"""A predicted frequency response at constant force, and the peak of a sampled curve."""
 
 from dataclasses import dataclass
 
@@ -6,12 +6,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.prediction.peaks import peak_of
 
-__all__ = ["Peak", "SteadyPrediction"]
+__all__ = ["Peak", "SteadyPrediction", "peak_of"]
 
-Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_NEAR_THE_TOP = 0.9
+
+
+def peak_of(amplitude: Float, *columns: Float) -> tuple[float, ...]:
+    """Largest amplitude of a curve and the other columns there, by a parabola through the three highest points.
+
+    Points are taken as evenly spaced along the curve. The result is the largest point itself if one of its
+    neighbours is missing, or lies so far below that the curve jumps there or is too coarsely sampled.
+    """
+    top = int(np.argmax(amplitude))
+    values = np.column_stack([amplitude, *columns])
+    if not 0 < top < amplitude.size - 1:
+        return tuple(values[top].tolist())
+    before, here, after = amplitude[top - 1 : top + 2]
+    bend = before - 2.0 * here + after
+    if min(before, after) < _NEAR_THE_TOP * here or bend == 0.0:
+        return tuple(values[top].tolist())
+    shift = 0.5 * (before - after) / bend
+    weights = np.array([0.5 * shift * (shift - 1.0), 1.0 - shift**2, 0.5 * shift * (shift + 1.0)])
+    return tuple((weights @ values[top - 1 : top + 2]).tolist())
 
 
 @dataclass(frozen=True)
@@ -77,7 +97,7 @@ class SteadyPrediction:
 
     @property
     def name(self) -> str:
-        """What was predicted, for tables."""
+        """Label of the prediction for tables."""
         if self.force == "voltage":
             return f"{self.force_n:g} V"
         kind = {"fundamental": "", "rms": " RMS", "pure-sine": " pure sine", "recorded": " recorded"}[self.force]
@@ -106,17 +126,17 @@ class SteadyPrediction:
     def peak(self, channel: str | None = None) -> Peak:
         """Largest amplitude on the main branch, by a parabola through the three highest points.
 
-        Of a response that was cut off it is no peak unless `peak_reached`.
+        If the response was cut off, this is a peak only with `peak_reached`.
         """
         main = self.branch == 0
         columns = (self.amplitude_m(channel), self.frequency_hz, self.phase_lag_deg(channel), self.modal_amplitude)
         return Peak(*peak_of(*(column[main] for column in columns)))
 
     def peak_reached(self, channel: str | None = None, *, order: int = 0) -> bool:
-        """Whether the largest amplitude is a peak: not so where a response was cut off on its way up.
+        """Whether the largest amplitude is a peak, and not the end of a response that was cut off on its way up.
 
-        That is where the largest of all branches, of the displacement differentiated ``order`` times, is the last point of
-        one, or not on the main one, of which alone `peak` tells.
+        It is no peak if the largest value of the displacement differentiated ``order`` times, over all branches, is the last
+        point of a branch, or lies off the main branch, which alone `peak` describes.
         """
         if self.complete:
             return True

@@ -65,7 +65,8 @@ class Subject:
     def notes(self) -> tuple[str, ...]:
         """What holds for every analysis of this bench."""
         scatter = ("the specimen scatters from run to run or by assembly; this is the nominal one, without scatter",)
-        return (*(scatter if self.rig.scatters else ()), *self.remarks)
+        wear = ("the specimen wears within a run; this is the one that a run begins with",)
+        return (*(scatter if self.rig.scatters else ()), *(wear if self.rig.wear.wears else ()), *self.remarks)
 
     def demands(self, responses: PeriodicResponses) -> list[Demand]:
         """What the points ask of the bench, beside what it allows."""

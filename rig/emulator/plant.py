@@ -128,7 +128,8 @@ class VirtualPlant:
 
     def reset(self) -> None:
         """Back to rest, at sample 0, with the noise of the same seed."""
-        self._arrays, self._state = self._rig.build(self._seed)
+        self._realised = self._rig.realised(self._seed)
+        self._arrays, self._state = self._realised.build(self._seed)
         self._loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
         self._first = 0
         self._buffers_for(0)
@@ -143,17 +144,19 @@ class VirtualPlant:
         n = voltages.size
         if self._raised.size != n:
             self._buffers_for(n)
-        exchange_block(
-            self._arrays,
-            self._state,
-            NO_QUEUE,
-            self._first,
-            voltages,
-            self._readings_v,
-            self._raised,
-            self._raised_count,
-            self._loopback,
-        )
+        for arrays, part in self._realised.pieces(self._arrays, self._first, n):
+            self._arrays = arrays
+            exchange_block(
+                self._arrays,
+                self._state,
+                NO_QUEUE,
+                self._first + part.start,
+                voltages[part],
+                self._readings_v[part],
+                self._raised[part],
+                self._raised_count,
+                self._loopback,
+            )
         counts, flags = self._counted()
         if self._wiring is not None:
             counts = self._wiring.connect(counts, self._first)

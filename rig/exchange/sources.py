@@ -1,6 +1,6 @@
 """What a file of ours holds, as objects that can be exchanged."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,9 +9,10 @@ import numpy as np
 
 from identification import ModalAnalysis
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.errors import ConfigurationError, RecordingError
 from rig.exchange.time_data import TimeData
-from rig.measurements import backbone, bench_of_recording, frequency_responses, point_rows, response_matrices, sweeps
+from rig.measurements import bench_of_recording, point_rows
 from rig.models.files.files import load
 from rig.models.files.force_surface import MeasuredSurface
 from rig.models.files.pnlss import IdentifiedPnlss
@@ -44,9 +45,9 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     if data not in DATA:
         raise ConfigurationError(f"`data` = {data!r}: allowed is {' or '.join(DATA)}")
     kind = kind_of(path)
-    if kind in _RESULTS:
+    if kind in CAMPAIGNS:
         with Recording(path) as recording:
-            return _time_data(recording, points) if data == "time" else _RESULTS[kind](recording)
+            return _time_data(recording, points) if data == "time" else CAMPAIGNS[kind].exchanged(recording)
     if data == "time" or points:
         raise RecordingError(f"{path}: holds a {kind}; samples of points are in recordings")
     found = load(path)
@@ -57,17 +58,6 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     if isinstance(found, ModalAnalysis):
         return [found.modes] if found.responses is None else [found.modes, found.responses]
     return [found]
-
-
-_RESULTS: dict[str, Callable[[Recording], list[Any]]] = {
-    "backbone": lambda recording: [backbone(recording)],
-    "stepped-phase": lambda recording: [frequency_responses(recording)],
-    "continuous-backbone": lambda recording: [backbone(recording)],
-    "stepped-sine": lambda recording: [frequency_responses(recording)],
-    "response-controlled": lambda recording: [frequency_responses(recording)],
-    "multisine": lambda recording: list(response_matrices(recording).values()),
-    "sweep": lambda recording: list(sweeps(recording).values()),
-}
 
 
 def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:

@@ -8,7 +8,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["MAIN", "REJECTED", "SECOND", "STYLE", "TRACE_BINS", "engineering", "plain_log", "say_why_empty", "title"]
+__all__ = [
+    "MAIN",
+    "REJECTED",
+    "SECOND",
+    "STYLE",
+    "TRACE_BINS",
+    "engineering",
+    "plain_log",
+    "say_why_empty",
+    "title",
+    "unit_text",
+]
 
 MAIN, SECOND, REJECTED = "#1f4e79", "#c0504d", "#9a9a9a"
 STYLE: dict[Any, Any] = {
@@ -42,8 +53,14 @@ def say_why_empty(axis: "Axes", text: str) -> None:
 
 
 def title(page: "Figure", text: str) -> None:
-    """Title at the top left."""
-    page.suptitle(text, fontsize=11, x=0.01, ha="left")
+    """Title at the top left; none where there is no text."""
+    if text:
+        page.suptitle(text, fontsize=11, x=0.01, ha="left")
+
+
+def unit_text(unit: str) -> str:
+    """A unit as it stands at an axis."""
+    return {"m/s2": "m/s²", "m/s^2": "m/s²"}.get(unit, unit)
 
 
 def plain_log(axis: "Axes") -> None:

@@ -1,9 +1,7 @@
 """Recordings as measurements in memory, the form that `identification` takes."""
 
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Any, cast
 
 from identification import (
     Backbone,
@@ -11,22 +9,14 @@ from identification import (
     ForceSurface,
     FrequencyResponse,
     FrequencyResponseMatrix,
-    IdentificationError,
     PeriodicSpectra,
     Transient,
-    best_linear_approximation,
 )
 from identification import force_surface as surface_of
 from identification.multisine.best_linear_approximation import Estimator
-from rig.bench import Bench
-from rig.bench.configuration import validated
-from rig.campaigns.backbone.plan import BackbonePlan
-from rig.campaigns.backbone.points import backbone_of
-from rig.campaigns.continuous_backbone.points import continuous_backbones_of
-from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.multisine.points import spectra_of
-from rig.campaigns.stepped_sine.points import frequency_responses_of
-from rig.campaigns.sweep.points import transient_of
+from rig.campaigns.dwell.campaign import DwellCourse
+from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows
+from rig.campaigns.kinds import KINDS, kinds_that_yield
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
@@ -36,6 +26,7 @@ __all__ = [
     "backbone",
     "bench_of_recording",
     "continuous_backbones",
+    "dwell_course",
     "force_surface",
     "frequency_responses",
     "load_backbone",
@@ -45,7 +36,7 @@ __all__ = [
     "sweeps",
 ]
 
-STEPPED = ("stepped-sine", "stepped-phase", "response-controlled")
+STEPPED = kinds_that_yield(FrequencyResponse)
 """Kinds of recordings that hold frequency responses, one per level."""
 
 
@@ -56,22 +47,7 @@ def backbone(recording: Recording) -> Backbone:
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
-    if recording.kind == "continuous-backbone":
-        passes = continuous_backbones(recording)
-        points = [point for one in passes for point in one.backbone.points]
-        repeats = [number for number, one in enumerate(passes, 1) for _ in one.backbone.points]
-        first = passes[0].backbone
-        return Backbone(tuple(points), first.specimen, first.drive_mode_shape, repeats=tuple(repeats))
-    _expect(recording, "backbone")
-    bench = bench_of_recording(recording)
-    plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
-    return backbone_of(
-        recording.latest.values(),
-        recording.channels,
-        bench.specimen.name,
-        bench.specimen.drive_mode_shape,
-        plan.controller.phase_lag_deg + 180.0,
-    )
+    return cast(Backbone, _measured(recording, Backbone))
 
 
 def continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
@@ -79,11 +55,7 @@ def continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
-    _expect(recording, "continuous-backbone")
-    specimen = bench_of_recording(recording).specimen
-    return continuous_backbones_of(
-        recording.latest.values(), recording.channels, specimen.name, specimen.drive_mode_shape
-    )
+    return cast(tuple[ContinuousBackbone, ...], _measured(recording, ContinuousBackbone))
 
 
 def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
@@ -92,10 +64,15 @@ def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
     One response per level and pass, in the order of measurement, which for stepped phase is that along the branch. Raises
     `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
     """
-    _expect(recording, *STEPPED)
-    return frequency_responses_of(
-        recording.latest.values(), recording.channels, bench_of_recording(recording).specimen.name
-    )
+    return cast(tuple[FrequencyResponse, ...], _measured(recording, FrequencyResponse))
+
+
+def dwell_course(recording: Recording) -> DwellCourse:
+    """Frequency, damping, amplitude and force of every accepted mean of a dwell, over cycles and time.
+
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any mean.
+    """
+    return cast(DwellCourse, _measured(recording, DwellCourse))
 
 
 def force_surface(recording: Recording) -> ForceSurface:
@@ -112,9 +89,7 @@ def sweeps(recording: Recording) -> dict[int, Transient]:
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any sweep.
     """
-    _expect(recording, "sweep")
-    bench = bench_of_recording(recording)
-    return {number: transient_of(bench, point_rows(recording, number)) for number in _accepted(recording)}
+    return cast(dict[int, Transient], _measured(recording, Transient))
 
 
 def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
@@ -122,19 +97,7 @@ def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
     """
-    _expect(recording, "multisine")
-    bench = bench_of_recording(recording)
-    plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
-    levels: dict[float, dict[int, np.ndarray]] = {}
-    periods: dict[float, int] = {}
-    for number, point in _accepted(recording).items():
-        level = point["level"]
-        levels.setdefault(level, {})[point["realisation"]] = point_rows(recording, number)
-        periods[level] = min(periods.get(level, point["periods"]), point["periods"])  # a change of plan may change them
-    return {
-        level: spectra_of(bench, plan.model_copy(update={"periods": periods[level]}), records)
-        for level, records in levels.items()
-    }
+    return cast(dict[float, PeriodicSpectra], _measured(recording, PeriodicSpectra))
 
 
 def response_matrices(
@@ -144,24 +107,8 @@ def response_matrices(
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
     """
-    specimen = bench_of_recording(recording).specimen.name
-    return {
-        level: best_linear_approximation(measured, estimator=estimator, specimen=specimen)
-        for level, measured in spectra(recording).items()
-    }
-
-
-def point_rows(recording: Recording, number: int) -> np.ndarray:
-    """All recorded rows of a point: structured array, inputs in SI units (`rig.tick.layout.recorded_row`).
-
-    Raises `RecordingError` where there is no such point or nothing was recorded of it.
-    """
-    for part in reversed(recording.parts):
-        for point in part.points:
-            if point["number"] == number and "end_sample" in point:
-                return part.read(point["first_sample"], point["end_sample"])
-    known = {**recording.latest, **recording.former}
-    raise RecordingError(f"point {number}: nothing was recorded of it; points {sorted(known)} are known")
+    found = _measured(recording, FrequencyResponseMatrix, estimator=estimator)
+    return cast(dict[float, FrequencyResponseMatrix], found)
 
 
 def load_backbone(path: Path) -> Backbone:
@@ -170,19 +117,9 @@ def load_backbone(path: Path) -> Backbone:
         return backbone(recording)
 
 
-def _expect(recording: Recording, *kinds: str) -> None:
-    if recording.kind not in kinds:
-        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {' or a '.join(kinds)}")
-
-
-def bench_of_recording(recording: Recording) -> Bench:
-    """The bench as it was."""
-    return validated(Bench, recording.configuration["bench"], "bench of the recording")
-
-
-def _accepted(recording: Recording) -> dict[int, dict[str, Any]]:
-    """The accepted points that the plan in force asks for, by number, in its order."""
-    accepted = {number: point for number, point in recording.latest.items() if point["accepted"]}
-    if not accepted:
-        raise IdentificationError("points: none of the recording was accepted")
-    return accepted
+def _measured(recording: Recording, measurement: type, **options: Any) -> Any:
+    campaign = KINDS.get(recording.kind)
+    if campaign is None or measurement not in campaign.measurements:
+        wanted = " or a ".join(kinds_that_yield(measurement))
+        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {wanted}")
+    return campaign.measurements[measurement](recording, **options)

@@ -108,7 +108,7 @@ def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, An
     busy, wall = sum(loop["busy_s"] for loop in loops), sum(loop["wall_s"] for loop in loops)
     samples = sum(loop["samples"] for loop in loops)
     return {
-        "samples": rows,
+        "samples": max(rows, samples),  # of a dwell not every row is stored; of a killed part only its rows are known
         "sample_rate_hz": rate_hz,
         "overruns": sum(loop["overruns"] for loop in loops),
         "periods": sum(loop["periods"] for loop in loops),

@@ -1,6 +1,5 @@
 """Analysis without a test: frequency responses, and periodic vibrations of the coupled rig by harmonic balance."""
 
-from simulators.analysis.errors import NotConvergedError
 from simulators.analysis.frequency_responses import FrequencyResponses, frequency_response
 from simulators.analysis.harmonic_balance import (
     constant_displacement_response,
@@ -8,8 +7,8 @@ from simulators.analysis.harmonic_balance import (
     forced_response,
     phase_resonance_backbone,
 )
-from simulators.analysis.hysteresis import hysteresis_loops
-from simulators.analysis.responses import HysteresisLoop, PeriodicResponses
+from simulators.analysis.responses import HysteresisLoop, NotConvergedError, PeriodicResponses
+from simulators.analysis.site_forces import hysteresis_loops
 
 __all__ = [
     "FrequencyResponses",

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from simulators.analysis.condensed import CondensedRig, CondensedStructure
 from simulators.analysis.conditions import Conditions
-from simulators.analysis.errors import NotConvergedError
-from simulators.analysis.series import Series
-from simulators.analysis.site_forces import SiteForces
+from simulators.analysis.responses import NotConvergedError
+from simulators.analysis.site_forces import Series, SiteForces
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["Balance", "Solution"]
@@ -50,10 +49,10 @@ class Solution:
             raise NotConvergedError(f"the path has no direction at {self.conditions}") from None
 
     def stable(self, *, under_voltage: bool = False) -> bool:
-        """Static stability of the fundamental where frequency and level stand still, the loop open.
+        """Static stability of the fundamental at constant frequency and level, without a loop.
 
         The determinant of the equations at a given frequency is positive at rest and changes its sign at every fold.
-        ``under_voltage``: with the voltage in the place of what was held.
+        ``under_voltage``: at constant voltage instead of the held quantity.
         """
         if under_voltage:
             left = self.jacobian[:-2, :-2]
@@ -86,8 +85,7 @@ class Balance:
     def responses(self, unknowns: Real) -> tuple[Complex, Complex, Real]:
         """Site coordinates, force and drive displacement that the site forces cause [n_site + 2, H + 1].
 
-        Also their Jacobian [n_site + 2, H + 1, len(y)], and the sizes of the contributions that they are sums of
-        [n_site + 2].
+        Also their Jacobian [n_site + 2, H + 1, len(y)], and the sizes of the contributions to each sum [n_site + 2].
         """
         series, n = self.series, self.n_site
         omega, voltage = unknowns[-2], unknowns[-1]
@@ -118,7 +116,7 @@ class Balance:
         return value, jacobian, scale
 
     def solve(self, start: Real, conditions: Conditions) -> Solution:
-        """Newton's method with steps halved until the residual falls; `NotConvergedError` where it does not arrive."""
+        """Newton's method with steps halved until the residual falls; raises `NotConvergedError` if it does not converge."""
         with np.errstate(all="ignore"):  # what is not finite is refused, and a trial may go far
             return self._solve(start, conditions)
 
@@ -147,7 +145,7 @@ class Balance:
         raise NotConvergedError(f"no periodic vibration found at {conditions}")
 
     def _checked(self, solution: Solution) -> Solution:
-        """Refuse the same vibration half a period later, and what is none."""
+        """Refuse the solution that is the same vibration half a period later, and solutions that are no vibration."""
         omega, voltage = solution.unknowns[-2:]
         if omega > 0.0 and voltage > 0.0:
             return solution

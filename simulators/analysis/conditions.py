@@ -1,4 +1,4 @@
-"""What closes the equations of a harmonic balance: a level that is held, and a phase lag or a frequency.
+"""Conditions of a harmonic balance: a level that is held, and a phase lag or a frequency; checks of what a user asks for.
 
 The level is that of the stinger force (peak of its fundamental, or RMS of its harmonics), of the drive point's
 displacement, or of the voltage. Each condition gives one real equation whose residual is relative, and its slopes.
@@ -8,9 +8,21 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Conditions", "Held", "Quantity", "held_force"]
+from simulators.virtual_rig import VirtualRig
+
+__all__ = [
+    "Conditions",
+    "Held",
+    "Quantity",
+    "checked_harmonics",
+    "followed_mode",
+    "held_force",
+    "lags_rad",
+    "levels",
+    "positive",
+]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -23,10 +35,14 @@ _NAMES: dict[Held, tuple[str, str]] = {
     "response": ("response", "m"),
     "voltage": ("voltage", "V"),
 }
+_LAG_LIMITS_DEG = (-179.0, -1.0)
+_SAMPLES_PER_HARMONIC = 4
+_MOVES_A_SITE = 0.01
+"""A mode moves a site if its deflection there exceeds this share of the largest of all modes."""
 
 
 def held_force(quantity: Quantity) -> Held:
-    """What is held where the force is, by its fundamental or by its RMS."""
+    """The condition that holds a force, by its fundamental or its RMS."""
     if quantity not in ("fundamental", "rms"):
         raise ValueError(f"quantity = {quantity!r}: allowed is fundamental or rms")
     return "force" if quantity == "fundamental" else "force-rms"
@@ -41,11 +57,11 @@ class Conditions:
     out, as piezoelectric sensors see none. ``response``: peak of the drive point's displacement, fundamental (m).
     ``voltage``: its amplitude (V)."""
     level: float
-    """Its value."""
+    """Value of the level."""
     at: Literal["lag", "frequency"]
     """Lag ``arg F_1 - arg A_1`` of the drive-point acceleration behind the force (rad), or frequency (rad/s)."""
     value: float
-    """Its value."""
+    """Value of the lag or frequency."""
 
     def halfway_to(self, goal: "Conditions") -> "Conditions":
         """Geometric mean of the levels, arithmetic of lag or frequency."""
@@ -90,3 +106,73 @@ class Conditions:
         """Voltage that a linear rig with these gains (N/V, m/V) needs for the level."""
         gains = {"force": force_per_v, "force-rms": force_per_v / np.sqrt(2.0), "response": drive_per_v, "voltage": 1.0}
         return float(self.level / gains[self.held])
+
+
+def positive(name: str, values: ArrayLike) -> Real:
+    """``values`` as a row of finite numbers above zero."""
+    array = _row(name, values)
+    for value in array[~((array > 0.0) & np.isfinite(array))]:
+        raise ValueError(f"{name} = {value:g}: allowed is above 0")
+    return array
+
+
+def levels(
+    forces_n: ArrayLike | None, voltages_v: ArrayLike | None, amplitudes_m: ArrayLike | None
+) -> tuple[Literal["force", "voltage", "response"], Real]:
+    """The one of the three quantities that is given, and its values."""
+    if forces_n is not None and voltages_v is None and amplitudes_m is None:
+        return "force", positive("forces_n", forces_n)
+    if voltages_v is not None and forces_n is None and amplitudes_m is None:
+        return "voltage", positive("voltages_v", voltages_v)
+    if amplitudes_m is not None and forces_n is None and voltages_v is None:
+        return "response", positive("amplitudes_m", amplitudes_m)
+    raise ValueError("forces_n, voltages_v, amplitudes_m: several or none given, allowed is one of them")
+
+
+def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Real:
+    """Phase lags in radians from degrees."""
+    array = _row(name, values)
+    lowest, highest = _LAG_LIMITS_DEG
+    for value in array[~((array >= lowest) & (array <= highest))]:
+        raise ValueError(f"{name} = {value:g}: allowed is {lowest:g} to {highest:g}")
+    if rising and not np.all(np.diff(array) > 0.0):
+        raise ValueError(f"{name}: not rising, allowed are lags each above the one before")
+    return np.radians(array)
+
+
+def checked_harmonics(harmonics: int, samples: int) -> tuple[int, int]:
+    """Highest harmonic and samples per period; the samples must resolve it and the products of the sites."""
+    for name, value in (("harmonics", harmonics), ("samples", samples)):
+        if not isinstance(value, int | np.integer):
+            raise ValueError(f"{name} = {value!r}: allowed is a whole number")
+    if harmonics < 1:
+        raise ValueError(f"harmonics = {harmonics}: allowed is at least 1")
+    if samples < _SAMPLES_PER_HARMONIC * (harmonics + 1):
+        raise ValueError(
+            f"samples = {samples}: allowed is at least {_SAMPLES_PER_HARMONIC * (harmonics + 1)} for {harmonics} harmonics"
+        )
+    return harmonics, samples
+
+
+def followed_mode(rig: VirtualRig, near_hz: float | None) -> int:
+    """Index of the linear mode nearest to ``near_hz``; without it, of the lowest that moves a nonlinear site."""
+    modes = rig.linear_modes
+    if near_hz is not None:
+        return modes.nearest(float(positive("near_hz", [near_hz])[0]))
+    m = rig.plant.n_mode
+    moved = np.abs(np.vstack([rig.plant.site_rows[:, :m], rig.plant.site_rows[:, m : 2 * m]]) @ modes.vectors)
+    largest = np.max(moved, axis=1, keepdims=True, initial=0.0)
+    taking_part = np.any((moved > _MOVES_A_SITE * largest) & (largest > 0.0), axis=0) & (modes.frequency_hz > 0.0)
+    if np.any(taking_part):
+        return int(np.argmax(taking_part))
+    return int(np.argmax(modes.frequency_hz > 0.0))
+
+
+def _row(name: str, values: ArrayLike) -> Real:
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {values!r}: allowed is a number, or one row of numbers") from None
+    if array.ndim != 1 or array.size == 0:
+        raise ValueError(f"{name}: shape {array.shape}, allowed is one row of at least one number")
+    return array

@@ -1,4 +1,4 @@
-"""Everything that a solved harmonic balance says about the rig."""
+"""Responses of the rig from solutions of its harmonic balance."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from simulators.analysis.balance import Balance, Solution
 from simulators.analysis.condensed import CondensedStructure
 from simulators.analysis.responses import PeriodicResponses
-from simulators.analysis.series import Series
+from simulators.analysis.site_forces import Series
 from simulators.layout import Flag
 from simulators.virtual_rig import VirtualRig
 
@@ -106,7 +106,7 @@ class Evaluation:
         }
 
     def _flags(self, beyond: NDArray[np.bool_], voltage: Real, sensors: Complex) -> NDArray[np.int64]:
-        """What a run of the rig would flag."""
+        """Flags that a run of the rig would raise."""
         rig, series = self.rig, Series(self.balance.series.harmonics, 128)
         converter = rig.converter
         flags = np.where(beyond, int(Flag.LAW_RANGE), 0)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simulators.analysis.inputs import positive
+from simulators.analysis.conditions import positive
 from simulators.plant.assembly import LinearPlant
-from simulators.plant.discretise import phi_matrices
+from simulators.plant.compilation import phi_matrices
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["FrequencyResponses", "frequency_response"]

@@ -14,10 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simulators.analysis.conditions import Conditions, Quantity, held_force
-from simulators.analysis.inputs import lags_rad, levels, positive
+from simulators.analysis.conditions import Conditions, Quantity, held_force, lags_rad, levels, positive
+from simulators.analysis.paths import HARMONICS, SAMPLES, ModePaths
 from simulators.analysis.responses import PeriodicResponses
-from simulators.analysis.study import HARMONICS, SAMPLES, Study
 from simulators.virtual_rig import VirtualRig
 
 __all__ = [
@@ -82,9 +81,9 @@ def phase_resonance_backbone(
     if excitation == "pure-sine" and held == "voltage":
         raise ValueError("voltages_v: allowed with excitation = 'exciter', a pure sine has forces_n")
     lag = float(lags_rad("phase_lag_deg", [phase_lag_deg])[0])
-    study = Study.of(rig, near_hz, harmonics, samples, pure_sine=excitation == "pure-sine")
+    paths = ModePaths.of(rig, near_hz, harmonics, samples, pure_sine=excitation == "pure-sine")
     goals = [Conditions(held_as if held == "force" else held, float(level), "lag", lag) for level in values]
-    return study.evaluation(study.path(goals))
+    return paths.evaluation(paths.path(goals))
 
 
 def constant_force_response(
@@ -127,8 +126,8 @@ def constant_force_response(
     """
     force, held = float(positive("force_n", [force_n])[0]), held_force(quantity)
     lags = _lags(phase_lags_deg)
-    study = Study.of(rig, near_hz, harmonics, samples)
-    return study.over_lags([Conditions(held, force, "lag", float(lag)) for lag in lags])
+    paths = ModePaths.of(rig, near_hz, harmonics, samples)
+    return paths.over_lags([Conditions(held, force, "lag", float(lag)) for lag in lags])
 
 
 def constant_displacement_response(
@@ -166,12 +165,12 @@ def constant_displacement_response(
     amplitude = float(positive("amplitude_m", [amplitude_m])[0])
     if phase_lags_deg is not None and frequencies_hz is not None:
         raise ValueError("phase_lags_deg, frequencies_hz: both given, allowed is one of them")
-    study = Study.of(rig, near_hz, harmonics, samples)
+    paths = ModePaths.of(rig, near_hz, harmonics, samples)
     if frequencies_hz is not None:
         omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
         goals = [Conditions("response", amplitude, "frequency", float(w)) for w in omega]
-        return study.evaluation(study.path(goals))
-    return study.over_lags([Conditions("response", amplitude, "lag", float(lag)) for lag in _lags(phase_lags_deg)])
+        return paths.evaluation(paths.path(goals))
+    return paths.over_lags([Conditions("response", amplitude, "lag", float(lag)) for lag in _lags(phase_lags_deg)])
 
 
 def forced_response(
@@ -209,8 +208,8 @@ def forced_response(
     """
     voltage = float(positive("voltage_v", [voltage_v])[0])
     omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
-    study = Study.of(rig, near_hz, harmonics, samples)
-    return study.evaluation(study.path([Conditions("voltage", voltage, "frequency", float(w)) for w in omega]))
+    paths = ModePaths.of(rig, near_hz, harmonics, samples)
+    return paths.evaluation(paths.path([Conditions("voltage", voltage, "frequency", float(w)) for w in omega]))
 
 
 def _lags(phase_lags_deg: ArrayLike | None) -> NDArray[np.float64]:

@@ -1,28 +1,36 @@
-"""From one periodic vibration to the next: prediction along the tangent, halved where Newton does not arrive."""
+"""Paths of periodic vibrations of one rig: prediction along the tangent, steps halved where Newton does not converge."""
 
 import math
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from simulators.analysis.balance import Balance, Solution
-from simulators.analysis.conditions import Conditions
-from simulators.analysis.errors import NotConvergedError
+from simulators.analysis.conditions import Conditions, checked_harmonics, followed_mode
+from simulators.analysis.evaluation import Evaluation
+from simulators.analysis.responses import NotConvergedError, PeriodicResponses
+from simulators.virtual_rig import VirtualRig
 
-__all__ = ["follow", "from_rest"]
+__all__ = ["HARMONICS", "SAMPLES", "ModePaths", "follow", "from_rest"]
 
-_NEARLY_LINEAR = 1e-3
-"""The first level is approached from this share of it, starting with the vibration of the linear rig."""
+HARMONICS = 15
+SAMPLES = 512
 _RESONANCE_RAD = -0.5 * math.pi
+_NEARLY_LINEAR = 1e-3
+"""Share of the first level at which a path starts, from the vibration of the linear rig."""
 _DEEPEST = 8
 _LARGEST_LAG_STEP = 0.6
 _LARGEST_LEVEL_RATIO = 4.0
-"""Steps of the lag (rad) and of the level beyond which Newton may arrive at another vibration of the same conditions."""
+"""With larger steps of the lag (rad) or the level Newton may converge to another vibration of the same conditions."""
 
 
 def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solution:
-    """The vibration at ``goal`` that a level raised from zero leads to; its lag or frequency is held meanwhile.
+    """The vibration at ``goal`` that is reached from rest as the level rises at constant lag or frequency.
 
-    It starts at ``omega_rad_s``: the frequency of the goal, or that of resonance, from which the lag is then turned. A
-    response is raised at resonance and turned after: away from it takes more force, and there are more vibrations.
+    It starts at ``omega_rad_s``: the frequency of the goal, or that of resonance, from which the lag is then turned. With a
+    held response the level rises at resonance and the lag is turned afterwards, because away from resonance the response takes
+    more force and more vibrations exist.
     """
     low = replace(goal, level=_NEARLY_LINEAR * goal.level)
     if goal.held == "response" and goal.at == "lag":
@@ -34,7 +42,7 @@ def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solutio
 
 
 def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -> Solution:
-    """The vibration at ``goal`` on the branch of ``here``; `NotConvergedError` where the branch does not reach it."""
+    """The vibration at ``goal`` on the branch of ``here``; raises `NotConvergedError` if the branch does not reach it."""
     now = here.conditions
     if _far(now, goal):
         return follow(balance, follow(balance, here, now.halfway_to(goal)), goal)
@@ -51,8 +59,69 @@ def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -
 
 
 def _far(now: Conditions, goal: Conditions) -> bool:
-    """Whether a step is to be halved before it is tried."""
+    """Whether a step is too large to be tried as a whole."""
     ratio = abs(math.log(goal.level / now.level))
     return ratio > math.log(_LARGEST_LEVEL_RATIO) or (
         goal.at == "lag" and abs(goal.value - now.value) > _LARGEST_LAG_STEP
     )
+
+
+@dataclass(frozen=True, eq=False)
+class ModePaths:
+    """Paths of periodic vibrations that belong to one linear mode of a rig."""
+
+    balance: Balance
+    evaluation: Evaluation
+    resonance_rad_s: float
+
+    @classmethod
+    def of(
+        cls, rig: VirtualRig, near_hz: float | None, harmonics: int, samples: int, *, pure_sine: bool = False
+    ) -> "ModePaths":
+        """Paths of the mode nearest to ``near_hz``; the arguments are checked."""
+        balance = Balance(rig, *checked_harmonics(harmonics, samples), pure_sine=pure_sine)
+        mode = followed_mode(rig, near_hz)
+        resonance = 2.0 * np.pi * float(rig.linear_modes.frequency_hz[mode])
+        return cls(balance, Evaluation(rig, balance, mode), resonance)
+
+    def path(self, goals: Sequence[Conditions]) -> list[Solution]:
+        """One vibration per goal; raises `NotConvergedError` with those found before."""
+        solutions, failure = self.tried(goals)
+        if failure is not None:
+            raise NotConvergedError(str(failure), self.evaluation(solutions) if solutions else None) from failure
+        return solutions
+
+    def over_lags(self, goals: Sequence[Conditions]) -> PeriodicResponses:
+        """One vibration per goal (one level, rising lags), followed in both directions from the goal nearest to resonance."""
+        nearest = int(np.argmin([abs(goal.value - _RESONANCE_RAD) for goal in goals]))
+        above, failure = self.tried(goals[nearest:])
+        if not above:
+            raise NotConvergedError(str(failure))
+        below, failed_below = self.tried(goals[:nearest][::-1], above[0])
+        found = self.evaluation([*below[::-1], *above])
+        if failure or failed_below:
+            raise NotConvergedError("; ".join(str(one) for one in (failed_below, failure) if one), found)
+        return found
+
+    def tried(
+        self, goals: Iterable[Conditions], here: Solution | None = None
+    ) -> tuple[list[Solution], NotConvergedError | None]:
+        """Vibrations up to the first that is not found, and its error."""
+        solutions: list[Solution] = []
+        for goal in goals:
+            try:
+                here = self._next(here, goal)
+            except NotConvergedError as failure:
+                asked, ended = str(goal), str(failure)
+                return solutions, failure if asked in ended else NotConvergedError(f"{asked}: {ended}")
+            solutions.append(here)
+        return solutions, None
+
+    def _next(self, here: Solution | None, goal: Conditions) -> Solution:
+        if here is not None:
+            try:
+                return follow(self.balance, here, goal)
+            except NotConvergedError:
+                if goal.at == "lag":
+                    raise
+        return from_rest(self.balance, goal, goal.value if goal.at == "frequency" else self.resonance_rad_s)

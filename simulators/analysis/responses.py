@@ -1,11 +1,11 @@
-"""Periodic vibrations of a coupled rig as data: arrays with one entry per point."""
+"""Periodic vibrations of a coupled rig as data, one entry per point, and the error for those that are not found."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HysteresisLoop", "PeriodicResponses"]
+__all__ = ["HysteresisLoop", "NotConvergedError", "PeriodicResponses"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -36,13 +36,13 @@ class PeriodicResponses:
     damping_ratio: Real
     """Active power of the fundamental ``P_1 = 1/2 Re(F_1 conj(i W X_d1))`` as ``P_1 / (W^2 w q^2)`` [n]."""
     damping_ratio_total_power: Real
-    """The same with the active power of all harmonics [n]."""
+    """Damping ratio with the active power of all harmonics [n]."""
     force_harmonics_n: Complex
     """Stinger force [n, H + 1]."""
     drive_harmonics_m: Complex
     """Displacement of the drive point [n, H + 1]."""
     sensor_harmonics: dict[str, Complex]
-    """What each sensor is exposed to, by channel name [n, H + 1], N or m/s^2."""
+    """True quantity at each sensor, by channel name [n, H + 1], N or m/s^2."""
     point_harmonics_m: dict[str, Complex]
     """Displacement of each named point of the structure [n, H + 1]."""
     site_harmonics: Complex
@@ -50,13 +50,13 @@ class PeriodicResponses:
     site_force_harmonics: Complex
     """Force of each nonlinear site [n, n_site, H + 1], minus the linear part that the linear plant holds."""
     neglected_share: Real
-    """What was left out [n]: RMS of the force harmonics H + 1 to 2 H + 1 that the motion causes, over the fundamental."""
+    """Neglected share [n]: RMS of the force harmonics H + 1 to 2 H + 1 that the motion causes, over the fundamental."""
     flags: NDArray[np.int64]
     """`simulators.layout.Flag` bits [n]: site out of its range, sensor or output clipped (neither clips here)."""
     stable: NDArray[np.bool_] | None = None
-    """Under constant frequency and level, of what was held, by the folds of the curve [n]."""
+    """Stable at constant frequency and constant held level, judged by the folds of the curve [n]."""
     stable_under_voltage: NDArray[np.bool_] | None = None
-    """The same under constant voltage [n]; None where the force itself was imposed."""
+    """Stable at constant frequency and voltage [n]; None where the force itself was imposed."""
     level_slope: Real | None = None
     """``d ln(level) / d ln(U)`` [n] of the level held, at the lag or frequency held; None where the force was imposed.
 
@@ -94,3 +94,14 @@ class HysteresisLoop:
     def dissipated_j(self) -> float:
         """Energy lost per period (J): the area of the loop."""
         return float(np.sum(0.5 * (self.force[1:] + self.force[:-1]) * np.diff(self.coordinate)))
+
+
+class NotConvergedError(ArithmeticError):
+    """No periodic vibration was found at a point asked for: the level is out of reach, or the path ends.
+
+    The message names the point. ``found`` holds the points found before, in the order asked for; None if there are none.
+    """
+
+    def __init__(self, message: str, found: "PeriodicResponses | None" = None) -> None:
+        super().__init__(message)
+        self.found = found

@@ -1,26 +1,71 @@
-"""Forces of all nonlinear sites under a periodic motion: alternating frequency-time (Cameron & Griffin 1989)."""
+"""Forces of all nonlinear sites under a periodic motion: alternating frequency-time (Cameron & Griffin 1989).
 
+The file also holds the Fourier series that this method needs and the hysteresis loops of friction joints that it gives.
+"""
+
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulators.analysis.kernels import friction_over_a_period, memoryless_over_a_period
-from simulators.analysis.series import Series
+from simulators.analysis.responses import HysteresisLoop, PeriodicResponses
 from simulators.plant.sites import local_sites
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["SiteForces", "SiteWaves"]
+__all__ = ["Series", "SiteForces", "SiteWaves", "hysteresis_loops"]
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 _RELATIVE_STEP = 6e-6
 """Half step of the central differences over the size of the motion, near the cube root of the rounding error."""
 _SMALLEST_STEP = 1e-15
 
 
+class Series:
+    """Series ``y(theta) = Re sum_h Y_h exp(i h theta)`` up to harmonic H, sampled N times over a period.
+
+    Its real coefficients are ``[Y_0, Re Y_1 ... Re Y_H, Im Y_1 ... Im Y_H]``, P = 2 H + 1 of them.
+    """
+
+    def __init__(self, harmonics: int, samples: int) -> None:
+        self.harmonics = harmonics
+        self.samples = samples
+        self.size = 2 * harmonics + 1
+        self.orders = np.arange(harmonics + 1)
+
+    @cached_property
+    def basis(self) -> Real:
+        """Samples from coefficients [N, P]."""
+        angles = np.outer(2.0 * np.pi * np.arange(self.samples) / self.samples, self.orders[1:])
+        return np.ascontiguousarray(np.hstack([np.ones((self.samples, 1)), np.cos(angles), -np.sin(angles)]))
+
+    @cached_property
+    def projection(self) -> Real:
+        """Coefficients from samples [P, N]."""
+        projection = self.basis.T * (2.0 / self.samples)
+        projection[0] *= 0.5
+        return np.ascontiguousarray(projection)
+
+    def to_complex(self, coefficients: Real) -> Complex:
+        """Harmonics [n, H + 1, ...] from coefficients [n, P, ...]."""
+        packed = coefficients[:, : self.harmonics + 1].astype(np.complex128)
+        packed[:, 1:] += 1j * coefficients[:, self.harmonics + 1 :]
+        return packed
+
+    def to_real(self, harmonics: Complex) -> Real:
+        """Coefficients [n, P, ...] from harmonics [n, H + 1, ...]."""
+        return np.concatenate([harmonics.real, harmonics[:, 1:].imag], axis=1)
+
+    def waveforms(self, harmonics: Complex) -> Real:
+        """Samples [n, N] from harmonics [n, H + 1]."""
+        return np.asarray(self.to_real(harmonics) @ self.basis.T)
+
+
 class SiteWaves(NamedTuple):
-    """Forces of the sites over one period, and how they change with the coefficients of the motion."""
+    """Forces of the sites over one period, and their derivatives by the coefficients of the motion."""
 
     forces: Real
     """Forces on the structure [n_site, N], minus the linear parts that the linear plant holds."""
@@ -69,3 +114,22 @@ class SiteForces:
         for i, j in zip(*np.nonzero(np.any(slopes, axis=0)), strict=True):
             jacobian[i, :, j] = series.projection @ (slopes[:, i, j, None] * series.basis)
         return bool(beyond)
+
+
+def hysteresis_loops(
+    rig: VirtualRig, responses: PeriodicResponses, point: int, *, samples: int = 512
+) -> tuple[HysteresisLoop, ...]:
+    """Loops of all friction joints of ``rig`` at one point of its responses, in the order of ``rig.friction``."""
+    n_point, _, n_harmonic = responses.site_harmonics.shape
+    if not -n_point <= point < n_point:
+        raise ValueError(f"point = {point}: allowed is {-n_point} to {n_point - 1}")
+    series, sites = Series(n_harmonic - 1, samples), SiteForces(rig)
+    coefficients = series.to_real(responses.site_harmonics[point])
+    first = sites.n_site - len(rig.friction)
+    motion = (coefficients @ series.basis.T)[first:]
+    forces = sites(series, coefficients).forces[first:]
+    loops = []
+    for joint, coordinate, force in zip(rig.friction, motion, forces, strict=True):
+        restoring = joint.stuck_stiffness * coordinate - force
+        loops.append(HysteresisLoop(np.append(coordinate, coordinate[0]), np.append(restoring, restoring[0])))
+    return tuple(loops)

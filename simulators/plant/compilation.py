@@ -1,16 +1,16 @@
-"""The arrays of a virtual rig from its parts."""
+"""The arrays on which the compiled integrator runs, from the parts of a virtual rig; discretisation of the linear plant."""
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from simulators.exciter import Exciter
 from simulators.layout import CHANNEL, CONVERTER, PLANT, RigArrays, RigState
 from simulators.plant.assembly import LinearPlant
-from simulators.plant.discretise import aligned, pad, round_up, step_columns
 from simulators.plant.sites import local_sites
 from simulators.sensing.filters import channel_sections, output_sections, ring_size, skew_taps
 from simulators.sensing.parts import Converter, Sensor
@@ -18,9 +18,90 @@ from simulators.sites.elements import Element
 from simulators.sites.friction import FrictionSite
 from vibrolock.lanes import WIDTH
 
-__all__ = ["at_rest", "jenkins_elements", "rig_arrays"]
+__all__ = [
+    "PhiMatrices",
+    "StepColumns",
+    "aligned",
+    "at_rest",
+    "jenkins_elements",
+    "pad",
+    "phi_matrices",
+    "rediscretised",
+    "rig_arrays",
+    "round_up",
+    "step_columns",
+]
 
 Matrix = NDArray[np.float64]
+
+
+class PhiMatrices(NamedTuple):
+    """The exact linear sub-step."""
+
+    transition: Matrix
+    """``e^{hA}`` [n, n]."""
+    held: Matrix
+    """``h phi_1(hA) B`` [n, n_input]: effect of an input held over the step."""
+    ramp: Matrix
+    """``h phi_2(hA) B`` [n, n_input]: effect of an input that grows linearly from 0 to 1 over the step."""
+
+
+def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrices:
+    """Matrix exponential, phi_1 and phi_2 by one exponential of an augmented matrix (Van Loan 1978).
+
+    ``phi_1(z) = (e^z - 1)/z``, ``phi_2(z) = (e^z - 1 - z)/z^2``, formed without dividing.
+    """
+    n, k = columns.shape
+    augmented = np.zeros((n + 2 * k, n + 2 * k))
+    augmented[:n, :n] = step_s * dynamics
+    augmented[:n, n : n + k] = step_s * columns
+    augmented[n : n + k, n + k :] = np.eye(k)
+    exponential = expm(augmented)
+    return PhiMatrices(exponential[:n, :n], exponential[:n, n : n + k], exponential[:n, n + k :])
+
+
+class StepColumns(NamedTuple):
+    """The sub-step as the kernels run it, padded; rows are ``[joint coordinates, element coordinates, x]``."""
+
+    predictor: Matrix
+    """[n_input, n_row]."""
+    corrector: Matrix
+    """[n_site, n_row]."""
+
+
+def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> StepColumns:
+    """Predictor and corrector, site coordinates folded in as rows of their own.
+
+    Joints are the last ``n_joint`` sites; their coordinates begin at row 0, where whole vectors can be loaded.
+    """
+    columns = np.column_stack([plant.voltage_column, plant.site_columns])
+    phi = phi_matrices(plant.dynamics, columns, step_s)
+    predictor = np.hstack([phi.transition, phi.held])
+    corrector = phi.ramp[:, 1:]
+    fold = np.vstack([np.roll(plant.site_rows, n_joint, axis=0), np.eye(plant.dynamics.shape[0])])
+    return StepColumns(pad((fold @ predictor).T), pad((fold @ corrector).T, rows=False))
+
+
+def pad(matrix: Matrix, *, rows: bool = True) -> Matrix:
+    """Zeros added until both sizes (or the last alone) are multiples of the vector length."""
+    n_row, n_column = matrix.shape
+    padded = aligned((round_up(n_row) if rows else n_row, round_up(n_column)))
+    padded[:n_row, :n_column] = matrix
+    return padded
+
+
+def aligned(shape: int | tuple[int, ...]) -> Matrix:
+    """Zeros that begin where a cache line does, so that no vector of a compiled loop straddles two."""
+    size = int(np.prod(shape))
+    line = WIDTH
+    whole = np.zeros(size + line)
+    skip = (-whole.ctypes.data // whole.itemsize) % line
+    return whole[skip : skip + size].reshape(shape)
+
+
+def round_up(size: int) -> int:
+    """The next multiple of the vector length."""
+    return -(-size // WIDTH) * WIDTH
 
 
 def rig_arrays(
@@ -36,7 +117,7 @@ def rig_arrays(
     seed: int,
 ) -> RigArrays:
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
-    step = step_columns(plant, len(joints), 1.0 / (converter.sample_rate_hz * converter.substeps))
+    step = step_columns(plant, len(joints), _step_s(converter))
     jenkins = jenkins_elements(joints)
     substeps = converter.substeps // converter.oversampling
     sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
@@ -57,6 +138,19 @@ def rig_arrays(
         reconstruction=output_sections(converter),
         taps=taps,
     )
+
+
+def rediscretised(
+    rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Matrix], converter: Converter
+) -> RigArrays:
+    """The arrays of a rig with another plant of the same coordinates and sites; ``outputs``: one row per sensor, of it."""
+    step = step_columns(plant, n_joint, _step_s(converter))
+    return rig._replace(step=step.predictor, correct=step.corrector, sense=pad(np.array(outputs).T))
+
+
+def _step_s(converter: Converter) -> float:
+    """Integration step (s)."""
+    return 1.0 / (converter.sample_rate_hz * converter.substeps)
 
 
 def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:

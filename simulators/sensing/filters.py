@@ -19,6 +19,7 @@ __all__ = [
 ]
 
 Matrix = NDArray[np.float64]
+
 _IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
 
 

@@ -1,4 +1,4 @@
-"""What every beam that is made from its geometry has: material, section, named points, attachments, damping."""
+"""Beams given by their geometry: material, section, named points, lumped masses, supports, damping."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -10,12 +10,40 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive, Several
-from simulators.structures.attachments import LumpedMass, Support
 from simulators.structures.beam import Lump, Quantity, Spring
 
-__all__ = ["MeshedBeam", "check_rising"]
+__all__ = ["LumpedMass", "MeshedBeam", "Support", "check_rising"]
 
+NotNegative = Annotated[float, Field(ge=0.0)]
 Matrix = NDArray[np.float64]
+
+
+class LumpedMass(Part):
+    """A rigid body on a beam: a sensor, a magnet, a bolt."""
+
+    at: str
+    """Name of the point it sits on."""
+    mass_kg: NotNegative
+    """Mass."""
+    inertia_kg_m2: NotNegative = 0.0
+    """Rotary inertia about its point, for rotation in the plane of vibration."""
+
+
+class Support(Part):
+    """A linear elastic support between a point of a beam and the ground: a bungee cord, a soft clamp."""
+
+    at: str
+    """Name of the point that it holds."""
+    stiffness_n_m: NotNegative = 0.0
+    """Stiffness against deflection."""
+    rotational_stiffness_n_m_rad: NotNegative = 0.0
+    """Stiffness against rotation, in N m/rad."""
+
+    @model_validator(mode="after")
+    def _supports(self) -> "Support":
+        if self.stiffness_n_m == 0.0 and self.rotational_stiffness_n_m_rad == 0.0:
+            raise ValueError("stiffness_n_m = 0.0 and rotational_stiffness_n_m_rad = 0.0: allowed is one above 0")
+        return self
 
 
 class Modes(Protocol):
@@ -30,7 +58,7 @@ class Modes(Protocol):
 
 
 class MeshedBeam(Part):
-    """A beam of rectangular section; subclasses say what it is made of and compute its `modes`."""
+    """A beam of rectangular section; subclasses define its parts and compute its `modes`."""
 
     length_m: Positive
     """Length; positions count from 0, the clamped end where there is one."""
@@ -111,7 +139,7 @@ class MeshedBeam(Part):
 
 
 def check_rising(frequencies_hz: Sequence[float]) -> None:
-    """`ValueError` where a frequency is below the one before it: shapes and damping would go with another mode."""
+    """Raise `ValueError` if frequencies do not rise: shapes and damping would belong to another mode."""
     for index, (before_hz, next_hz) in enumerate(pairwise(frequencies_hz), start=1):
         if next_hz < before_hz:
             raise ValueError(f"frequency_hz[{index}] = {next_hz:g}: allowed is from {before_hz:g} on, lowest first")

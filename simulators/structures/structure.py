@@ -9,8 +9,7 @@ from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive, Several
 from simulators.structures.beam import BeamModes, Boundary, Quantity, beam_modes
-from simulators.structures.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
-from simulators.structures.lap_mesh import LapMesh
+from simulators.structures.lap_joint import Interface, LapJointModes, LapMesh, Section, lap_joint_modes
 from simulators.structures.meshed import MeshedBeam, check_rising
 
 __all__ = ["BeamStructure", "LapJointedBeam", "ModalStructure", "Structure"]

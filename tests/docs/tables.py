@@ -14,9 +14,10 @@ from simulators.scatter import Deviation, Scatter
 from simulators.sensing.parts import Converter, Sensor
 from simulators.sites.elements import Clearance, Cubic, Magnet, User
 from simulators.sites.friction import IwanSite, JenkinsSite
-from simulators.structures.attachments import LumpedMass, Support
+from simulators.structures.meshed import LumpedMass, Support
 from simulators.structures.structure import BeamStructure, LapJointedBeam, ModalStructure
 from simulators.virtual_rig import VirtualRig
+from simulators.wear import Wear
 from tests.docs.pages import ROOT
 
 PAGE = ROOT / "docs" / "virtual-rigs.md"
@@ -40,6 +41,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "Converter": Converter,
     "Scatter": Scatter,
     "Deviation": Deviation,
+    "Wear": Wear,
 }
 WORDS = {"string": "text", "boolean": "true, false", "number": "number", "integer": "whole number", "object": "table"}
 

@@ -15,6 +15,7 @@ from rig import errors as rig_errors
 from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
+from rig.campaigns.dwell.plan import DriftLimits, DwellPlan
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plant import PlantFacts
@@ -44,6 +45,8 @@ MODELS = {
     "Keys of a multisine plan": MultisinePlan,
     "Keys of a continuous backbone plan": ContinuousBackbonePlan,
     "Keys of a backbone plan": BackbonePlan,
+    "Keys of a dwell plan": DwellPlan,
+    "Keys of `[alarm]` and `[abort]`": DriftLimits,
     "Keys of `[controller]`": PhaseLockedLoop,
     "Keys of `[controller.lock]`": LockRule,
     "Keys of `[settle]`": SettleRule,
@@ -69,6 +72,7 @@ def keys_under(heading: str) -> dict[str, tuple[str, str]]:
             "user-guide.md",
             "controller.md",
             "campaigns.md",
+            "dwell.md",
             "tuning.md",
             "wire-protocol.md",
             "wire-protocol-can.md",

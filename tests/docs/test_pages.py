@@ -104,7 +104,7 @@ def test_every_kind_of_plan_is_in_the_table_of_kinds():
 
 
 def test_decisions_are_numbered_without_gaps_and_say_context_decision_consequences():
-    records = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    records = sorted((ROOT / "docs" / "decisions").glob("[0-9]*.md"))
     assert [path.name[:5] for path in records] == [f"{number:04d}-" for number in range(1, len(records) + 1)]
     for path in records:
         text = path.read_text(encoding="utf-8")
@@ -114,3 +114,7 @@ def test_decisions_are_numbered_without_gaps_and_say_context_decision_consequenc
             "## Decision",
             "## Consequences",
         ], path.name
+    index = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^- \[(\d{4})\]\(([^)]+)\)", index, re.MULTILINE)) == [
+        (path.name[:4], path.name) for path in records
+    ]

@@ -3,7 +3,7 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from simulators.plant.discretise import phi_matrices
+from simulators.plant.compilation import phi_matrices
 from simulators.simulation import Simulation
 from tests.simulators.references import EquationsOfMotion, ideal
 

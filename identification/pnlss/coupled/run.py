@@ -20,7 +20,7 @@ from identification.pnlss.coupled.reaction import Reaction, chosen_filter
 from identification.pnlss.kernels import workspace
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulation import Simulation, use_of
-from identification.pnlss.steady.excitation import linear_resonance_hz
+from identification.pnlss.steady.setting_up import linear_resonance_hz
 from identification.prediction.exciter import Exciter
 from identification.validation import finite_array, positive
 
@@ -30,11 +30,11 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _LOWEST, _GUESSED = 0.8, 0.5
-"""Of the lowest frequency excited in training, and of the linear resonance where that is unknown."""
+"""Default lowest frequency: share of the lowest trained frequency, or of the linear resonance if that is unknown."""
 _FADED = 0.5
-"""Share of the lowest frequency below which nothing is added to the filter."""
+"""Share of the lowest frequency below which the filter alone makes the reaction."""
 _AFTER_PERIODS = 40
-"""Of the lowest frequency, at zero volts, that are simulated after the end so that it does not come as a shock."""
+"""Periods of the lowest frequency that are simulated at zero volts after the end, so that the end is no jump."""
 _TOLERANCE = 1e-6
 _PASSES = 40
 

@@ -1,17 +1,33 @@
-"""What a fit refuses, before it begins."""
+"""Checks before a fit: data, models and memory it cannot work with are refused."""
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment
-from identification.pnlss.experiment_groups import same_channels, same_data
+from identification.pnlss.best_linear import check_periodic
+from identification.pnlss.experiment import Experiment, same_channels, same_data
+from identification.pnlss.fitting.normal_equations import BLOCK
+from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.periods import check_periodic
 
-__all__ = ["belongs", "check_data", "check_enough", "check_not_zero", "check_resumed", "check_signals"]
+__all__ = [
+    "available_bytes",
+    "belongs",
+    "check_data",
+    "check_enough",
+    "check_memory",
+    "check_not_zero",
+    "check_resumed",
+    "check_signals",
+    "needed_bytes",
+]
+
+_SQUARES = 6
+"""Square matrices of the size of all parameters held at once: normal equations, those of one experiment, eigenvectors, room."""
 
 
 def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
@@ -30,7 +46,7 @@ def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
 
 
 def check_signals(experiments: Sequence[Experiment]) -> None:
-    """Raise `IdentificationError` where experiments have not the same channels, or a channel is zero throughout."""
+    """Raise `IdentificationError` if channels differ between experiments or a channel is zero throughout."""
     same_channels(experiments)
     for kind, rows, channels in (
         ("input", [e.inputs for e in experiments], experiments[0].input_channels),
@@ -44,7 +60,7 @@ def check_signals(experiments: Sequence[Experiment]) -> None:
 
 
 def check_enough(experiments: Sequence[Experiment], parameters: int) -> None:
-    """Raise `IdentificationError` where there are fewer values than parameters."""
+    """Raise `IdentificationError` if there are fewer values than parameters."""
     values = sum(e.counted * len(e.output_channels) for e in experiments)
     if values < parameters:
         raise IdentificationError(
@@ -60,7 +76,7 @@ def check_data(
     parameters: int,
     by_frequency: bool,
 ) -> None:
-    """Raise `IdentificationError` where data and model do not go together or the data cannot tell the parameters."""
+    """Raise `IdentificationError` if data and model do not match or the data cannot determine the parameters."""
     check_signals(experiments)
     if not np.array_equal(start.state_features.limits, start.output_features.limits):
         raise IdentificationError(
@@ -86,7 +102,7 @@ def check_data(
 
 
 def _check_validation(experiments: Sequence[Experiment], validation: Sequence[Experiment]) -> None:
-    """Refuse validation data that is trained on too, or has nothing in an output."""
+    """Refuse validation data that is also training data, or has an output that is zero throughout."""
     for index, one in enumerate(validation):
         twin = next((k for k, other in enumerate(experiments) if same_data(one, other)), None)
         if twin is not None:
@@ -100,7 +116,7 @@ def _check_validation(experiments: Sequence[Experiment], validation: Sequence[Ex
 
 
 def check_not_zero(experiment: Experiment, what: str) -> None:
-    """Raise `IdentificationError` where an output is zero where it counts: no error is relative to that."""
+    """Raise `IdentificationError` if an output is zero where it counts, for relative errors are undefined there."""
     for channel, values in zip(experiment.output_channels, experiment.counted_outputs, strict=True):
         if not np.any(values):
             raise IdentificationError(
@@ -109,7 +125,7 @@ def check_not_zero(experiment: Experiment, what: str) -> None:
 
 
 def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int, validated: bool) -> None:
-    """Raise `IdentificationError` unless a fit of just this structure can go on from ``resume``."""
+    """Raise `IdentificationError` unless ``resume`` is a fit of the same structure and kind of data."""
     for name in ("a", "b", "c", "e", "f"):
         mine, theirs = getattr(start, name).shape, getattr(resume.last, name).shape
         if mine != theirs:
@@ -117,10 +133,9 @@ def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int, validated
                 f"resume: its {name} has shape {theirs}, that of the start {mine}; give the same start"
             )
     for name in ("state_features", "output_features"):
-        if not np.array_equal(getattr(start, name).exponents, getattr(resume.last, name).exponents):
-            raise IdentificationError(
-                f"resume: its {name} are other monomials than those of the start; give the same start"
-            )
+        mine, theirs = getattr(start, name), getattr(resume.last, name)
+        if not np.array_equal(mine.exponents, theirs.exponents) or mine.functions != theirs.functions:
+            raise IdentificationError(f"resume: its {name} differ from those of the start; give the same start")
     if len(resume.last_initial_states) != estimated:
         raise IdentificationError(
             f"resume: has {len(resume.last_initial_states)} estimated initial states, the experiments {estimated}; "
@@ -130,3 +145,46 @@ def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int, validated
     if before != validated:
         had, has = ("validation data" if there else "no validation data" for there in (before, validated))
         raise IdentificationError(f"resume: was fitted with {had}, now there is {has}; give the same validation")
+
+
+def needed_bytes(parameters: Parameters, experiments: Sequence[Experiment], by_frequency: bool) -> dict[str, int]:
+    """Estimate of the peak memory of a fit, by purpose."""
+    outputs = len(parameters.start.outputs)
+    columns = parameters.shared - parameters.start.states * max(parameters.estimated - 1, 0)
+    widest = max(e.inputs.shape[1] for e in experiments)
+    need = {
+        "data": 8 * sum(e.inputs.size + e.outputs.size for e in experiments),
+        "simulation": 8 * widest * (2 * outputs + parameters.start.states),
+        "normal equations": 8 * _SQUARES * parameters.count**2,
+        "blocks": 16 * outputs * BLOCK * columns,
+    }
+    if by_frequency:
+        need["Jacobian of a period"] = 8 * (outputs + 1) * max(e.period_samples for e in experiments) * columns
+    return need
+
+
+def available_bytes() -> int | None:
+    """Memory available to programs, caches included; None if the system does not report it."""
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024 * int(line.split()[1])
+    except OSError:
+        pass
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def check_memory(parameters: Parameters, experiments: Sequence[Experiment], by_frequency: bool) -> None:
+    """Raise `IdentificationError` if a fit needs more memory than is available."""
+    need, there = needed_bytes(parameters, experiments, by_frequency), available_bytes()
+    if there is None or sum(need.values()) <= there:
+        return
+    parts = ", ".join(f"{name} {value / 1e9:.2f}" for name, value in need.items())
+    advice = "leave the frequency weighting out, or " if by_frequency else ""
+    raise IdentificationError(
+        f"memory: the fit needs {sum(need.values()) / 1e9:.2f} GB ({parts}), {there / 1e9:.2f} GB are free; "
+        f"{advice}give shorter experiments or take fewer features"
+    )

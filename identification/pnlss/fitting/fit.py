@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment
-from identification.pnlss.experiment_groups import excited_band
-from identification.pnlss.fitting.checks import check_data, check_resumed
-from identification.pnlss.fitting.initial_states import fitted_initial_state
+from identification.pnlss.experiment import Experiment, excited_band
+from identification.pnlss.fitting.checks import check_data, check_memory, check_resumed
 from identification.pnlss.fitting.levenberg_marquardt import Iterates, iterate
-from identification.pnlss.fitting.memory import check_memory
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.problem import Problem, Scales, scales_of
+from identification.pnlss.fitting.records import fitted_initial_state
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.model import PnlssModel
@@ -28,7 +26,7 @@ __all__ = ["fit_pnlss"]
 Float = NDArray[np.float64]
 
 _HOPELESS = 1e3
-"""A start whose outputs are so many times those measured is no start."""
+"""A start is refused if its outputs exceed this multiple of the measured ones."""
 
 
 def fit_pnlss(
@@ -40,12 +38,12 @@ def fit_pnlss(
     progress: Callable[[FitProgress], None] | None = None,
     resume: PnlssFit | None = None,
 ) -> PnlssFit:
-    """Fit all coefficients of ``start``, the weights in its features, and initial states where those are estimated.
+    """Fit all coefficients of ``start``, the weights in its features, and estimated initial states.
 
     Parameters
     ----------
     start
-        Where to begin, mostly a linear model `with_features`. Its simulation must stay bounded.
+        Initial model, mostly a linear model `with_features`. Its simulation must stay bounded.
     experiments
         Training data.
     validation
@@ -55,18 +53,18 @@ def fit_pnlss(
     progress
         Called after each iteration.
     resume
-        A fit to go on from, of the same start, experiments and settings: it goes on as if it had never stopped. More
-        iterations, or another tolerance or patience, make one go on that had ended.
+        An earlier fit of the same start, experiments and settings, which continues as if it had never stopped. A fit that
+        had ended continues with more iterations, or another tolerance or patience.
 
     Returns
     -------
     PnlssFit
-        Also after Ctrl-C: then with all that was reached, and ``interrupted``.
+        After Ctrl-C the fit reached so far, marked ``interrupted``.
 
     Raises
     ------
     IdentificationError
-        On data and models that do not go together, data that cannot tell the parameters, a start that is not bounded.
+        On data and models that do not match, data that cannot determine the parameters, a start that is not bounded.
     """
     settings = FitSettings() if settings is None else settings
     estimated = sum(e.initial_state == "estimated" for e in experiments)
@@ -102,7 +100,7 @@ def fit_pnlss(
 
 
 def _state_scale(start: PnlssModel, experiments: Sequence[Experiment]) -> Float:
-    """RMS of each state when the start is simulated; raises `IdentificationError` if that gets out of hand."""
+    """RMS of each state of the simulated start; raises `IdentificationError` if it is unbounded or far too large."""
     total, samples = np.zeros(start.states), 0
     for index, experiment in enumerate(experiments):
         run = start.simulate(experiment.inputs)
@@ -124,7 +122,7 @@ def _state_scale(start: PnlssModel, experiments: Sequence[Experiment]) -> Float:
 
 
 def _begin(problem: Problem) -> Iterates:
-    """The start, with initial states from the first samples."""
+    """Iterates at the start, with initial states from the first samples."""
     parameters = problem.parameters
     rest = np.zeros((parameters.estimated, parameters.start.states))
     system = parameters.system(parameters.vector(parameters.start, rest))
@@ -134,14 +132,14 @@ def _begin(problem: Problem) -> Iterates:
 
 
 def _resumed(problem: Problem, scales: Scales, resume: PnlssFit) -> Iterates:
-    """Where a fit stopped."""
+    """Iterates at which an earlier fit stopped."""
     pairs = ((resume.last, resume.last_initial_states), (resume.model, resume.initial_states))
     last, best = (problem.parameters.vector(scales.model(m), begins / scales.states) for m, begins in pairs)
     return Iterates.resumed(last, best, resume.history)
 
 
 def _trained(model: PnlssModel, experiments: Sequence[Experiment], begins: Float) -> PnlssModel:
-    """The model with the range of its training data, and their names."""
+    """The model with the range, band and names of its training data."""
     states, place = np.zeros(model.states), 0
     free = replace(model, state_range=np.full(model.states, np.nan))
     for experiment in experiments:

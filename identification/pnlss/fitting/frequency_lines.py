@@ -15,11 +15,11 @@ __all__ = ["transformed", "with_lines"]
 Float = NDArray[np.float64]
 
 _COLUMNS = 64
-"""Columns transformed at a time: what a transform needs besides the Jacobian stays small."""
+"""Columns transformed at a time, so that a transform needs little memory besides the Jacobian."""
 
 
 def with_lines(records: Sequence[Record], settings: FitSettings, sample_rate_hz: float) -> list[Record]:
-    """The same with weights of lines where the settings ask for them.
+    """The records with weights of lines if the settings ask for them.
 
     Raises `IdentificationError` for a record that is not periodic or has no line that counts.
     """

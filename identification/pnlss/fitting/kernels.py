@@ -1,12 +1,12 @@
 """Compiled sensitivities of a nonlinear state-space model: blocks of its Jacobian by recursion over time.
 
-All but the recursion itself become part of it: handing over bundles of arrays would cost as much as what is done with them.
+All functions but the recursion itself are inlined: passing tuples of arrays would cost as much as the work on them.
 """
 
 import numpy as np
 
 from identification.pnlss.fitting.layout import Room, Slopes, System
-from identification.pnlss.kernels import Table, feature_values
+from identification.pnlss.kernels import Table, feature_values, function_slope, weighted_sum
 from vibrolock.compiled import inner_kernel, kernel
 
 __all__ = ["combine_rows", "effective_matrices", "sensitivities"]
@@ -51,18 +51,26 @@ def effective_matrices(system: System, slopes: Slopes, v: np.ndarray, r: Room) -
         for i in range(n + outputs):
             linear = system.state[i, j] if i < n else system.output[i - n, j]
             r.effective[i * n + j] = linear if held else r.effective[i * n + j] + linear
-    _add_saturating(system.state_table, system.state, n, r.z, r.state_steep, r.effective[: n * n])
-    _add_saturating(system.output_table, system.output, n, r.q, r.output_steep, r.effective[n * n :])
+    _add_functions(system.state_table, system.state, v, n, r.z, r.state_steep, r.effective[: n * n])
+    _add_functions(system.output_table, system.output, v, n, r.q, r.output_steep, r.effective[n * n :])
 
 
 @inner_kernel
-def _add_saturating(
-    table: Table, matrix: np.ndarray, n: int, features: np.ndarray, steep: np.ndarray, effective: np.ndarray
+def _add_functions(
+    table: Table,
+    matrix: np.ndarray,
+    v: np.ndarray,
+    n: int,
+    features: np.ndarray,
+    steep: np.ndarray,
+    effective: np.ndarray,
 ) -> None:
+    """Add the derivatives of functions of weighted sums to ``effective``; their slopes go to ``steep``."""
     first = table.limits.size + table.factors.shape[0]
     for f in range(table.weights.shape[0]):
-        steep[f, 0] = 1.0 - (features[first + f] + table.at_rest[f]) ** 2
-        steep[f, 1] = 1.0 - table.at_rest[f] ** 2
+        code, at_rest = table.codes[f], table.at_rest[f]
+        steep[f, 0] = function_slope(code, weighted_sum(table, f, v), features[first + f] + at_rest)
+        steep[f, 1] = function_slope(code, table.weights[f, v.size], at_rest)
         for i in range(matrix.shape[0]):
             factor = matrix[i, first + f] * steep[f, 0]
             for j in range(n):
@@ -73,7 +81,7 @@ def _add_saturating(
 def _add_errors(
     system: System, v: np.ndarray, y: np.ndarray, weight: np.ndarray, columns: int, r: Room, errors: np.ndarray
 ) -> None:
-    """Write the errors of a sample, weight the linearised outputs, and add what the errors make of derivatives to gradients."""
+    """Write the errors of a sample, weight the linearised outputs, and add errors times derivatives to the gradients."""
     n = system.state.shape[0]
     outputs, own = system.output.shape
     r.back[:] = 0.0
@@ -160,11 +168,11 @@ def sensitivities(
 ) -> int:
     """Go through a block of inputs and measured outputs (float[n, n_inputs], float[n, n_outputs]), carrying ``r``.
 
-    The columns of sensitivities are ``linear`` ones of [A B E] (row by row; 0 for none), then the weights of the saturating
-    state features (row by row), if linear is not 0, then whatever began as not zero: initial states. Where the block is
+    The columns of sensitivities are ``linear`` ones of [A B E] (row by row; 0 for none), then the weights in the
+    state features (row by row), if linear is not 0, then those of initial states. Where the block is
     ``counted``, ``errors`` (float[n, n_outputs]) gets the weighted errors, simulated less measured, ``r`` their products with
     all derivatives, and of the samples ``kept`` (int[n_kept], rising) ``jacobian`` (float[n_outputs, n_kept, n_columns +
-    n_output_weights]) gets the derivatives of the weighted outputs, those by the weights of saturating output features last,
+    n_output_weights]) gets the derivatives of the weighted outputs, those by the weights in the output features last,
     and ``rows`` (float[n_kept, n_output_columns]) q: the derivative of output l by its own [C D F] is ``weight[l] q``.
 
     Returns n, or the sample at which a state is beyond ``bound`` or not a number.

@@ -1,4 +1,4 @@
-"""What the kernels of a fit work on: a system, its derivatives, and the room of a recursion over time."""
+"""Data of the kernels of a fit: a system, its derivatives, and the room of a recursion over time."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class System(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Derivatives of the monomials of a system, which are a few monomials themselves."""
+    """Derivatives of the monomials of a system, which are combinations of a few monomials."""
 
     table: Table
     """Monomials that occur in derivatives, of degree one and above."""
@@ -30,7 +30,7 @@ class Slopes(NamedTuple):
 
 
 class Room(NamedTuple):
-    """What the recursion carries from sample to sample, and where it works."""
+    """State of the recursion from sample to sample, and its working arrays."""
 
     x: np.ndarray
     """float[n_states], the state before the next sample."""

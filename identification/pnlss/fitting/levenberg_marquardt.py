@@ -1,4 +1,7 @@
-"""Iterations of a fit: which damping, when to stop, what is kept."""
+"""Levenberg-Marquardt iterations: damped steps, choice of the damping, stopping, the iterates kept.
+
+Normal equations are scaled to columns of unit norm and decomposed once; each damping then only changes a diagonal.
+"""
 
 import time
 from collections.abc import Callable
@@ -6,31 +9,73 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
+from identification.pnlss.fitting.normal_equations import NormalEquations
 from identification.pnlss.fitting.problem import Problem
 from identification.pnlss.fitting.result import FitHistory
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
-from identification.pnlss.fitting.steps import Steps
 
-__all__ = ["Iterates", "iterate"]
+__all__ = ["Iterates", "Steps", "iterate"]
 
 Float = NDArray[np.float64]
 
 _FACTOR = 10.0
 _SMALLEST, _LARGEST = 1e-16, 1e8
-"""Dampings worth trying."""
+"""Range of dampings that are tried."""
 _NEAR = 1e-4
-"""Relative gain of an iteration below which the end may be near: from then on all samples make the Hessian, and steps reach a
-minimum in few iterations. Before, some of the samples lead on as fast."""
+"""Once an iteration gains less than this share, all samples enter the Hessian, so that a minimum is reached in few steps.
+Before, a subset of the samples makes as fast progress."""
 _WORTH = 0.01
-"""A smaller damping is tried where it promises so much more than the gain that is there."""
+"""A smaller damping is tried if its predicted gain exceeds the gain achieved by more than this share."""
 _STALLED = 5
-"""Iterations on end without a gain worth the name, after which a fit ends."""
+"""A fit ends after this many successive iterations without a gain above the tolerance."""
+
+
+class Steps:
+    """Solutions of ``(H + damping w_max D^2) step = -g`` in the span of the eigenvectors that the data determine.
+
+    D^2 is the diagonal of H, so that neither units nor degrees matter; w_max is the largest eigenvalue of ``D^-1 H D^-1``.
+    n_states^2 directions change no output at all: eigenvalues below ``truncation w_max`` are left out, which a factorisation
+    could not do.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the decomposition does not converge.
+    """
+
+    def __init__(self, equations: NormalEquations, truncation: float) -> None:
+        diagonal = np.sqrt(np.diag(equations.hessian))
+        self._scale = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
+        scaled = equations.hessian * self._scale * self._scale[:, None]
+        values, vectors = eigh(scaled, driver="evd", overwrite_a=True, check_finite=False)
+        self._kept = values > max(truncation, np.finfo(float).tiny) * values[-1]
+        self._values = values[self._kept]
+        self._vectors = vectors[:, self._kept]
+        self._gradient = self._vectors.T @ (self._scale * equations.gradient)
+
+    @property
+    def rank(self) -> int:
+        """Number of directions kept."""
+        return int(np.count_nonzero(self._kept))
+
+    def at(self, damping: float) -> Float:
+        """Step with this damping, relative to the largest eigenvalue."""
+        if not self.rank:
+            return np.zeros_like(self._scale)
+        solved = self._gradient / (self._values + damping * self._values[-1])
+        return np.asarray(-self._scale * (self._vectors @ solved))
+
+    def promised(self, damping: float) -> float:
+        """Predicted decrease of the squared errors with this damping, for outputs linear in the parameters."""
+        values, damped = self._values, self._values + damping * self._values[-1:]
+        return float(np.sum(self._gradient**2 * (2.0 * damped - values) / damped**2))
 
 
 @dataclass(eq=False)
 class Iterates:
-    """The last iterate and the best, and the way there."""
+    """The last iterate, the best one, and the history of the fit."""
 
     vector: Float
     best: Float
@@ -43,14 +88,14 @@ class Iterates:
 
     @classmethod
     def begin(cls, problem: Problem, vector: Float) -> "Iterates":
-        """At a start."""
+        """The iterates at the start of a fit."""
         damping = problem.settings.damping
         errors = problem.training_error(vector), problem.validation_error(vector)
         return cls(vector, vector, damping, [errors[0]], [errors[1]], [damping], [0.0])
 
     @classmethod
     def resumed(cls, last: Float, best: Float, history: FitHistory) -> "Iterates":
-        """Where another left off."""
+        """The state in which an earlier fit stopped."""
         lists = (history.training_error, history.validation_error, history.damping, history.seconds)
         training, validation, dampings, seconds = (list(map(float, values)) for values in lists)
         began = time.perf_counter() - seconds[-1]
@@ -58,7 +103,7 @@ class Iterates:
 
     @property
     def history(self) -> FitHistory:
-        """As the result holds it."""
+        """History of the fit for its result."""
         return FitHistory(
             training_error=np.array(self.training),
             validation_error=np.array(self.validation),
@@ -67,13 +112,13 @@ class Iterates:
         )
 
     def every(self, problem: Problem) -> int:
-        """Of how many samples on end the next Hessian takes one; of each one, once the training error has nearly stalled."""
+        """The next Hessian takes one of this many samples; all of them once the training error has nearly stalled."""
         errors, near = np.array(self.training), max(_NEAR, problem.settings.tolerance)
         far = np.all(np.diff(errors) < -near * errors[:-1])
         return problem.every if far else 1
 
     def add(self, problem: Problem, vector: Float, training: float, damping: float) -> None:
-        """One more iterate."""
+        """Append an iterate."""
         validation = problem.validation_error(vector)
         self.vector, self.damping = vector, damping
         self.training.append(training)
@@ -85,7 +130,7 @@ class Iterates:
 
 
 def iterate(problem: Problem, iterates: Iterates, progress: Callable[[FitProgress], None] | None) -> tuple[str, bool]:
-    """Go on until there is a reason to stop; that reason, and whether it was an interrupt."""
+    """Iterate until there is a reason to stop; return that reason and whether it was an interrupt."""
     settings = problem.settings
     try:
         while (reason := _reason(iterates, settings)) is None:
@@ -124,7 +169,7 @@ def _reason(iterates: Iterates, settings: FitSettings) -> str | None:
 
 
 def _descend(problem: Problem, steps: Steps, iterates: Iterates) -> tuple[Float, float, float] | None:
-    """The parameters, their training error and the damping of a step that fits better; None if none does.
+    """Parameters, training error and damping of a step that reduces the cost; None if no step does.
 
     A simulation costs far less than sensitivities, so dampings are simply tried: downwards as long as that is better and
     promises to be, and upwards where nothing was.

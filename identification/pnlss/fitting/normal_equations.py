@@ -1,7 +1,7 @@
-"""Normal equations of all parameters, gathered block by block: what a fit holds does not grow with the samples.
+"""Normal equations of all parameters, summed block by block, so that memory does not grow with the number of samples.
 
 With J the derivatives of the weighted errors by the shared parameters and Q the rows q = (x, u, chi), the own parameters of
-output l have the Jacobian ``w_l Q``: of those parts only ``J_l' Q`` and ``Q' Q`` are needed, never the columns themselves.
+output l have the Jacobian ``w_l Q``: so only ``J_l' Q`` and ``Q' Q`` are needed, never the columns themselves.
 """
 
 from collections.abc import Iterator
@@ -15,15 +15,15 @@ from scipy.linalg.blas import dgemm, dsyrk
 from identification.pnlss.fitting.frequency_lines import transformed
 from identification.pnlss.fitting.kernels import sensitivities
 from identification.pnlss.fitting.layout import System, room
-from identification.pnlss.fitting.parameters import Parameters
+from identification.pnlss.fitting.parameters import Parameters, slopes_of
 from identification.pnlss.fitting.records import BOUND, Record
-from identification.pnlss.fitting.slopes import slopes_of
 
 __all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "kept_samples", "normal_equations"]
 
 Float = NDArray[np.float64]
+
 BLOCK = 256
-"""Samples of a block whose derivatives are kept: its Jacobian stays in the cache between the recursion and the products."""
+"""Samples of a block: few enough for its Jacobian to stay in the cache between the recursion and the products."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -36,10 +36,10 @@ class NormalEquations:
 
 
 def kept_samples(samples: int, every: int) -> NDArray[np.int64]:
-    """One of each ``every`` samples on end, at places that follow the golden ratio.
+    """Indices of one sample of every ``every``, at positions that follow the golden ratio.
 
-    A fixed stride would see a vibration whose period is a few strides at the same few phases throughout, and tell less of its
-    harmonics than there is to know.
+    A fixed stride would see a vibration whose period is a few strides always at the same few phases, and miss part of its
+    harmonics.
     """
     begins = np.arange(0, samples, every)
     widths = np.minimum(every, samples - begins)
@@ -50,8 +50,8 @@ class Blocks:
     """Goes through an experiment block by block.
 
     Iterating gives the Jacobian float[n_outputs, n, n_columns], rows float[n, n_own] and weighted errors
-    float[n_errors, n_outputs] of counted samples, n of them one of each ``every`` and errors of all; the arrays are used again.
-    After that the products of derivatives and errors are there. Ends early, with NaN, where the run leaves all bounds.
+    float[n_errors, n_outputs] of counted samples: n is one of every ``every``, errors are those of all. Arrays are reused.
+    Afterwards the products of derivatives and errors are complete. Iteration ends early, with NaN, if the run is unbounded.
     """
 
     def __init__(
@@ -100,14 +100,14 @@ class Blocks:
 
 
 def _edges(record: Record, size: int) -> Iterator[int]:
-    """Where blocks of counted samples begin; none goes on into the next period."""
+    """First samples of the blocks of counted samples; no block extends into the next period."""
     period = record.period or len(record.u)
     for begin in range(record.counted_from, len(record.u), period):
         yield from range(begin, min(begin + period, len(record.u)), size)
 
 
 class _Sums:
-    """Products of the blocks of one experiment; of symmetric ones the upper half counts."""
+    """Products summed over the blocks of one experiment; symmetric ones in their upper half."""
 
     def __init__(self, columns: int, own: int, outputs: int) -> None:
         self.shared = np.zeros((columns, columns), order="F")
@@ -138,10 +138,10 @@ class _Sums:
 def normal_equations(
     parameters: Parameters, vector: Float, records: list[Record], weights: Float, every: int = 1
 ) -> NormalEquations:
-    """Of all experiments at ``vector``, errors weighted by output (float[n_outputs]) and as each record says.
+    """Sum over all experiments at ``vector``, errors weighted by output (float[n_outputs]) and by the weights of each record.
 
-    The gradient is that of all samples; the Hessian that of one of each ``every``, except for errors by frequency line. Not
-    finite where a run leaves all bounds.
+    The gradient takes all samples; the Hessian takes one of every ``every``, except for errors by frequency line. The result
+    is not finite if a run is unbounded.
     """
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     hessian, gradient = np.zeros((parameters.count, parameters.count)), np.zeros(parameters.count)
@@ -167,7 +167,7 @@ def _scatter(
     hessian: Float,
     gradient: Float,
 ) -> None:
-    """Put the products of an experiment where its parameters stand."""
+    """Add the products of an experiment at the places of its parameters."""
     hessian[np.ix_(places, places)] += weight * _whole(sums.shared)
     gradient[places] += weight * sums.gradient
     for output, (mixed, by, own) in enumerate(zip(sums.mixed, weights, sums.own, strict=True)):

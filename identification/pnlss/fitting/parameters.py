@@ -1,4 +1,4 @@
-"""All parameters of a model as one vector, and back."""
+"""Parameters of a model as one vector and back, and the derivatives of its monomials for the kernels of the fit."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -6,26 +6,27 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.layout import System
+from identification.pnlss.features import with_weights
+from identification.pnlss.fitting.layout import Slopes, System
 from identification.pnlss.kernels import Matrices, Table
 from identification.pnlss.model import PnlssModel
 
-__all__ = ["Parameters", "matrices_of"]
+__all__ = ["Parameters", "matrices_of", "slopes_of"]
 
 Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """Where each parameter stands: first those that all outputs share, then those of each output by itself.
+    """Layout of the vector: first the parameters that all outputs share, then those of each output.
 
-    Shared are [A B E] row by row, the weights of saturating state features row by row, those of saturating output features,
-    and the initial states of the experiments that have theirs estimated; own are [C D F] row by row.
+    Shared are [A B E] row by row, the weights in the state features row by row, those in the output features, and the
+    estimated initial states of experiments; own are [C D F] row by row.
 
     Parameters
     ----------
     start
-        A model of the structure in question; all but what is listed above is taken from it.
+        A model of the same structure; everything that is no parameter is taken from it.
     estimated
         Number of experiments with an estimated initial state.
     """
@@ -76,9 +77,9 @@ class Parameters:
         return marks
 
     def columns(self, place: int | None) -> NDArray[np.int64]:
-        """Which parameter each column of an experiment's Jacobian belongs to, for its shared part.
+        """Index of the shared parameter that each column of an experiment's Jacobian belongs to.
 
-        ``place`` is that of the experiment among those with an estimated initial state, None if it is none of them.
+        ``place`` is the position of the experiment among those with an estimated initial state, None if it has none.
         """
         linear, inner_state, inner_output, _ = (np.arange(self.ends[i - 1] if i else 0, self.ends[i]) for i in range(4))
         n = self.start.states
@@ -91,7 +92,7 @@ class Parameters:
         return slice(self.shared + output * width, self.shared + (output + 1) * width)
 
     def vector(self, model: PnlssModel, initial_states: Float) -> Float:
-        """float[count] of a model of this structure and initial states float[estimated, n_states]."""
+        """float[count] from a model of this structure and initial states float[estimated, n_states]."""
         parts = (
             np.hstack([model.a, model.b, model.e]),
             model.state_features.weights,
@@ -102,14 +103,14 @@ class Parameters:
         return np.concatenate([np.ravel(part) for part in parts])
 
     def system(self, vector: Float) -> System:
-        """The same as kernels take it."""
+        """The model with these parameters as the kernels take it."""
         linear, inner_state, inner_output, _, own = np.split(vector, self.ends[:-1])
         state, output = self.tables
         return System(
             linear.reshape(self.start.states, -1),
             own.reshape(len(self.start.outputs), -1),
-            _weighted(state, inner_state),
-            _weighted(output, inner_output),
+            with_weights(state, inner_state.reshape(state.weights.shape)),
+            with_weights(output, inner_output.reshape(output.weights.shape)),
         )
 
     def initial_states(self, vector: Float) -> Float:
@@ -127,13 +128,8 @@ class Parameters:
         )
 
 
-def _weighted(table: Table, weights: Float) -> Table:
-    rows = weights.reshape(table.weights.shape)
-    return table._replace(weights=rows, at_rest=np.tanh(rows[:, -1]))
-
-
 def matrices_of(system: System) -> Matrices:
-    """A, B, E, C, D and F by themselves."""
+    """A, B, E, C, D and F as separate matrices."""
     n, variables = system.state.shape[0], system.state_table.limits.size
     parts = [
         m[:, begin:end]
@@ -141,3 +137,32 @@ def matrices_of(system: System) -> Matrices:
         for begin, end in ((0, n), (n, variables), (variables, None))
     ]
     return Matrices(*(np.ascontiguousarray(part) for part in parts))
+
+
+def slopes_of(system: System) -> Slopes:
+    """``E d phi / d x`` and ``F d chi / d x`` of the monomials of a system, as combinations of as few products as possible.
+
+    The derivatives of a cubic model need a handful of products, however many monomials it has.
+    """
+    n, outputs = system.state.shape[0], system.output.shape[0]
+    found: dict[tuple[int, ...], Float] = {}
+    for first, matrix, table in ((0, system.state, system.state_table), (n, system.output, system.output_table)):
+        variables = table.limits.size
+        for index, row in enumerate(table.factors):
+            factors = [int(j) for j in row if j >= 0]
+            for position, j in enumerate(factors):
+                if j >= n:
+                    continue
+                rest = tuple(factors[:position] + factors[position + 1 :])
+                shares = found.setdefault(rest, np.zeros((n + outputs, n)))
+                shares[first : first + len(matrix), j] += matrix[:, variables + index]
+    degree = max((len(rest) for rest in found), default=0)
+    padded = [(*rest, *[-1] * (degree - len(rest))) for rest in found]
+    table = Table(
+        np.array(padded, dtype=np.int64).reshape(len(found), degree),
+        np.minimum(system.state_table.limits, system.output_table.limits),
+        np.zeros((0, system.state_table.limits.size + 1)),
+        np.zeros(0),
+        np.zeros(0, dtype=np.int64),
+    )
+    return Slopes(table, np.array(list(found.values())).reshape(len(found), (n + outputs) * n))

@@ -1,4 +1,4 @@
-"""A fit in scaled variables: its cost at any parameters, and its normal equations there."""
+"""A fit in scaled variables: cost and normal equations at any parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.frequency_lines import with_lines
-from identification.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
 from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
-from identification.pnlss.fitting.records import Record, records_of, simulated
+from identification.pnlss.fitting.records import PRIOR, Record, fitted_initial_state, records_of, simulated
 from identification.pnlss.fitting.settings import FitSettings
 from identification.pnlss.model import PnlssModel
 
@@ -23,12 +22,12 @@ Float = NDArray[np.float64]
 
 _EVERY = (1, 2, 4, 8)
 _VALUES = 100
-"""Values of outputs for each parameter that a Hessian is to be from, if fewer samples are to lead on as all do."""
+"""Values of outputs per parameter that a Hessian needs to make as much progress as with all samples."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """RMS of states in the start, and of inputs and outputs in the training data."""
+    """RMS of the states of the start, and of inputs and outputs in the training data."""
 
     states: Float
     inputs: Float
@@ -57,10 +56,10 @@ def _rms(rows: Float) -> Float:
 
 
 class Problem:
-    """Training and validation data, and what is to be made small.
+    """Training and validation data, and the cost of a fit.
 
-    That is the sum over experiments, outputs and samples (or lines) of weighted squared errors over that of the squared
-    outputs, to which a ridge adds.
+    The cost is the sum of weighted squared errors over experiments, outputs and samples (or lines), relative to the sum of
+    the squared outputs, plus a ridge.
     """
 
     def __init__(
@@ -88,7 +87,7 @@ class Problem:
 
     @property
     def every(self) -> int:
-        """Of how many samples on end one is enough for the Hessian of a step far from the minimum."""
+        """Far from the minimum the Hessian of a step takes one of this many samples."""
         if self.settings.every is not None:
             return self.settings.every
         values = sum(len(r.u) - r.counted_from for r in self.training) * self.weights.size
@@ -106,7 +105,7 @@ class Problem:
         return squares if np.isfinite(squares) else float(np.inf)
 
     def training_error(self, vector: Float) -> float:
-        """Relative RMS error over all training data; inf where a run leaves all bounds."""
+        """Relative RMS error over all training data; inf if a run is unbounded."""
         if not np.all(np.isfinite(vector)):
             return float(np.inf)
         system, begins = self.parameters.system(vector), self.parameters.initial_states(vector)
@@ -118,7 +117,7 @@ class Problem:
         return float(np.sqrt(total / self._total))
 
     def validation_error(self, vector: Float) -> float:
-        """The same of validation data, initial states estimated for just this model; NaN without such data."""
+        """Relative RMS error over all validation data, initial states estimated for this model; NaN without such data."""
         if not self.validation:
             return float(np.nan)
         system, total = self.parameters.system(vector), 0.0
@@ -135,7 +134,7 @@ class Problem:
         return error**2 + float(self._ridge @ vector**2)
 
     def equations(self, vector: Float, every: int = 1) -> NormalEquations:
-        """Normal equations of half of `cost`; initial states that outputs do not tell of are held back."""
+        """Normal equations of half of `cost`; a small weight holds initial states that the outputs do not show near zero."""
         found = normal_equations(self.parameters, vector, self.training, self.weights, every)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
         return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)

@@ -1,4 +1,4 @@
-"""Experiments as a fit works with them, and what a system makes of them."""
+"""Experiments in the scaled units of a fit, their simulation, and initial states from their first samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,16 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.pnlss.experiment import Experiment
-from identification.pnlss.fitting.layout import System
-from identification.pnlss.fitting.parameters import matrices_of
+from identification.pnlss.fitting.kernels import sensitivities
+from identification.pnlss.fitting.layout import System, room
+from identification.pnlss.fitting.parameters import matrices_of, slopes_of
 from identification.pnlss.kernels import simulate, workspace
 
-__all__ = ["BOUND", "Record", "records_of", "simulated"]
+__all__ = ["BOUND", "PRIOR", "SAMPLES", "Record", "fitted_initial_state", "records_of", "simulated"]
 
 Float = NDArray[np.float64]
 
 BOUND = 1e6
-"""States of so many times their RMS in the start are out of bounds."""
+"""A state is out of bounds beyond this multiple of its RMS in the start."""
+SAMPLES = 600
+"""Samples from which an initial state is estimated: a few decay times of lightly damped structures at usual rates."""
+PRIOR = 1e-6
+"""Weight of the squared initial state (states of unit RMS) beside the squared errors (outputs of unit RMS). It only matters
+for states that the outputs do not show."""
+_ITERATIONS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +36,14 @@ class Record:
     period: int
     weight: float
     place: int | None
-    """Among those with an estimated initial state; None for a run from rest."""
+    """Position among the experiments with an estimated initial state; None for a run from rest."""
     name: str
     """For messages."""
     lines: Float | None = None
     """float[n_outputs, n_lines], weights of the lines of a period; None where errors are those over time."""
 
     def squares(self, errors: Float) -> Float:
-        """float[n_outputs], sums of squares of errors float[n, n_outputs] where they count, weighted by lines if so asked."""
+        """float[n_outputs], sums of squares of the counted errors float[n, n_outputs], weighted by ``lines`` if given."""
         counted = errors[self.counted_from :]
         with np.errstate(over="ignore", invalid="ignore"):
             if self.lines is None:
@@ -76,3 +83,49 @@ def simulated(system: System, u: Float, initial_state: Float) -> tuple[Float, Fl
     begin = np.ascontiguousarray(initial_state)
     count = simulate(m, system.state_table, system.output_table, u, begin, bound, workspace(m), x, y)
     return (x, y) if count == len(u) and bool(np.all(np.isfinite(y))) else None
+
+
+def fitted_initial_state(system: System, record: Record, weights: Float, samples: int = SAMPLES) -> Float:
+    """float[n_states] that fits the first ``samples`` counted outputs best: least squares by Levenberg-Marquardt from rest.
+
+    The result is rest if the run from rest is unbounded.
+    """
+    n, outputs = len(system.state), len(weights)
+    first, end = record.counted_from, min(record.counted_from + samples, len(record.u))
+    u, y = record.u[:end], record.y[:end]
+    jacobian = np.zeros((outputs, end - first, n + system.output_table.weights.size))
+    rows, errors = np.zeros((end - first, system.output.shape[1])), np.zeros((end - first, outputs))
+
+    def error(x: Float) -> float:
+        run = simulated(system, u, x)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return (
+                float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2) + PRIOR * x @ x)
+            )
+
+    slopes, none, all_samples = slopes_of(system), np.arange(0), np.arange(end - first)
+    into = (jacobian, rows, errors)
+    x, damping = np.zeros(n), 1e-6
+    best = error(x)
+    for _ in range(_ITERATIONS):
+        r = room(system, slopes, n)
+        r.x[:] = x
+        r.s[0] = np.eye(n)
+        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, False, none, r, *into)
+        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, True, all_samples, r, *into)
+        stacked = jacobian[:, :, :n].reshape(-1, n)
+        if done < end or not np.all(np.isfinite(stacked)):
+            break
+        values, vectors = np.linalg.eigh(stacked.T @ stacked + PRIOR * np.eye(n))
+        along = vectors.T @ (stacked.T @ errors.T.ravel() + PRIOR * x)
+        before = best
+        while damping < 1e6:
+            step = -vectors @ (along / (values + damping * values[-1]))
+            tried = error(x + step)
+            if tried < best:
+                x, best, damping = x + step, tried, damping / 100.0
+                break
+            damping *= 10.0
+        if best > before * (1.0 - 1e-10):
+            break
+    return x

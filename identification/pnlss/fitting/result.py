@@ -1,4 +1,4 @@
-"""What a fit gives: the chosen model, the last iterate, and how it got there."""
+"""Result of a fit: the chosen model, the last iterate, and the history of errors."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -27,7 +27,7 @@ class FitHistory:
     training_error, validation_error
         float[n], relative RMS errors over all outputs; validation NaN without data, inf for an unbounded run.
     damping
-        float[n], of the step that led there; of the start that of the settings.
+        float[n], of the step to each iterate; the first is that of the settings.
     seconds
         float[n], since the fit began.
     """

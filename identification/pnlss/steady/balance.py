@@ -25,7 +25,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _ENOUGH_FOR_BENDS = 16
-"""Samples per harmonic for features that are no polynomials; what folds is then of the order of what is left out."""
+"""Samples per harmonic for features that are no polynomials; aliasing is then of the order of the neglected harmonics."""
 
 
 class Period(NamedTuple):
@@ -44,7 +44,7 @@ class Period(NamedTuple):
 
 
 def samples_for(model: PnlssModel, harmonics: int) -> int:
-    """Samples of a period with which nothing folds into the harmonics kept: more than ``(degree + 1) H`` for polynomials."""
+    """Samples of a period without aliasing into the harmonics kept: more than ``(degree + 1) H`` for polynomials."""
     both = (model.state_features, model.output_features)
     degree = max(int(features.exponents.sum(axis=1).max(initial=1)) for features in both)
     least = (degree + 1) * harmonics + 1
@@ -60,7 +60,7 @@ def _bends(features: Features) -> bool:
 class Balance:
     """Equations of a driven model; unknowns are the states' coefficients float[size, n_states] in a row, then the drive's.
 
-    ``held`` (float[n_inputs]) are constants that inputs have beside what drives, whatever its level.
+    ``held`` (float[n_inputs]) are constant parts of the inputs, independent of the level.
     """
 
     def __init__(self, model: PnlssModel, drive: Drive, basis: Basis, held: Float | None = None) -> None:
@@ -81,7 +81,7 @@ class Balance:
 
     @property
     def state_unknowns(self) -> int:
-        """How many of the unknowns are the states'."""
+        """Number of unknowns that belong to the states."""
         return self.basis.size * self.model.states
 
     def states(self, z: Float) -> Float:
@@ -151,7 +151,7 @@ class Balance:
         return system
 
     def linear(self, frequency_hz: float, level: float = 1.0) -> Float:
-        """Unknowns at a level of the model without its features."""
+        """Unknowns of the linear part at a level."""
         model, z = self.model, np.zeros(self.state_unknowns)
         point = np.array([np.exp(1j * self.angle(frequency_hz))])
         row = self._driven_row()

@@ -1,7 +1,7 @@
-"""What drives a model periodically: a sine, or a voltage that holds the force among its outputs; see `coupled` for exciters.
+"""Periodic excitations of a model: a sine, a voltage that holds a force among the outputs, an exciter that makes the force.
 
-Each knows the inputs' Fourier coefficients as linear functions of unknowns of its own and of the level (1 is what was asked
-for), and the equations that these unknowns obey. The coefficients are real, ordered as in `identification.pnlss.steady.basis`.
+Each gives the inputs' Fourier coefficients as linear functions of its own unknowns and of the level (1 is the level asked
+for), and the equations of these unknowns. The coefficients are real, ordered as in `identification.pnlss.steady.basis`.
 """
 
 from dataclasses import dataclass
@@ -10,10 +10,16 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drive", "Equations", "HeldOutput", "Sine", "level_reached", "peak_of_level"]
+from identification.pnlss.steady.basis import complex_product
+from identification.prediction.exciter import Exciter
+
+__all__ = ["Coupled", "Drive", "Equations", "HeldOutput", "Sine", "level_reached", "peak_of_level"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
+
+_NUDGE = 1e-5
+"""Relative step of the numerical derivatives of the exciter by frequency, which are accurate to ten digits."""
 
 
 class Equations(NamedTuple):
@@ -28,7 +34,7 @@ class Equations(NamedTuple):
 
 
 class Drive(Protocol):
-    """What drives a model."""
+    """A periodic excitation of a model."""
 
     @property
     def size(self) -> int:
@@ -58,7 +64,7 @@ class Sine:
 
     @property
     def size(self) -> int:
-        """No unknowns."""
+        """Zero: a sine has no unknowns."""
         return 0
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
@@ -68,11 +74,11 @@ class Sine:
         return given, np.zeros((coefficients, self.n_inputs, 0))
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """None."""
+        """A sine has no equations: all parts are empty."""
         return Equations(np.zeros(0), np.zeros((0, 0)), np.zeros((0, *outputs.shape)), np.zeros(0), np.zeros(0))
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """No unknowns."""
+        """Empty: a sine has no unknowns."""
         return np.zeros(0)
 
     def voltage(self, own: Float) -> complex:
@@ -92,7 +98,7 @@ class HeldOutput:
 
     @property
     def size(self) -> int:
-        """The amplitude."""
+        """One: the amplitude."""
         return 1
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
@@ -113,7 +119,7 @@ class HeldOutput:
         return np.array([peak_of_level(self.force_n, self.held) / np.abs(response[self.output])])
 
     def voltage(self, own: Float) -> complex:
-        """The unknown."""
+        """The amplitude, which is the unknown."""
         return complex(own[0])
 
 
@@ -123,10 +129,94 @@ def peak_of_level(force_n: float, held: str) -> float:
 
 
 def level_reached(force: Float, held: str, force_n: float, level: float) -> tuple[float, Float]:
-    """``|F_1|^2``, or the mean square of a force's harmonics, over that asked for, minus level^2; by its coefficients."""
+    """``|F_1|^2`` or the mean square of a force over the value asked for, minus level^2; its derivative by the coefficients."""
     weight = np.zeros(force.size)
     if held == "rms":
         weight[1:] = 0.5 / force_n**2
     else:
         weight[1:3] = 1.0 / force_n**2
     return float(weight @ force**2) - level**2, 2.0 * weight * force
+
+
+@dataclass(frozen=True)
+class Coupled:
+    """An exciter whose sine of voltage makes the force at one input, with the reaction of the drive point's motion.
+
+    Unknowns are the coefficients of the force without its static part, then those of the voltage. The phase reference is the
+    fundamental of the force, or the voltage if that is held.
+    """
+
+    exciter: Exciter
+    amplitude: float
+    held: Literal["fundamental", "rms", "voltage"]
+    output: int
+    order: int
+    """Order of the time derivative of the drive point's displacement in that output."""
+    row: int
+    n_inputs: int
+    coefficients: int
+
+    @property
+    def size(self) -> int:
+        """Harmonics of the force and the voltage."""
+        return self.coefficients + 1
+
+    def inputs(self, coefficients: int) -> tuple[Float, Float]:
+        """The force's coefficients."""
+        slope = np.zeros((coefficients, self.n_inputs, self.size))
+        slope[1:, self.row, : coefficients - 1] = np.eye(coefficients - 1)
+        return np.zeros((coefficients, self.n_inputs)), slope
+
+    def _factors(self, frequency_hz: Float) -> tuple[Complex, Complex]:
+        """complex[k], force per volt, and complex[k, H], force per drive output at each harmonic, at float[k]."""
+        h = np.arange(1, self.coefficients // 2 + 1)
+        at_hz = frequency_hz[:, None] * h
+        per_motion = self.exciter.force(0.0, 1.0, at_hz) * (2j * np.pi * at_hz) ** (2 - self.order)
+        return self.exciter.force(1.0, 0.0, frequency_hz), np.asarray(per_motion)
+
+    def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
+        """``F_h = g V delta_h1 + r_h Y_h`` for each harmonic, then the held level and the phase reference."""
+        count = self.coefficients - 1
+        by_own, by_outputs = np.zeros((self.size, self.size)), np.zeros((self.size, *outputs.shape))
+        by_frequency, by_level = np.zeros(self.size), np.zeros(self.size)
+        residual = np.empty(self.size)
+
+        nudge = _NUDGE * frequency_hz
+        per_volt, per_motion = self._factors(frequency_hz + nudge * np.array([0.0, 1.0, -1.0]))
+        volt, motion = complex_product(per_volt), complex_product(per_motion)
+        force = (motion @ outputs[1:, self.output].reshape(-1, 2, 1)).reshape(3, count)
+        force[:, :2] += volt @ own[count:]
+        residual[:count] = (own[:count] - force[0]) / self.amplitude
+        by_own[:count, :count] = np.eye(count) / self.amplitude
+        by_own[:2, count:] = -volt[0] / self.amplitude
+        for h in range(count // 2):
+            by_outputs[2 * h : 2 * h + 2, 2 * h + 1 : 2 * h + 3, self.output] = -motion[0, h] / self.amplitude
+        by_frequency[:count] = -(force[1] - force[2]) / (2.0 * nudge * self.amplitude)
+        if self.held == "voltage":
+            residual[count:] = [own[count] / self.amplitude - level, own[count + 1] / self.amplitude]
+            by_own[count:, count:] = np.eye(2) / self.amplitude
+            by_level[count] = -1.0
+        else:
+            with_static = np.concatenate([[0.0], own[:count]])
+            residual[count], slope = level_reached(with_static, self.held, self.amplitude, level)
+            residual[count + 1] = own[1] / self.amplitude
+            by_own[count, :count], by_own[count + 1, 1] = slope[1:], 1.0 / self.amplitude
+            by_level[count] = -2.0 * level
+        return Equations(residual, by_own, by_outputs, by_frequency, by_level)
+
+    def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
+        """A force without harmonics, and the voltage that it needs."""
+        per_volt, per_motion = self._factors(np.array([frequency_hz]))
+        of_force = complex((1.0 - per_motion[0, 0] * response[self.output]) / per_volt[0])
+        if self.held == "voltage":
+            voltage, force = complex(self.amplitude), self.amplitude / of_force
+        else:
+            force = complex(peak_of_level(self.amplitude, self.held))
+            voltage = of_force * force
+        own = np.zeros(self.size)
+        own[:2], own[-2:] = [force.real, -force.imag], [voltage.real, -voltage.imag]
+        return own
+
+    def voltage(self, own: Float) -> complex:
+        """The voltage, from the last two unknowns."""
+        return complex(own[-2], -own[-1])

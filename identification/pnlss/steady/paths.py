@@ -17,22 +17,22 @@ __all__ = ["Followed", "followed", "from_rest", "polished", "sizes", "statically
 Float = NDArray[np.float64]
 
 _FIRST_LEVEL = 0.02
-"""Share of the level at which the linear solution is a start for Newton's method."""
+"""Share of the level at which Newton's method starts from the linear solution."""
 _LEVELS = Steps(first=0.1, largest=0.5)
 _MOST_LEVELS = 300
 _BAND_UNITS = 4.0
-"""Lengths in a band: with the longest step of 0.05 a band takes 80 points, and a resonance in it many more."""
+"""Length of a band: with the longest step of 0.05 a band takes 80 points, and a resonance in it many more."""
 
 
 class Followed(NamedTuple):
-    """A path, and what is to be said of its end; empty where it reached the far end of the band."""
+    """A path and a note on its end; the note is empty if it reached the far end of the band."""
 
     path: Path
     note: str
 
 
 def sizes(balance: Balance, frequency_hz: float) -> Float:
-    """Size of each unknown: that of the linear solution there, alike for all harmonics."""
+    """Size of each unknown in the linear solution at this frequency, the same for all harmonics."""
     linear = balance.linear(frequency_hz)
     states = np.max(np.abs(balance.states(linear)), axis=0)
     states = np.maximum(states, 1e-9 * np.max(states, initial=1e-300))
@@ -43,7 +43,7 @@ def sizes(balance: Balance, frequency_hz: float) -> Float:
 
 
 def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf) -> Float | None:
-    """Unknowns of the vibration that is reached from rest as the level rises; None where the path does not get there."""
+    """Unknowns of the vibration that is reached from rest as the level rises; None if the path does not reach the level."""
     linear, scale = balance.linear(frequency_hz, _FIRST_LEVEL), sizes(balance, frequency_hz)
     try:
         path = continued(
@@ -103,7 +103,7 @@ def polished(balance: Balance, z: Float, frequency_hz: float) -> Float | None:
 
 
 def _beyond(balance: Balance, z: Float, largest_use: float) -> str:
-    """What to say of states that are far outside of the training data; empty where they are not."""
+    """Message on states far outside of the training data; empty if there are none."""
     use = use_of(np.max(np.abs(balance.basis.to_time @ balance.states(z)), axis=0), balance.model.state_range)
     if not np.any(use > largest_use):
         return ""

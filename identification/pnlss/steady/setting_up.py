@@ -1,23 +1,134 @@
-"""From what is asked of a model to the equations of its harmonic balance."""
+"""Equations of the harmonic balance that a user asks for: drive, held inputs, band, harmonics; linear resonance."""
 
 from collections.abc import Mapping
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.steady.balance import Balance, samples_for
 from identification.pnlss.steady.basis import Basis, real_coefficients
-from identification.pnlss.steady.excitation import Held, drive_of, held_values, linear_resonance_hz
-from identification.pnlss.steady.states import SteadyStates
+from identification.pnlss.steady.drives import Coupled, Drive, HeldOutput, Sine
+from identification.pnlss.steady.states import SteadyStates, motion_rows
 from identification.prediction.exciter import Exciter
+from identification.validation import positive
 
-__all__ = ["balance_of", "band_of", "harmonics_that_fit", "unknowns_near"]
+__all__ = [
+    "Held",
+    "balance_of",
+    "band_of",
+    "drive_of",
+    "harmonics_that_fit",
+    "held_values",
+    "linear_resonance_hz",
+    "unknowns_near",
+]
 
 Float = NDArray[np.float64]
+Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 
+_LIGHT = 0.3
+"""Damping ratio up to which a pole makes a resonance."""
 _BAND = (0.85, 1.15)
+
+
+def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> tuple[int, NDArray[np.float64]]:
+    """Row of the driven input, and the constant values of all other inputs, float[n_inputs].
+
+    Driven is the one force, or the one input that is not held. Raises `IdentificationError` where there is none such, or an
+    input beside it has no value.
+    """
+    given = dict(held_inputs or {})
+    names = [channel.name for channel in model.inputs]
+    for name, value in given.items():
+        if name not in names:
+            raise IdentificationError(
+                f"held_inputs: the model has no input '{name}', its inputs are {', '.join(names)}"
+            )
+        if model.inputs[names.index(name)].role == "force":
+            raise IdentificationError(f"held_inputs: '{name}' is the force, which drives; hold the other inputs")
+        if not np.isfinite(value):
+            raise IdentificationError(f"held_inputs: '{name}' is {value:g}, needs a finite value")
+    forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"]
+    free = [row for row, name in enumerate(names) if name not in given]
+    if len(forces) > 1 or (not forces and len(free) != 1):
+        raise IdentificationError(
+            f"model: has {len(names)} inputs, {len(forces)} of them forces and {len(given)} held constant; needs one force, or "
+            "a voltage alone (held_inputs holds others)"
+        )
+    row = forces[0] if forces else free[0]
+    missing = [names[other] for other in free if other != row]
+    if missing:
+        raise IdentificationError(
+            f"held_inputs: has no value for {', '.join(missing)}, which the model has beside {names[row]}; give each its "
+            "constant value"
+        )
+    return row, np.array([float(given.get(name, 0.0)) for name in names])
+
+
+def drive_of(
+    model: PnlssModel, level: float, held: Held, exciter: Exciter | None, coefficients: int, row: int
+) -> Drive:
+    """The drive at input ``row``; raises `IdentificationError` if model, exciter and held quantity do not match."""
+    if held not in get_args(Held):
+        raise IdentificationError(f"force: is '{held}', allowed are {', '.join(get_args(Held))}")
+    amplitude = positive("force_n", level, "V" if held == "voltage" else "N")
+    m = len(model.inputs)
+    if model.inputs[row].role != "force":
+        return _voltage_driven(model, amplitude, held, exciter, row)
+    if exciter is None:
+        if held != "pure-sine":
+            raise IdentificationError(
+                f"force: '{held}' of a model driven by a force needs an exciter, which makes the force's harmonics; "
+                "without one 'pure-sine' is predicted"
+            )
+        return Sine(amplitude, row, m)
+    if held == "pure-sine":
+        raise IdentificationError("exciter: makes harmonics of the force; leave it out for 'pure-sine'")
+    drive = find_role(model.outputs, "drive")
+    order = MOTION_ORDER[model.outputs[drive].motion]
+    return Coupled(exciter, amplitude, held, drive, order, row, m, coefficients)
+
+
+def _voltage_driven(model: PnlssModel, amplitude: float, held: Held, exciter: Exciter | None, row: int) -> Drive:
+    if exciter is not None:
+        raise IdentificationError("exciter: is inside a model that is driven by a voltage; leave it out")
+    force = find_role(model.outputs, "force")
+    if held == "voltage":
+        return Sine(amplitude, row, len(model.inputs), is_voltage=True)
+    if held == "pure-sine":
+        raise IdentificationError(
+            "force: 'pure-sine' is not what a sine of voltage makes; a model driven by a voltage answers 'fundamental', "
+            "'rms' or 'voltage'"
+        )
+    return HeldOutput(amplitude, held, force, row, len(model.inputs))
+
+
+def linear_resonance_hz(model: PnlssModel) -> float:
+    """Natural frequency of the linear part's lightly damped mode with the largest displacement of the drive point.
+
+    Of those in the band that its training data was excited in, where that is known and holds one: others are guesses. Raises
+    `IdentificationError` if it has none.
+    """
+    poles = np.linalg.eigvals(model.a)
+    s = np.log(poles[(poles.imag > 0.0) & (np.abs(poles) > 0.0)]) * model.sample_rate_hz
+    s = s[-s.real <= _LIGHT * np.abs(s)]
+    if not s.size:
+        raise IdentificationError(
+            "lowest_hz, highest_hz: not given, and the model's linear part has no lightly damped mode to set them by"
+        )
+    low, high = (2.0 * np.pi * f for f in model.excited_hz or (0.0, np.inf))
+    inside = (np.abs(s) >= low) & (np.abs(s) <= high)
+    s = s[inside] if inside.any() else s
+    output = motion_rows(model.outputs)[0]
+    order = MOTION_ORDER[model.outputs[output].motion]
+    forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"] or slice(None)
+    response = model.linear_part.response(np.exp(1j * s.imag / model.sample_rate_hz))[:, output, forces]
+    size = np.linalg.norm(response, axis=1) / np.abs(s) ** order
+    return float(np.abs(s[int(np.argmax(size))]) / (2.0 * np.pi))
 
 
 def balance_of(
@@ -29,7 +140,7 @@ def balance_of(
     harmonics: int,
     samples: int | None,
 ) -> Balance:
-    """The equations; raises `IdentificationError` on too few samples and what `held_values` and `drive_of` refuse."""
+    """The equations; raises `IdentificationError` on too few samples and as `held_values` and `drive_of` do."""
     least = 2 * harmonics + 1
     count = samples_for(model, harmonics) if samples is None else samples
     if count < least:
@@ -40,7 +151,7 @@ def balance_of(
 
 
 def band_of(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None) -> tuple[float, float]:
-    """The band in Hz, by default about the linear resonance; `IdentificationError` if it is none."""
+    """The band in Hz, by default around the linear resonance; raises `IdentificationError` if the limits do not rise."""
     if lowest_hz is None or highest_hz is None:
         resonance = linear_resonance_hz(model)
         lowest_hz = _BAND[0] * resonance if lowest_hz is None else lowest_hz
@@ -54,7 +165,7 @@ def band_of(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None
 
 
 def harmonics_that_fit(model: PnlssModel, harmonics: int, highest_hz: float) -> tuple[int, list[str]]:
-    """Harmonics that the sample rate has room for, with a note where they are fewer than asked for."""
+    """Harmonics below half the sample rate, with a note if these are fewer than asked for."""
     if harmonics < 1:
         raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
     room = int(np.ceil(0.5 * model.sample_rate_hz / highest_hz)) - 1
@@ -70,7 +181,7 @@ def harmonics_that_fit(model: PnlssModel, harmonics: int, highest_hz: float) -> 
 
 
 def unknowns_near(balance: Balance, near: SteadyStates) -> Float:
-    """Unknowns of the first point of other steady states, as far as their harmonics go."""
+    """Unknowns from the first point of other steady states; harmonics that these lack are zero."""
     size = balance.basis.size
 
     def fitted(harmonics: NDArray[np.complex128]) -> Float:

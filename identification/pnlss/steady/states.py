@@ -1,4 +1,4 @@
-"""Periodic vibrations of a nonlinear state-space model, with all their harmonics."""
+"""Periodic vibrations of a nonlinear state-space model with all harmonics, and a frequency response made of them."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,8 +12,9 @@ from identification.pnlss.simulation import use_of
 from identification.pnlss.steady.balance import Balance
 from identification.pnlss.steady.basis import harmonics_of
 from identification.pnlss.steady.stability import Loss, loss_of_stability, multipliers
+from identification.prediction.steady_prediction import SteadyPrediction
 
-__all__ = ["SteadyStates", "motion_rows", "steady_states"]
+__all__ = ["PnlssResponse", "SteadyStates", "motion_rows", "steady_states"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -48,14 +49,14 @@ class SteadyStates:
     multipliers
         complex[n, n_states], of a disturbance over one sample, under the inputs as they are.
     stable
-        bool[n]. Under a given input: every multiplier below 1. Where a force is held: on a part of the curve that a slow
-        change of frequency can hold, and no multiplier above 1 but real ones, which belong to an input that is not held.
+        bool[n]. Under a given input: every multiplier is below 1. With a held force: a slow change of frequency can hold the
+        point, and no multiplier exceeds 1 except real ones, which belong to an input that is not held.
     loss
-        How each is unstable: ``fold``, ``period doubling``, ``Neimark-Sacker``; empty for stable ones.
+        Loss of stability: ``fold``, ``period doubling``, ``Neimark-Sacker``; empty for stable ones.
     state_use, input_use
         float[n, n_states], float[n, n_inputs], largest magnitude over the largest in the training data; NaN where unknown.
     input_channels, output_channels
-        What goes in, and what comes out.
+        Input and output channels.
     """
 
     frequency_hz: Float
@@ -110,7 +111,7 @@ class SteadyStates:
         return np.asarray(found)
 
     def joined(self, other: "SteadyStates") -> "SteadyStates":
-        """The points of both, these first."""
+        """The points of both, those of this one first."""
         arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _ARRAYS}
         return replace(self, **arrays, loss=(*self.loss, *other.loss))
 
@@ -135,7 +136,7 @@ def steady_states(
 ) -> SteadyStates:
     """The vibrations that solutions (float[n, n_unknowns]) of a balance describe.
 
-    ``statically_stable`` (bool[n]) tells, where the force is held, those that a slow change can hold.
+    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that a slow change can hold.
     """
     model, basis = balance.model, balance.basis
     count, harmonics = frequency_hz.size, basis.harmonics + 1
@@ -172,3 +173,53 @@ def steady_states(
         input_channels=model.inputs,
         output_channels=model.outputs,
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PnlssResponse:
+    """Frequency response of a nonlinear state-space model at constant force, with all harmonics.
+
+    Parameters
+    ----------
+    force_n, force
+        Level and kind of the force that is held, as in `SteadyPrediction`.
+    points, folds
+        The vibrations along the curve, and those at its turning points in frequency.
+    branch
+        int[n], 0 for the response that begins at the lowest frequency; 1 for a part followed from the highest frequency
+        because the first did not reach it.
+    notes
+        Notes for the user, one line each.
+    complete
+        Whether every path reached the far end of the band; otherwise a note says where it ended and why.
+    """
+
+    force_n: float
+    force: str
+    points: SteadyStates
+    folds: SteadyStates
+    branch: NDArray[np.int64]
+    notes: tuple[str, ...]
+    complete: bool = True
+
+    @property
+    def prediction(self) -> SteadyPrediction:
+        """The fundamental harmonics; the modal amplitude is unknown, for no mode shape is needed."""
+        count, folds = self.points.count, self.folds.count
+        return SteadyPrediction(
+            force_n=self.force_n,
+            force=self.force,
+            channels=self.points.channels,
+            frequency_hz=self.points.frequency_hz,
+            modal_amplitude=np.full(count, np.nan),
+            fundamental_n=np.abs(self.points.force_n[:, 1]),
+            displacement_m=self.points.displacement_m[:, 1],
+            stable=self.points.stable,
+            branch=self.branch,
+            range_use=np.asarray(self.points.range_use),
+            fold_frequency_hz=self.folds.frequency_hz,
+            fold_amplitude_m=np.abs(self.folds.displacement_m[:, 1, 0]),
+            fold_modal_amplitude=np.full(folds, np.nan),
+            notes=self.notes,
+            complete=self.complete,
+        )

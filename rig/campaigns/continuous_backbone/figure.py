@@ -5,12 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.campaigns.evaluation.figure import draw_history, heading
 from rig.figures.style import MAIN, REJECTED, SECOND, engineering, say_why_empty
+from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["draw_differences", "draw_ways"]
+__all__ = ["draw", "draw_differences", "draw_ways"]
 
 Point = Mapping[str, Any]
 _WAYS = (("up", SECOND, "^"), ("down", "#4f9d69", "v"))
@@ -18,6 +21,17 @@ _QUANTITIES = (
     ("modal_frequency_hz", "modal_frequency_std_hz", 1.0, "modal frequency, Hz"),
     ("damping_ratio", "damping_ratio_std", 100.0, "modal damping ratio, %"),
 )
+
+
+def draw(page: "Figure", recording: Recording) -> None:
+    """Draw both ways, their differences from the mean, and the loop over time."""
+    page.set_size_inches(9.0, 9.6)
+    axes = page.subplots(3, 2)
+    points = list(recording.latest.values())
+    draw_ways(axes[0], points)
+    draw_differences(axes[1], points)
+    draw_history(axes[2, 0], axes[2, 1], recording)
+    heading(page, recording)
 
 
 def draw_ways(axes: Sequence["Axes"], points: Sequence[Point]) -> None:

@@ -18,7 +18,7 @@ _DAY_S = 86400.0
 _KEYS = {
     SegmentKind.RAMP: ("ramp_periods", "level_ramp_periods", "approach_periods", "ramp_s", "silent_s"),
     SegmentKind.SETTLE: ("settle.longest_periods",),
-    SegmentKind.RECORD: ("record_periods", "periods"),
+    SegmentKind.RECORD: ("record_periods", "periods", "mean_s"),
     SegmentKind.HOLD: ("hold_periods", "start_periods", "lock_periods", "end_periods", "transient_periods"),
     SegmentKind.SWEEP: ("rate_hz_per_s", "rate_octaves_per_min"),
     SegmentKind.LEVEL_SWEEP: ("sweep_periods", "record_periods"),
@@ -52,6 +52,8 @@ def _duration_s(plan: Plan, bench: Bench, segment: Segment) -> float:
     """How long a segment takes at the most, at the lowest frequency that it may have, s."""
     if segment.kind is SegmentKind.SWEEP:
         return float(getattr(plan, "duration_s", 0.0))
+    if segment.duration_s is not None:
+        return segment.duration_s
     lowest_hz = bench.limits.frequency_hz[0]
     if segment.excitation is not None:
         lowest_hz = segment.excitation.frequency_hz

@@ -126,6 +126,10 @@ class Plan(Configured):
         """Numbers of the targets that are measured in one go with this one, itself included."""
         return frozenset((number,))
 
+    def row_stride(self, number: int, sample_rate_hz: float) -> int:
+        """Of how many rows one is stored while a target is measured; 1 for all."""
+        return 1
+
     def waveforms(self, sample_rate_hz: float) -> np.ndarray | None:
         """Waveforms of unit peak that the segments play, float64[n, period]; None where they play none."""
         return None

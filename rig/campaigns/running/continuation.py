@@ -13,27 +13,14 @@ from typing import Any
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
+from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import Plan, Target
 from rig.campaigns.plans import bench_of, plan_from
 from rig.errors import ConfigurationError
 from rig.recording.reader import Recording
 
-__all__ = ["FIXED", "VIBRATION", "Continuation", "changed_keys", "identities", "numbered", "what_is_left"]
-
-VIBRATION: dict[str, tuple[str, ...]] = {
-    "backbone": ("controller.phase_lag_deg",),
-    "stepped-phase": (),
-    "continuous-backbone": ("controller.phase_lag_deg",),
-    "response-controlled": (),
-    "stepped-sine": (),
-    "sweep": ("start_hz", "stop_hz", "rate_hz_per_s", "rate_octaves_per_min"),
-    "multisine": ("lowest_hz", "highest_hz", "resolution_hz", "grid", "detection_group", "phase_seed"),
-}
-"""By kind, what of a plan makes all its points other vibrations where it is changed."""
-
-FIXED: dict[str, tuple[str, ...]] = {"backbone": ("harmonics",), "continuous-backbone": ("harmonics",)}
-"""By kind, what of a plan may not change: what is made of all points together needs them evaluated alike."""
+__all__ = ["Continuation", "changed_keys", "identities", "numbered", "what_is_left"]
 
 Identity = tuple[object, ...]
 
@@ -84,7 +71,7 @@ def what_is_left(recording: Recording, change: Plan | None = None, source: str |
 
 def identities(plan: Plan) -> tuple[Identity, ...]:
     """What each of a plan's targets physically is, numbers to nine digits; the last entry tells equal ones apart."""
-    common = _rounded(attrgetter(path)(plan) for path in VIBRATION[plan.kind])
+    common = _rounded(attrgetter(path)(plan) for path in KINDS[plan.kind].identity)
     seen: Counter[Identity] = Counter()
     out = []
     for target in plan.targets():
@@ -130,7 +117,7 @@ def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: s
             f"{head}levels in {change.level_unit}: allowed are levels in {before.level_unit}, as in {name}; "
             "others are recorded in a file of their own"
         )
-    for path in FIXED.get(change.kind, ()):
+    for path in KINDS[change.kind].fixed:
         new, old = attrgetter(path)(change), attrgetter(path)(before)
         if new != old:
             raise ConfigurationError(f"{head}{path} = {new!r}: allowed is {old!r}, with which {name} was begun")

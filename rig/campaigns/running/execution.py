@@ -20,6 +20,7 @@ from rig.campaigns.running.advice import Before, Trip, advice_on
 from rig.campaigns.running.device_remarks import flag_names, with_device_remarks
 from rig.campaigns.running.evaluations import Evaluations
 from rig.campaigns.running.kept_rows import KeptRows
+from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trips import tripped_at
 from rig.errors import RecordingError
 from rig.loop.loop import LoopStatistics, RunningLoop
@@ -74,6 +75,7 @@ class Execution:
         self.journal, self.progress = journal, progress
         self.measure = KINDS[plan.kind].measure
         self.in_one_go = KINDS[plan.kind].in_one_go
+        self.watch = KINDS[plan.kind].watch
         self.targets = plan.targets()
         self.measured_before = before.done
         self.numbers = range(len(self.targets)) if before.numbers is None else before.numbers
@@ -86,6 +88,7 @@ class Execution:
         self.locked = any(point["accepted"] for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = KeptRows(loop.tick.row_dtype)
+        self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)
         self.evaluations = Evaluations()
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
@@ -121,7 +124,11 @@ class Execution:
 
     def _take(self, rows: np.ndarray) -> None:
         """Record and evaluate a chunk."""
-        self._write(self.journal.rows, rows)
+        stored, events = self.stored.take(self.tick.sample - rows.size, rows)
+        if stored.size:
+            self._write(self.journal.rows, stored)
+        for event in events:
+            self._write(self.journal.event, event)
         self._attempt(self._note_changes, rows)
         self._attempt(self._collect, rows)
         self._attempt(self.progress.advance, rows, self.tick)
@@ -198,7 +205,9 @@ class Execution:
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
-        return [{**point, "first_sample": first, "end_sample": first + rows.size} for point in points]
+        stored = self.stored.row_range(first, first + rows.size)
+        where = {} if stored is None else {"first_sample": stored[0], "end_sample": stored[1]}
+        return [{**point, **where} for point in points]
 
     def _report_rest(self) -> None:
         """Wait for the points that are still being worked out, also after a failure elsewhere or in one of them."""
@@ -246,6 +255,10 @@ class Execution:
     def _report(self, point: dict[str, Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
         point = with_plausibility(self.bench, self.plan, point, self.known)
+        if self.watch is not None:
+            point, stop = self.watch(self.plan, self.known, point)
+            if stop:
+                self.loop.request_stop(stop)
         quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
         point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
         self.known.append(point)

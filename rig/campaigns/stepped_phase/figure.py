@@ -7,16 +7,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import FrequencyResponse
+from rig.campaigns.evaluation.figure import said
+from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.figures.style import REJECTED
 from rig.figures.style import title as heading
+from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_stepped_phase"]
+__all__ = ["draw", "draw_stepped_phase"]
 
 NEAR_DEG = 5.0  # of phase resonance: the point that is marked as resonant
+
+
+def draw(page: "Figure", recording: Recording) -> None:
+    """Draw every level of a recording along its branch."""
+    draw_stepped_phase(
+        page,
+        recorded_frequency_responses(recording),
+        held="RMS of the force" if recording.configuration["plan"].get("levels_rms_n") else "",
+        title=said(recording, "stepped phase"),
+        lags_deg=sorted({point["asked_phase_lag_deg"] + 180.0 for point in recording.latest.values()}),
+    )
 
 
 def draw_stepped_phase(

@@ -1,6 +1,7 @@
 """`VirtualDAQ`: a full sibling of a real driver, with any block and any latency."""
 
 import math
+from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -13,7 +14,8 @@ from rig.drivers.virtual.kernels import exchange_block, fused
 from rig.drivers.virtual.loopback import loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
-from simulators.layout import Flag
+from rig.tick.safety.kernels import is_over
+from simulators.layout import Flag, RigArrays
 from simulators.sensing.parts import LOWEST_INTERNAL_RATE_HZ
 from simulators.virtual_rig import VirtualRig
 
@@ -178,7 +180,8 @@ class VirtualDAQ(DAQ):
         pass
 
     def _start(self) -> None:
-        self._arrays, self._state = self.rig.build(self._seed)
+        self._realised = self.rig.realised(self._seed)
+        self._arrays, self._state = self._realised.build(self._seed)
         self._queue = np.zeros(self.queue_samples)
         self._loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
         self._under_way = np.zeros(self.block + self.queue_samples)
@@ -186,18 +189,23 @@ class VirtualDAQ(DAQ):
         self._first = 0
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
+        if self.rig.wear.wears:
+            for arrays, part in self._pieces(voltages.size):
+                self._arrays = arrays
+                self._swap(voltages[part], inputs[part], self.flags[part])
+        else:
+            self._swap(voltages, inputs, self.flags)
+
+    def _swap(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
+        """Swap samples over which the plant stays as it is."""
         exchange_block(
-            self._arrays,
-            self._state,
-            self._queue,
-            self._first,
-            voltages,
-            inputs,
-            self.flags,
-            self._counts,
-            self._loopback,
+            self._arrays, self._state, self._queue, self._first, voltages, inputs, flags, self._counts, self._loopback
         )
         self._first += voltages.size
+
+    def _pieces(self, n: int) -> Iterator[tuple[RigArrays, slice]]:
+        """The next ``n`` samples of the rig in pieces over each of which its plant stays as it is, with its arrays."""
+        return self._realised.pieces(self._arrays, int(self._state.counter[0]), n)
 
     def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
         """Run the tick and the rig in one compiled loop, bit for bit as `exchange` with this block would.
@@ -210,7 +218,23 @@ class VirtualDAQ(DAQ):
                 f"the tick expects a lead of {lead} samples, this device has {math.floor(self.block + self.latency_samples)}"
             )
         volts = np.empty(len(self.channels))
-        return fused(t, self._arrays, self._state, self._under_way, volts, readings, rows, self._counts, self._loopback)
+        done = 0
+        for arrays, part in self._pieces(rows.size):
+            self._arrays = arrays
+            done += fused(
+                t,
+                self._arrays,
+                self._state,
+                self._under_way,
+                volts,
+                readings[part],
+                rows[part],
+                self._counts,
+                self._loopback,
+            )
+            if is_over(t.guard[0], lead):
+                break
+        return done
 
     def _stop(self) -> None:
         self._rest()

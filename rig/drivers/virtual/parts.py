@@ -15,7 +15,7 @@ UNITS = {
     "m_s2": "m/s^2", "n_m_rad": "N m/rad", "n_s_m": "N s/m", "n_m4": "N m^4", "n_m3": "N/m^3", "n_m2": "N/m^2",
     "kg_m3": "kg/m^3", "kg_m2": "kg m^2", "v_per_unit": "V per N or m/s^2", "rad_s": "rad/s", "n_m": "N/m", "n_a": "N/A",
     "a_v": "A/V", "per_m2": "1/m^2", "per_m": "1/m", "ohm": "ohm", "deg": "deg", "hz": "Hz", "pa": "Pa", "kg": "kg",
-    "samples": "samples", "s": "s", "h": "H", "v": "V", "n": "N", "m": "m", "a": "A",
+    "samples": "samples", "per_s": "1/s", "s": "s", "h": "H", "v": "V", "n": "N", "m": "m", "a": "A",
 }  # fmt: skip
 """Units by the end of a key, longer ends first."""
 _TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}

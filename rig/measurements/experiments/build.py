@@ -11,6 +11,7 @@ from identification import Experiment, IdentificationError
 from identification.signals.decimation import LARGEST_FACTOR
 from identification.validation import positive
 from rig.bench.configuration import validated
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.drift import of_the_result
 from rig.errors import RecordingError
@@ -22,8 +23,7 @@ from rig.recording.reader import Recording
 
 __all__ = ["KINDS", "default_rate_hz", "experiments", "rows_from_rest"]
 
-SETTLED = ("backbone", "stepped-phase", "stepped-sine", "response-controlled")
-KINDS = ("multisine", "sweep", *SETTLED)
+KINDS = tuple(name for name, campaign in CAMPAIGNS.items() if campaign.experiments)
 """Kinds of recordings that hold experiments."""
 
 SAMPLES_PER_PERIOD = 25
@@ -102,14 +102,14 @@ def experiments(
         )
     ratio = rate_hz / bench.sample_rate_hz
     whole = Fraction(ratio).limit_denominator(LARGEST_FACTOR)
-    if recording.kind != "multisine" and abs(float(whole) / ratio - 1.0) > _SAME_RATIO:
+    if _made_of(recording) != "realisations" and abs(float(whole) / ratio - 1.0) > _SAME_RATIO:
         raise IdentificationError(
             f"rate_hz: is {rate_hz:.10g} Hz, {recording.path} was recorded at {bench.sample_rate_hz:g} Hz; allowed are ratios "
             f"of whole numbers up to {LARGEST_FACTOR}, such as {float(whole) * bench.sample_rate_hz:.10g} Hz"
         )
     used = _accepted(recording)
     stem = recording.path.stem
-    if recording.kind == "multisine":
+    if _made_of(recording) == "realisations":
         plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
         return tuple(
             realisation(
@@ -136,7 +136,7 @@ def _records(
     """Experiments of all that is no multisine."""
     for point in points:
         rows, name = point_rows(recording, point["number"]), _called(recording.path.stem, point)
-        if recording.kind == "sweep":
+        if _made_of(recording) == "sweeps":
             start_hz = float(recording.configuration["plan"]["start_hz"])
             lead = rows_from_rest(recording, point["number"], Fraction(rate_hz / signals.bench.sample_rate_hz))
             rows = np.concatenate([lead, rows])
@@ -183,7 +183,7 @@ def default_rate_hz(recording: Recording) -> float:
         return most
     decade = 10.0 ** math.floor(math.log10(most))
     rate_hz = next(factor * decade for factor in _ROUND if factor * decade <= most * (1.0 + 1e-12))
-    if recording.kind == "multisine":
+    if _made_of(recording) == "realisations":
         period_s = round(bench.sample_rate_hz / float(plan["resolution_hz"])) / bench.sample_rate_hz
         if abs(rate_hz * period_s - round(rate_hz * period_s)) > 1e-9:
             return math.floor(most * period_s) / period_s
@@ -193,11 +193,15 @@ def default_rate_hz(recording: Recording) -> float:
 def _highest_hz(recording: Recording) -> float:
     """The highest frequency that is excited."""
     plan = recording.configuration["plan"]
-    if recording.kind == "multisine":
+    if _made_of(recording) == "realisations":
         return float(plan["highest_hz"])
-    if recording.kind == "sweep":
+    if _made_of(recording) == "sweeps":
         return max(float(plan["start_hz"]), float(plan["stop_hz"]))
     return max(float(point["frequency_hz"]) for point in _accepted(recording))
+
+
+def _made_of(recording: Recording) -> str | None:
+    return CAMPAIGNS[recording.kind].experiments
 
 
 def _accepted(recording: Recording) -> list[dict[str, Any]]:

@@ -27,6 +27,7 @@ from identification import (
     stepped_sine_mode,
 )
 from identification.validation import one_specimen
+from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import (
     STEPPED,
@@ -142,13 +143,14 @@ def _backbones(path: Path) -> tuple[Sequence[Backbone | ContinuousBackbone], tup
     kind = kind_of(path)
     if kind in KINDS and isinstance(measured := load(path), Backbone):
         return (measured,), ()
-    if kind not in ("backbone", "continuous-backbone"):
+    if kind not in kinds_that_yield(Backbone):
         raise RecordingError(
             f"{path}: holds a {kind}; a nonlinear mode comes from backbones, or from stepped sines alone"
         )
     with Recording(path) as recording:
         notes = points_left_out(recording)
-        return (continuous_backbones(recording) if kind != "backbone" else (backbone(recording),)), notes
+        continuous = kind in kinds_that_yield(ContinuousBackbone)
+        return (continuous_backbones(recording) if continuous else (backbone(recording),)), notes
 
 
 def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
@@ -181,7 +183,7 @@ def _matrices(
     With the voltage as instrument the fit is to force and motions over the voltage.
     """
     kind = kind_of(path)
-    if kind == "multisine":
+    if kind in kinds_that_yield(PeriodicSpectra):
         with Recording(path) as recording:
             specimen = bench_of_recording(recording).specimen.name
             measured, missing = list(spectra(recording).values()), points_left_out(recording)
@@ -204,7 +206,7 @@ def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
     if len(paths) != 1:
         raise ConfigurationError(f"`kind` exciter: {len(paths)} files given, allowed is one multisine recording")
     kind = kind_of(paths[0])
-    if kind != "multisine":
+    if kind not in kinds_that_yield(PeriodicSpectra):
         raise RecordingError(f"{paths[0]}: holds a {kind}; an exciter model comes from a multisine")
     low, high = request.band_hz or (None, None)
     with Recording(paths[0]) as recording:

@@ -7,6 +7,7 @@ from typing import cast
 from identification import (
     Exciter,
     FrequencyResponse,
+    PeriodicSpectra,
     PnlssModel,
     PredictionError,
     Predictions,
@@ -15,6 +16,7 @@ from identification import (
     pnlss_frequency_response,
     simulated_run,
 )
+from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording
 from rig.measurements.experiments import experiments
@@ -126,7 +128,7 @@ def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedR
     """Every realisation of a recording, simulated, what it was to the model, and notes."""
     model = identified.model
     with Recording(path) as recording:
-        if recording.kind != "multisine":
+        if recording.kind not in kinds_that_yield(PeriodicSpectra):
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a multisine recording")
         found = experiments(
             recording,

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from identification import (
     IdentificationError,
     PnlssModel,
+    Transient,
     compare_sweep,
 )
 from identification.channels import find_role
-from identification.prediction.simulated_runs import estimated_initial_state
+from identification.pnlss.errors import estimated_initial_state
 from rig.campaigns.evaluation.gaps import bridged, lost_rows
+from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import ConfigurationError, RecordingError
@@ -40,7 +42,7 @@ def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swep
     do not fit.
     """
     with Recording(path) as recording:
-        if recording.kind != "sweep":
+        if recording.kind not in kinds_that_yield(Transient):
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
         notes = (
             *strangers(bench_of_recording(recording), models.model.specimen, models.exciter, str(path)),

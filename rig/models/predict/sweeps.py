@@ -19,6 +19,7 @@ from identification import (
 )
 from rig.bench import Bench
 from rig.campaigns.evaluation.gaps import bridged
+from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import ConfigurationError, RecordingError
@@ -83,7 +84,7 @@ class Swept:
 def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
     """Every sweep of a recording; `RecordingError` where it holds something else."""
     with Recording(path) as recording:
-        if recording.kind != "sweep":
+        if recording.kind not in kinds_that_yield(Transient):
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
         notes = strangers(bench_of_recording(recording), models.mode.specimen, models.exciter, str(path))
         recorded = sweeps(recording)

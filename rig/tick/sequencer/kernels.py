@@ -355,6 +355,7 @@ def advance(
         elif verdict != RUNNING:
             give_up(progress, segments, outcomes, settling, lock, guard, verdict, cycle, sample)
         return
-    if segment.kind != SETTLE and elapsed >= segment.periods and not (segment.kind == RECORD and is_slipping(lock)):
+    over = sample - progress.start_sample >= segment.samples if segment.samples > 0 else elapsed >= segment.periods
+    if segment.kind != SETTLE and over and not (segment.kind == RECORD and is_slipping(lock)):
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
         close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE, cycle, sample)

@@ -80,6 +80,7 @@ SEGMENT = np.dtype(
         ("geometric", "i8"),
         ("lag_rad", "f8"),
         ("periods", "f8"),
+        ("samples", "i8"),
         ("on_failure", "i8"),
         ("on_lost_lock", "i8"),
         ("drive", "i8"),
@@ -89,9 +90,11 @@ SEGMENT = np.dtype(
         ("waveform", "i8"),
     ]
 )
-"""One segment of a plan; ``level`` in the unit of its amplitude law (V, N, m), where ``geometric`` ramped by its logarithm,
-``lag_rad`` the wanted phase lag, ``omega`` (rad/s) that a tone ends with, ``rate`` of a sweep in rad/s per sample, of a
-logarithmic one in 1 per sample, ``waveform`` the number of the one that is played."""
+"""One segment of a plan, ``periods`` long, or ``samples`` where these are not 0.
+
+``level`` in the unit of its amplitude law (V, N, m), where ``geometric`` ramped by its logarithm, ``lag_rad`` the wanted phase
+lag, ``omega`` (rad/s) that a tone ends with, ``rate`` of a sweep in rad/s per sample, of a logarithmic one in 1 per sample,
+``waveform`` the number of the one that is played."""
 
 OUTCOME = np.dtype(
     [

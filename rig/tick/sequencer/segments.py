@@ -74,8 +74,8 @@ class Segment:
 
     Without an ``excitation`` the phase-locked loop chooses the frequency, for the lag ``lag_deg`` (if not given, the law's).
     ``amplitude_law`` says what the level is (if not given, the plan's); where it changes, the level begins at what is
-    measured, without a bump. A ``geometric`` ramp goes by the level's logarithm. A sweep is over at its last frequency,
-    whatever its ``periods``.
+    measured, without a bump. A ``geometric`` ramp goes by the level's logarithm. A held segment with ``duration_s`` lasts so
+    long, whatever its ``periods``; a sweep is over at its last frequency, whatever its ``periods``.
     """
 
     kind: SegmentKind
@@ -88,6 +88,7 @@ class Segment:
     amplitude_law: AmplitudeLaw | None = None
     lag_deg: float | None = None
     geometric: bool = False
+    duration_s: float | None = None
 
 
 def segment_table(
@@ -104,6 +105,7 @@ def segment_table(
     for row, segment in zip(table, segments, strict=True):
         row["kind"], row["point"], row["level"] = segment.kind, segment.point, segment.level
         row["periods"] = segment.periods
+        row["samples"] = 0 if segment.duration_s is None else max(1, round(segment.duration_s * sample_rate_hz))
         row["amplitude_law"] = amplitude_law if segment.amplitude_law is None else segment.amplitude_law
         row["lag_rad"] = lag_rad if segment.lag_deg is None else math.radians(segment.lag_deg)
         row["geometric"] = segment.geometric

@@ -35,13 +35,21 @@ def linear_system(states: int, inputs: int, outputs: int, seed: int = 0) -> Pnls
 
 
 def nonlinear_system(
-    states: int, inputs: int, outputs: int, *, degrees: tuple[int, ...] = (2, 3), saturating: int = 0, seed: int = 0
+    states: int,
+    inputs: int,
+    outputs: int,
+    *,
+    degrees: tuple[int, ...] = (2, 3),
+    saturating: int = 0,
+    seed: int = 0,
+    function: str = "tanh",
 ) -> PnlssModel:
-    """The same with polynomials in states and outputs, and saturating features in both."""
+    """The same with polynomials in states and outputs, and functions of weighted sums in both, saturating or others."""
     rng = np.random.default_rng(seed + 100)
     monomials = Features.monomials(states, inputs, degrees)
     width = states + inputs + 1
-    phi, chi = (replace(monomials, weights=rng.normal(size=(saturating, width))) for _ in range(2))
+    names = (function,) * saturating
+    phi, chi = (replace(monomials, weights=rng.normal(size=(saturating, width)), functions=names) for _ in range(2))
     model = linear_system(states, inputs, outputs, seed).with_features(phi, chi)
     return replace(model, e=0.004 * rng.normal(size=model.e.shape), f=0.05 * rng.normal(size=model.f.shape))
 

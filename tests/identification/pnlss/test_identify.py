@@ -12,6 +12,7 @@ from identification import (
     FitSettings,
     IdentificationError,
     PnlssModel,
+    StateSpace,
     best_linear_responses,
     identify_pnlss,
     linear_pnlss,
@@ -20,8 +21,8 @@ from identification import (
 from identification.linear.state_space_fit import spectral_radius
 from identification.pnlss import identify, saturating_starts
 from identification.pnlss import linear_model as linear_model_module
-from identification.pnlss.fitting import memory
-from identification.pnlss.linear_start import linear_start, reflected
+from identification.pnlss.fitting import checks
+from identification.pnlss.linear_model import linear_start, reflected
 from tests.identification.pnlss.multisines import RATE_HZ, channels, linear_model, measured, multisine, oscillator
 
 
@@ -195,7 +196,7 @@ def test_an_order_with_more_parameters_than_values_is_refused_before_anything_is
         identify_pnlss(experiments, states=20)
 
 
-def test_an_unstable_start_is_reflected_and_fitted() -> None:
+def test_an_unstable_start_is_reflected_and_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
     stable = oscillator()
     outside = stable._replace(a=stable.a * 1.05 / spectral_radius(stable.a))
     inside = reflected(outside)
@@ -204,8 +205,16 @@ def test_an_unstable_start_is_reflected_and_fitted() -> None:
         np.sort_complex(1.0 / np.conj(np.linalg.eigvals(outside.a))),
     )
     assert reflected(stable) is stable
-    responses = best_linear_responses([measured(linear_model(stable), multisine(0), noise=0.15)])
+    unstable: list[bool] = []
+
+    def recorded(model: StateSpace) -> StateSpace:
+        unstable.append(spectral_radius(model.a) >= 1.0)
+        return reflected(model)
+
+    monkeypatch.setattr(linear_model_module, "reflected", recorded)
+    responses = best_linear_responses([measured(linear_model(stable), multisine(3, samples=256), noise=0.15)])
     assert spectral_radius(linear_start(responses, 8, sample_rate_hz=RATE_HZ).model.a) < 1.0
+    assert any(unstable)
 
 
 def test_without_periodic_experiments_a_linear_model_has_to_be_given() -> None:
@@ -270,7 +279,7 @@ def test_what_cannot_be_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         identify_pnlss(experiments, states=4, linear=oscillator())
     with pytest.raises(IdentificationError, match="linear: has an eigenvalue of magnitude 2"):
         identify_pnlss(experiments, states=2, linear=oscillator()._replace(a=2.0 * np.eye(2)))
-    monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
+    monkeypatch.setattr(checks, "available_bytes", lambda: 1000)
     with pytest.raises(IdentificationError, match="memory: the fit needs"):
         identify_pnlss(experiments, states=2)
 

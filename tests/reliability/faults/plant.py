@@ -7,7 +7,7 @@ import numpy as np
 from rig.bench import Bench
 from simulators.kernels import run_observed
 from simulators.layout import RigArrays
-from simulators.plant.discretise import aligned, pad
+from simulators.plant.compilation import aligned, pad
 from simulators.scatter import Deviation
 from simulators.virtual_rig import VirtualRig
 from tests.reliability.faults.spoiling import AMPLIFIER, SENSOR

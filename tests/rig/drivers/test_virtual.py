@@ -114,3 +114,43 @@ def test_facts_of_a_free_specimen_are_compared_with_a_mode_that_vibrates() -> No
     assert any(
         f"the virtual specimen has {mode.frequency_hz[2]:.6g} Hz" in remark for remark in make_daq(bench).remarks
     )
+
+
+WEAR: dict[str, Any] = {"frequency_per_s": [-0.01], "damping_per_s": [0.1], "until_s": 2.0}
+
+
+@pytest.mark.parametrize("block", [1, 7, 50])
+@pytest.mark.parametrize("wear", [{"every_s": 0.113}, {"every_s": 2e-4, "until_s": 0.005}])
+def test_fused_and_exchanged_runs_agree_while_the_specimen_wears(block: int, wear: dict[str, float]) -> None:
+    rows = []
+    for chosen, fused in ((WEAR | wear, True), (WEAR | wear, False), ({}, True)):
+        bench = bench_with(wear=chosen, queue_blocks=1)
+        with make_daq(bench) as daq:
+            daq.start(block)
+            tick = tick_for(bench, block + daq.latency_samples, 0.3)
+            rows.append(np.concatenate([*Loop(daq, tick, fused=fused).run()]))
+    fused_rows, exchanged, unworn = rows
+    assert 0 <= exchanged.size - fused_rows.size < block
+    for name in fused_rows.dtype.names:
+        np.testing.assert_array_equal(fused_rows[name], exchanged[name][: fused_rows.size])
+    assert not np.array_equal(fused_rows["inputs"][:5000], unworn["inputs"][:5000])
+
+
+def test_exchanged_readings_of_a_worn_specimen_do_not_depend_on_the_block() -> None:
+    bench = bench_with(wear=WEAR | {"every_s": 0.0266}, scatter={"frequency": 0.01})
+    voltages = np.random.default_rng(2).uniform(-0.5, 0.5, 700)
+    readings = []
+    for block in (1, 7, 50, 700):
+        with make_daq(bench, 4) as daq:
+            daq.start(block)
+            readings.append(np.vstack([daq.exchange(part) for part in voltages.reshape(-1, block)]))
+    for other in readings[1:]:
+        np.testing.assert_array_equal(readings[0], other)
+
+
+def test_wear_that_leaves_nothing_is_refused_in_one_line() -> None:
+    with pytest.raises(ConfigurationError) as error:
+        make_daq(bench_with(wear={"frequency_per_s": [-0.01], "until_s": 200.0}))
+    assert str(error.value) == (
+        "driver.options: wear: until_s = 200: allowed is below 100, where frequency_per_s = -0.01 reaches -100 %"
+    )

@@ -32,6 +32,17 @@ def measured_v(plant: VirtualPlant, *blocks: int) -> np.ndarray:
     return np.vstack(rows)
 
 
+def test_a_specimen_that_wears_measures_the_same_behind_a_device() -> None:
+    bench = bench_with(wear={"frequency_per_s": [-0.1], "until_s": 1.0, "every_s": 0.01})
+    with make_daq(bench, SEED) as daq:
+        daq.start(VOLTAGES.size)
+        expected = daq.exchange(VOLTAGES)
+    plant = VirtualPlant(bench, SEED)
+    for blocks in ((1,), (60,), (7, 50, 3)):
+        plant.reset()
+        np.testing.assert_array_equal(measured_v(plant, *blocks), expected)
+
+
 def test_every_start_with_the_same_or_another_block_measures_the_same(readings_v: np.ndarray) -> None:
     plant = VirtualPlant(bench_with(), SEED)
     for blocks in ((5,), (5,), (60,), (1,), (240,), (1,), (24,)):

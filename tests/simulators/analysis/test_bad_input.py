@@ -6,9 +6,9 @@ import numba
 import numpy as np
 import pytest
 
-from simulators.analysis.errors import NotConvergedError
 from simulators.analysis.harmonic_balance import constant_force_response, forced_response, phase_resonance_backbone
-from simulators.analysis.hysteresis import hysteresis_loops
+from simulators.analysis.responses import NotConvergedError
+from simulators.analysis.site_forces import hysteresis_loops
 from simulators.layout import Flag
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.analysis.rigs import one_mode

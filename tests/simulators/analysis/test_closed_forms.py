@@ -6,7 +6,7 @@ import pytest
 
 from simulators.analysis.frequency_responses import frequency_response
 from simulators.analysis.harmonic_balance import constant_force_response, forced_response, phase_resonance_backbone
-from simulators.analysis.hysteresis import hysteresis_loops
+from simulators.analysis.site_forces import hysteresis_loops
 from tests.simulators.analysis.rigs import DAMPING_RATIO, FREQUENCY_HZ, SHAPE, one_mode
 from tests.simulators.references import ideal
 

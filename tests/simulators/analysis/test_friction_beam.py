@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 
 from simulators.analysis.frequency_responses import frequency_response
 from simulators.analysis.harmonic_balance import constant_force_response, phase_resonance_backbone
-from simulators.analysis.hysteresis import hysteresis_loops
 from simulators.analysis.responses import PeriodicResponses
+from simulators.analysis.site_forces import hysteresis_loops
 from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal

@@ -4,7 +4,7 @@ import pytest
 from simulators.analysis.balance import Balance
 from simulators.analysis.conditions import Conditions
 from simulators.analysis.kernels import friction_over_a_period
-from simulators.analysis.series import Series
+from simulators.analysis.site_forces import Series
 from tests.reference.friction import jenkins_over_a_period
 from tests.simulators.analysis.rigs import every_site
 

@@ -8,8 +8,7 @@ from pydantic import ValidationError
 from scipy.linalg import eigh
 
 from simulators.structures.beam import Lump, Spring
-from simulators.structures.lap_joint import Interface, LapJointModes, Section, lap_joint_modes
-from simulators.structures.lap_mesh import LapMesh
+from simulators.structures.lap_joint import Interface, LapJointModes, LapMesh, Section, lap_joint_modes
 from simulators.structures.structure import LapJointedBeam
 
 LENGTH_M, LAP_M = 0.72, 0.12

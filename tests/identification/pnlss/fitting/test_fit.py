@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from identification import FitProgress, FitSettings, IdentificationError, PnlssFit, fit_pnlss, pnlss_errors
-from identification.pnlss.fitting import memory
-from identification.pnlss.fitting.memory import needed_bytes
+from identification.pnlss.fitting import checks
+from identification.pnlss.fitting.checks import needed_bytes
 from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.problem import Problem
@@ -240,7 +240,7 @@ def test_memory_that_is_not_there_is_asked_for_before_the_fit(monkeypatch: pytes
     one = periodic_experiment(system, 400)
     need = needed_bytes(Parameters(system), [one], True)
     assert need["Jacobian of a period"] >= 8 * 400 * Parameters(system).shared
-    monkeypatch.setattr(memory, "available_bytes", lambda: sum(need.values()) - 1)
+    monkeypatch.setattr(checks, "available_bytes", lambda: sum(need.values()) - 1)
     with pytest.raises(IdentificationError, match=r"memory: .*are free; leave the frequency weighting out"):
         fit_pnlss(disturbed(system), [one], settings=FitSettings(band_hz=(0.0, 50.0)))
     assert fit_pnlss(disturbed(system), [one], settings=FitSettings(iterations=1)).history.iterations == 1

@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from identification import Experiment, PnlssModel
+from identification.pnlss.features import FUNCTIONS
 from identification.pnlss.fitting.frequency_lines import with_lines
 from identification.pnlss.fitting.normal_equations import jacobian, kept_samples, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
@@ -37,10 +38,13 @@ def differences(parameters: Parameters, vector: Float, one: Record, weights: Flo
     return np.stack(columns, axis=-1)
 
 
+@pytest.mark.parametrize("function", FUNCTIONS)
 @pytest.mark.parametrize(("states", "inputs", "outputs"), [(2, 1, 1), (3, 1, 4), (2, 2, 2)])
 @pytest.mark.parametrize("estimated", [False, True])
-def test_the_jacobian_is_that_of_finite_differences(states: int, inputs: int, outputs: int, estimated: bool) -> None:
-    system = nonlinear_system(states, inputs, outputs, saturating=2)
+def test_the_jacobian_is_that_of_finite_differences(
+    states: int, inputs: int, outputs: int, estimated: bool, function: str
+) -> None:
+    system = nonlinear_system(states, inputs, outputs, saturating=2, function=function)
     begin = np.linspace(0.2, 0.5, states) if estimated else None
     one = record(system, replace(experiment(system, 120, begin=begin, noise=0.1), counted_from=20))
     parameters = Parameters(system, int(estimated))

@@ -6,8 +6,7 @@ import pytest
 from identification import IdentificationError, PnlssModel, pnlss_response, pnlss_steady_state
 from identification.pnlss.steady.balance import Balance, samples_for
 from identification.pnlss.steady.basis import Basis
-from identification.pnlss.steady.coupled import Coupled
-from identification.pnlss.steady.drives import Drive, HeldOutput, Sine
+from identification.pnlss.steady.drives import Coupled, Drive, HeldOutput, Sine
 from tests.identification.pnlss.steady.oscillators import (
     RATE_HZ,
     driven_by_voltage,

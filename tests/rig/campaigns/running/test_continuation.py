@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from controller import preset
 from rig.bench import load_bench
 from rig.campaigns.backbone.plan import BackbonePlan
-from rig.campaigns.kinds import KINDS
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.running.continuation import FIXED, VIBRATION, changed_keys, identities, numbered, what_is_left
+from rig.campaigns.running.continuation import changed_keys, identities, numbered, what_is_left
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import ConfigurationError
@@ -120,11 +119,6 @@ def test_what_makes_other_points_and_what_does_not(before, change, kept):
     after = type(before).model_validate(before.model_dump() | change)
     old = set(range(len(before.targets())))
     assert len(old & set(numbered([(before, None)], after))) == kept
-
-
-def test_for_every_kind_it_is_said_what_makes_a_point():
-    assert set(VIBRATION) == set(KINDS)
-    assert set(FIXED) <= set(KINDS)
 
 
 def recording(tmp_path, *plans, points=()):

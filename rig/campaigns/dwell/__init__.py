@@ -1,0 +1,1 @@
+"""The dwell campaign: resonance track and dwell."""

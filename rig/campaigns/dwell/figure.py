@@ -1,0 +1,55 @@
+"""Figure of a dwell: frequency, damping, amplitude and force over the cycles, with the limits of the plan."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.campaigns.dwell.campaign import recorded_course
+from rig.campaigns.evaluation.figure import heading
+from rig.figures.style import MAIN, REJECTED, SECOND, engineering
+from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw"]
+
+NEAR = 0.2  # of a limit, from which on it is drawn: further away it would hide the course
+
+
+def draw(page: "Figure", recording: Recording) -> None:
+    """Draw the accepted means over the cycles; limits are dashed, means that were not accepted are marked below."""
+    course, plan = recorded_course(recording), recording.configuration["plan"]
+    axes: Any = page.subplots(2, 2, sharex=True)
+    held = "levels_m" if plan.get("levels_m") else ""
+    amplitude, unit = engineering(course.amplitude_m)
+    panels = (
+        (axes[0, 0], course.modal_frequency_hz, "modal frequency, Hz", "frequency"),
+        (axes[0, 1], 100.0 * course.damping_ratio, "modal damping ratio, %", "damping"),
+        (axes[1, 0], amplitude, f"displacement amplitude, {unit}", "" if held else "amplitude"),
+        (axes[1, 1], course.force_n, "fundamental force, N", "amplitude" if held else ""),
+    )
+    left_out = [point["cycles"] for point in recording.latest.values() if not point["accepted"] and "cycles" in point]
+    for axis, values, label, watched in panels:
+        axis.plot(course.cycles, values, "o-", ms=2.5, lw=0.9, color=MAIN)
+        axis.set_ylabel(label)
+        _limits(axis, values, plan, watched)
+        if left_out:
+            axis.plot(left_out, np.full(len(left_out), np.nanmin(values)), "x", ms=4, color=REJECTED)
+    for axis in axes[1]:
+        axis.set_xlabel("cycles")
+    if axes[0, 0].get_legend_handles_labels()[0]:
+        axes[0, 0].legend(fontsize=8)
+    heading(page, recording)
+
+
+def _limits(axis: "Axes", values: np.ndarray, plan: dict[str, Any], watched: str) -> None:
+    """The limits on the side to which the quantity has gone."""
+    if not watched or not np.isfinite(values[0]):
+        return
+    sign = -1.0 if np.nanmean(values) < values[0] else 1.0
+    for name, colour in (("alarm", REJECTED), ("abort", SECOND)):
+        limit = plan[name].get(watched)
+        if limit is not None and np.nanmax(np.abs(values / values[0] - 1.0)) > NEAR * limit:
+            axis.axhline(values[0] * (1.0 + sign * limit), color=colour, lw=0.9, ls="--", label=f"{name}.{watched}")

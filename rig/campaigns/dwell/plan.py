@@ -1,0 +1,135 @@
+"""The dwell campaign: phase resonance is tracked at one level for a time or a number of cycles."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from rig.bench import Bench
+from rig.bench.configuration import Configured
+from rig.campaigns.planning.locked import SettledPlan
+from rig.campaigns.planning.plan import Target
+from rig.errors import ConfigurationError
+from rig.tick.sequencer.layout import OnFailure, SegmentKind
+from rig.tick.sequencer.segments import Segment
+
+__all__ = ["DriftLimits", "DwellPlan"]
+
+FEWEST_PERIODS = 10
+"""Periods of a mean, from which frequency and damping can be told."""
+
+
+class DriftLimits(Configured):
+    """Relative changes from the first mean, of either sign; a quantity without a limit is not watched."""
+
+    frequency: float | None = Field(None, gt=0, le=1)
+    """Relative change of the modal frequency."""
+    damping: float | None = Field(None, gt=0, le=100)
+    """Relative change of the damping ratio."""
+    amplitude: float | None = Field(None, gt=0, le=100)
+    """Relative change of the displacement amplitude of the drive point; of the force, where the displacement is held."""
+
+
+class DwellPlan(SettledPlan):
+    """One level held at phase resonance while the specimen ages, as in a fatigue test.
+
+    The vibration is settled once. From then on it is evaluated without a gap in means of ``mean_s``, each a point of the
+    recording: frequency, damping and amplitude over the cycles. Rows are stored in full for every ``record_every``-th mean, the
+    first and the last; in between one row in ``telemetry_s`` is stored, so that a test of ten hours stays small.
+    """
+
+    kind: Literal["dwell"] = "dwell"
+    """Kind of campaign."""
+    cycles: int | None = Field(None, ge=FEWEST_PERIODS, le=10**12)
+    """Number of cycles at the level; this or ``duration_s``."""
+    duration_s: float | None = Field(None, gt=0, le=1e7)
+    """Time at the level, s; this or ``cycles``."""
+    mean_s: float = Field(10.0, gt=0, le=3600)
+    """Length of a mean, s. With ``cycles`` it is the whole periods of ``controller.centre_frequency_hz`` in that time."""
+    record_every: int = Field(60, ge=1, le=10_000)
+    """Of how many means the rows of one are stored in full."""
+    telemetry_s: float = Field(0.1, gt=0, le=60)
+    """Time from one stored row to the next where rows are not stored in full, s."""
+    ramp_periods: float = Field(40.0, ge=1, le=1e5)
+    """Length of the ramp to the level, periods."""
+    alarm: DriftLimits = DriftLimits()
+    """Changes from the first mean that are warned of; the test goes on."""
+    abort: DriftLimits = DriftLimits()
+    """Changes from the first mean at which the output is ramped down and the test ends."""
+    accepted_level_error: float = Field(0.01, gt=0, le=1)
+    """Largest relative error of a held force or displacement over a mean with which it is accepted."""
+    repeats: Literal[1] = 1
+    """A specimen ages once."""
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Self:
+        if (self.cycles is None) == (self.duration_s is None):
+            raise ValueError("cycles, duration_s: exactly one of the two is to be given")
+        if len(self.levels) != 1:
+            raise ValueError(f"{self.levels_key}: {len(self.levels)} levels, allowed is exactly 1")
+        lowest_hz = self.controller.frequency_window_hz[0]
+        if self.mean_s * lowest_hz < FEWEST_PERIODS:
+            raise ValueError(
+                f"mean_s = {self.mean_s:g}: allowed is from {FEWEST_PERIODS / lowest_hz:.3g} s, "
+                f"{FEWEST_PERIODS} periods at the lowest frequency of the window"
+            )
+        if self.duration_s is not None and self.duration_s < self.mean_s:
+            raise ValueError(f"duration_s = {self.duration_s:g}: allowed is from mean_s = {self.mean_s:g} s")
+        return self
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Means, by the key that says for how long."""
+        return {"cycles" if self.cycles is not None else "duration_s": self.n_means}
+
+    @property
+    def mean_periods(self) -> int:
+        """Periods of a mean, where the length is given in cycles."""
+        return max(FEWEST_PERIODS, round(self.mean_s * self.controller.centre_frequency_hz))
+
+    @property
+    def n_means(self) -> int:
+        """Number of means; what is left over lengthens or shortens the last by up to a half."""
+        whole = self.mean_s if self.duration_s is not None else float(self.mean_periods)
+        length = self.duration_s if self.duration_s is not None else float(self.cycles or 0)
+        return max(1, int(min(1e9, length / whole) + 0.5))
+
+    def targets(self) -> tuple[Target, ...]:
+        """All means in their order."""
+        return tuple(Target(number=number, level=self.levels[0]) for number in range(self.n_means))
+
+    def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
+        """Start, ramp and settling, then one record after the other for all means that are not ``done``."""
+        failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
+        left = [target for target in self.targets() if target.number not in done]
+        if not left:
+            return ()
+        level, first = self.levels[0], left[0].number
+        out = self.start_segments()
+        out.append(Segment(SegmentKind.RAMP, -1, level, self.ramp_periods, geometric=self.levels_key != "levels_v"))
+        out.append(Segment(SegmentKind.SETTLE, first, level, self.settle.longest_periods, OnFailure.STOP, lost))
+        for target in left:
+            last = target.number == self.n_means - 1
+            before = target.number
+            if self.duration_s is not None:
+                length_s = self.duration_s - before * self.mean_s if last else self.mean_s
+                held = Segment(SegmentKind.RECORD, before, level, 0.0, failure, lost, duration_s=length_s)
+            else:
+                periods = (self.cycles or 0) - before * self.mean_periods if last else self.mean_periods
+                held = Segment(SegmentKind.RECORD, before, level, float(periods), failure, lost)
+            out.append(held)
+        return tuple(out)
+
+    def row_stride(self, number: int, sample_rate_hz: float) -> int:
+        """1 for the means that are stored in full."""
+        full = number % self.record_every == 0 or number == self.n_means - 1
+        return 1 if full else max(1, round(self.telemetry_s * sample_rate_hz))
+
+    def check(self, bench: Bench) -> None:
+        """Refuse, before anything moves, what the bench cannot do, and a limit on a damping that it cannot tell."""
+        super().check(bench)
+        for name, limits in (("alarm", self.alarm), ("abort", self.abort)):
+            if limits.damping is not None and bench.specimen.drive_mode_shape is None:
+                raise ConfigurationError(
+                    f"{name}.damping = {limits.damping:g}: the damping is unknown, for the bench {bench.name} has no "
+                    "specimen.drive_mode_shape"
+                )

@@ -1,0 +1,82 @@
+"""What the figures of several kinds of campaigns share: the course of the loop, and a heading."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.campaigns.evaluation.recorded import specimen_of
+from rig.figures.style import MAIN, SECOND, TRACE_BINS, title
+from rig.recording.parts import Part
+from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_history", "heading", "said"]
+
+
+def said(recording: Recording, test: str) -> str:
+    """Specimen, kind of test, number of points and how many of them were not accepted."""
+    points = recording.latest.values()
+    left_out = sum(not point["accepted"] for point in points)
+    text = f"{specimen_of(recording)}: {test}, {len(points)} point{'' if len(points) == 1 else 's'}"
+    return text + (f", {left_out} not accepted" if left_out else "")
+
+
+def heading(page: "Figure", recording: Recording) -> None:
+    """Write what the recording is over a page."""
+    title(page, said(recording, f"{recording.kind} test"))
+
+
+def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None:
+    """The loop over time: oscillator frequency with the output amplitude, and the phase error; mean and range of each bin."""
+    rate = float(recording.configuration["bench"]["sample_rate_hz"])
+    level = frequency.twinx()
+    width = max(1, recording.n_rows // TRACE_BINS)
+    start, largest = 0, 1.0
+    for part in recording.parts:
+        if part.n_rows < width:
+            continue
+        bins = part.n_rows // width
+        seconds = (start + width * (np.arange(bins) + 0.5)) / rate
+        _band(frequency, seconds, part.rows("frequency_hz"), width)
+        level.plot(seconds, _binned(np.abs(part.rows("command_v")), width).mean(axis=1), color=SECOND, lw=0.9)
+        degrees = np.degrees(part.rows("phase_error_rad"))
+        _band(error, seconds, degrees, width, label="detector" if start == 0 else None)
+        running = degrees[(part.rows("segment") >= 0) & np.isfinite(degrees)]
+        largest = max(largest, float(np.quantile(np.abs(running), 0.995)) if running.size else 0.0)
+        largest = max(largest, _mark_points(error, part, start, rate))
+        start += part.n_rows
+    frequency.set(xlabel="time, s", ylabel="oscillator frequency, Hz")
+    frequency.yaxis.label.set_color(MAIN)
+    level.set_ylabel("output amplitude, V", color=SECOND)
+    level.grid(False)
+    level.spines["right"].set_visible(True)
+    error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-1.3 * largest, 1.3 * largest))
+    if error.get_legend_handles_labels()[0]:
+        error.legend(fontsize=8, loc="upper right")
+
+
+def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
+    """Mark the phase error of every recorded fundamental of a part; returns the largest, deg."""
+    points = [point for point in part.points if "phase_error_deg" in point and point["settled"] is not None]
+    if not points:
+        return 0.0
+    seconds = [(start + 0.5 * (point["first_sample"] + point["end_sample"])) / rate for point in points]
+    degrees = [point["phase_error_deg"] for point in points]
+    axis.plot(seconds, degrees, "D", ms=4, color=SECOND, label="recorded fundamental" if start == 0 else None)
+    return float(np.max(np.abs(degrees)))
+
+
+def _binned(values: np.ndarray, width: int) -> np.ndarray:
+    """``values`` in rows of ``width``; an incomplete row at the end is left out."""
+    return np.asarray(values[: values.size // width * width].reshape(-1, width))
+
+
+def _band(axis: "Axes", seconds: np.ndarray, values: np.ndarray, width: int, label: str | None = None) -> None:
+    """Mean of each bin as a line, its range as a band: plain decimation would alias the ripple of the detector."""
+    rows = _binned(values.astype(float), width)
+    rows = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, np.nan)  # gaps stay gaps
+    axis.fill_between(seconds, rows.min(axis=1), rows.max(axis=1), color=MAIN, alpha=0.25, lw=0)
+    axis.plot(seconds, rows.mean(axis=1), color=MAIN, lw=0.8, label=label)

@@ -1,0 +1,25 @@
+"""Figure of a response-controlled test: every level, and the force surface through them where there are enough."""
+
+from typing import TYPE_CHECKING
+
+from identification import ForceSurface, IdentificationError, force_surface
+from rig.campaigns.evaluation.figure import said
+from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
+from rig.figures.force_surface import draw_force_surface
+from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw"]
+
+
+def draw(page: "Figure", recording: Recording) -> None:
+    """Draw every level, and the surface through them where there are enough."""
+    page.set_size_inches(11.0, 7.0)
+    responses = recorded_frequency_responses(recording)
+    try:
+        surface: ForceSurface | None = force_surface(responses)
+    except IdentificationError:
+        surface = None
+    draw_force_surface(page, responses, surface, text=said(recording, "response-controlled test"))

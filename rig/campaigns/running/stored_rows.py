@@ -1,0 +1,54 @@
+"""Which rows of a run are stored, and at which row of the file a sample stands."""
+
+from bisect import bisect_right
+from typing import Any
+
+import numpy as np
+
+from rig.campaigns.planning.plan import Plan
+
+__all__ = ["StoredRows"]
+
+
+class StoredRows:
+    """Rows on their way to the journal.
+
+    ``segments`` is the table of the sequencer. Between the records that a plan keeps whole, one row of ``plan.row_stride`` is
+    stored, those whose sample number is a multiple of it. Every change of the stride is an event, from which the samples of
+    all rows follow.
+    """
+
+    def __init__(self, plan: Plan, segments: np.ndarray, sample_rate_hz: float) -> None:
+        strides = [plan.row_stride(int(n), sample_rate_hz) if n >= 0 else 1 for n in segments["point"]]
+        self._strides = np.array([*strides, 1])  # the last is that of no segment, whose number is -1
+        self._all = bool((self._strides == 1).all())
+        self._changes: list[tuple[int, int, int]] = [(0, 0, 1)]  # first sample, first row, stride
+        self._rows = 0
+
+    def take(self, first: int, rows: np.ndarray) -> tuple[np.ndarray, list[dict[str, Any]]]:
+        """Of rows that begin with sample ``first``, those to be stored; and an event for every change of the stride."""
+        if self._all:
+            return rows, []
+        strides = self._strides[rows["segment"]]
+        samples = first + np.arange(rows.size)
+        kept = samples % strides == 0
+        stored_before = self._rows + np.concatenate([[0], np.cumsum(kept)])
+        events = []
+        previous = self._changes[-1][2]
+        for index in np.flatnonzero(np.diff(strides, prepend=previous)):
+            change = (int(samples[index]), int(stored_before[index]), int(strides[index]))
+            self._changes.append(change)
+            sample, row, stride = change
+            state = "all rows" if stride == 1 else f"1 row of {stride}"
+            events.append({"sample": sample, "what": "telemetry", "state": state, "row": row, "stride": stride})
+        self._rows = int(stored_before[-1])
+        return rows[kept], events
+
+    def row_range(self, first: int, end: int) -> tuple[int, int] | None:
+        """Rows of the part that hold samples ``first`` to ``end``; None where not all of them are stored."""
+        index = bisect_right(self._changes, (first, 2**63, 0)) - 1
+        sample, row, stride = self._changes[index]
+        until = self._changes[index + 1][0] if index + 1 < len(self._changes) else end
+        if stride != 1 or until < end:
+            return None
+        return row + first - sample, row + end - sample

@@ -1,0 +1,70 @@
+"""Figure of a stepped-sine test: force, displacement, lag and accelerance over frequency."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification import FrequencyResponse
+from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
+from rig.campaigns.evaluation.recorded import specimen_of
+from rig.figures.style import REJECTED
+from rig.figures.style import title as heading
+from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw", "draw_stepped_sine"]
+
+Float = NDArray[np.float64]
+
+_JUMP = 1.5  # times the amplitude of the point before
+
+
+def draw(page: "Figure", recording: Recording) -> None:
+    """Draw every level of a recording."""
+    responses = recorded_frequency_responses(recording)
+    draw_stepped_sine(page, responses, title=f"{specimen_of(recording)}: stepped sine, {len(responses)} levels")
+
+
+def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *, title: str = "") -> None:
+    """Force, displacement amplitude, phase lag and accelerance over frequency, one line per level.
+
+    ``page`` is an empty figure, about 9 by 6.4 inches; points are joined in the order of measurement, so that jumps and
+    the direction of a sweep stay visible.
+    """
+    from matplotlib import colormaps
+
+    (force, amplitude), (lag, accelerance) = page.subplots(2, 2, sharex=True)
+    micro = max(float(np.max(item.amplitude_m)) for item in responses) < 5e-4
+    for number, item in enumerate(responses):
+        colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.9)
+        style: dict[str, Any] = {"marker": ".", "ms": 4, "color": colour}
+        label = item.label or f"{item.level:g} {item.level_unit}"
+        acceleration = item.amplitude_m * (2.0 * np.pi * item.frequency_hz) ** 2
+        _stepped(force, item, item.force_n, label=label, **style)
+        _stepped(amplitude, item, item.amplitude_m * (1e6 if micro else 1e3), **style)
+        _stepped(lag, item, item.phase_lag_deg, **style)
+        _stepped(accelerance, item, acceleration / item.force_n, **style)
+    for axis in (force, amplitude, accelerance):
+        axis.set(yscale="log")
+    force.set(ylabel="force, N")
+    amplitude.set(ylabel=f"displacement amplitude, {'µm' if micro else 'mm'}")
+    lag.set(ylabel="phase lag of displacement, deg", xlabel="frequency, Hz")
+    lag.axhline(90.0, color=REJECTED, lw=0.8)
+    accelerance.set(ylabel="accelerance, 1/kg", xlabel="frequency, Hz")
+    page.legend(fontsize=8, loc="outside right upper")
+    heading(page, title)
+
+
+def _stepped(axis: "Axes", measured: FrequencyResponse, values: Float, **style: Any) -> None:
+    """Points in the order of measurement; where the amplitude jumps from one to the next, their link is dotted."""
+    frequency_hz, amplitude_m = measured.frequency_hz, measured.amplitude_m
+    jumps = np.flatnonzero(np.abs(np.diff(np.log(amplitude_m))) > np.log(_JUMP)) + 1
+    gaps = np.full(jumps.size, np.nan)
+    axis.plot(np.insert(frequency_hz, jumps, gaps), np.insert(values, jumps, gaps), **style)
+    for k in jumps:
+        axis.plot(frequency_hz[k - 1 : k + 1], values[k - 1 : k + 1], ":", lw=0.8, color=style["color"])

@@ -1,0 +1,130 @@
+"""Figure of a sweep: voltage, force, response and momentary frequency over time."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification import ForceDropOut, Transient, force_drop_out, zero_crossings
+from rig.campaigns.evaluation.recorded import point_rows, specimen_of
+from rig.campaigns.sweep.campaign import recorded_sweeps
+from rig.figures.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
+from rig.figures.style import title as heading
+from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw", "draw_sweep"]
+
+Float = NDArray[np.float64]
+
+
+def draw(page: "Figure", recording: Recording) -> None:
+    """Draw the last sweep of a recording; no other rows are read."""
+    number, sweep = list(recorded_sweeps(recording).items())[-1]
+    rows, point = point_rows(recording, number), recording.latest[number]
+    held = "uncontrolled"
+    if "held_least" in point:
+        held = f"held within {100.0 * point['held_least']:.1f} to {100.0 * point['held_most']:.1f} %"
+    draw_sweep(
+        page,
+        sweep,
+        np.vstack([rows["inputs"].T, rows["output_v"]]),
+        float(recording.configuration["bench"]["sample_rate_hz"]),
+        drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"].get("off_resonance_hz")),
+        title=f"{specimen_of(recording)}: sweep at {point['level']:g} {point['level_unit']}, {held}",
+    )
+
+
+def draw_sweep(
+    page: "Figure",
+    sweep: Transient,
+    samples: NDArray[Any],
+    sample_rate_hz: float,
+    *,
+    drop_out: ForceDropOut | None = None,
+    voltage: str = "voltage",
+    response: str = "drive",
+    title: str = "",
+) -> None:
+    """Voltage, force, response and momentary frequency over time.
+
+    Parameters
+    ----------
+    page
+        An empty figure, about 9 by 9 inches.
+    sweep
+        Fundamentals of the sweep; their envelopes are drawn over the signals.
+    samples
+        float[n_channels, n], the signals themselves, in the order of the channels of ``sweep``.
+    sample_rate_hz
+        Samples per second.
+    drop_out
+        What of the force's drop-out is marked; nothing if None.
+    voltage, response
+        Channels drawn beside the force.
+    title
+        Heading.
+    """
+    force = next(channel.name for channel in sweep.channels if channel.role == "force")
+    axes = page.subplots(4, 1, sharex=True, height_ratios=(1.0, 1.5, 1.5, 1.2))
+    names = {voltage: "voltage", force: "force", response: f"response ({response})"}
+    longest = int(np.ceil(sample_rate_hz / sweep.frequency_hz.min()))
+    for axis, (name, text) in zip(axes, names.items(), strict=False):
+        row = sweep.index(name)
+        _signal(axis, np.asarray(samples[row], dtype=np.float64), longest, sample_rate_hz)
+        envelope = np.abs(sweep.fundamentals[row])
+        axis.plot(sweep.time_s, envelope, color=SECOND, label="fundamental")
+        axis.plot(sweep.time_s, -envelope, color=SECOND)
+        axis.set(ylabel=f"{text}, {unit_text(sweep.channels[row].unit)}")
+    _momentary_frequency(axes[3], sweep, np.asarray(samples[sweep.index(force)]), sample_rate_hz)
+    if drop_out is not None:
+        _mark_drop_out(axes[1], axes[2], drop_out)
+    for axis in axes[1:]:
+        axis.legend(fontsize=8, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
+    axes[3].set(xlabel="time, s", xlim=(0.0, samples.shape[1] / sample_rate_hz))
+    heading(page, title)
+
+
+def _signal(axis: "Axes", values: Float, period: int, rate_hz: float) -> None:
+    """Range of a signal within the period around each instant: single oscillations would not be seen."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    at = np.arange(0, values.size, max(1, values.size // TRACE_BINS))
+    lowest, highest = minimum_filter1d(values, period)[at], maximum_filter1d(values, period)[at]
+    axis.fill_between(at / rate_hz, lowest, highest, color=MAIN, alpha=0.35, lw=0, label="signal")
+
+
+def _momentary_frequency(axis: "Axes", sweep: Transient, force: NDArray[Any], rate_hz: float) -> None:
+    halves = zero_crossings(force, sample_rate_hz=rate_hz)
+    axis.plot(halves.time_s, halves.frequency_hz, ".", ms=2.0, color=REJECTED, label="zero crossings of the force")
+    axis.plot(sweep.time_s, sweep.frequency_hz, color=MAIN, label="voltage")
+    turning = np.unwrap(np.angle(sweep.force))
+    own = sweep.frequency_hz + np.gradient(turning, sweep.time_s) / (2.0 * np.pi)
+    axis.plot(sweep.time_s, own, color=SECOND, lw=0.9, label="fundamental of the force")
+    low, high = sweep.frequency_hz.min(), sweep.frequency_hz.max()
+    margin = 0.25 * (high - low)
+    axis.set(ylabel="frequency, Hz", ylim=(low - margin, high + margin))
+
+
+def _mark_drop_out(force: "Axes", response: "Axes", drop_out: ForceDropOut) -> None:
+    """Levels off resonance, minimum, overshoot and peak, with their values."""
+    force.axhline(drop_out.off_resonance_n, color=REJECTED, lw=0.8, ls="--")
+    marks = (
+        (drop_out.minimum_time_s, drop_out.minimum_n, drop_out.minimum_ratio, drop_out.minimum_frequency_hz, "v"),
+        (
+            drop_out.overshoot_time_s,
+            drop_out.overshoot_n,
+            drop_out.overshoot_ratio,
+            drop_out.overshoot_frequency_hz,
+            "^",
+        ),
+    )
+    for seconds, newtons, ratio, frequency_hz, marker in marks:
+        label = f"{100 * ratio:.3g} % of {drop_out.off_resonance_n:.3g} N at {frequency_hz:.4g} Hz"
+        force.plot(seconds, newtons, marker, ms=6, color="black", label=label)
+    unit = unit_text(drop_out.peak_unit)
+    label = f"{drop_out.peak:.4g} {unit} at {drop_out.peak_frequency_hz:.4g} Hz"
+    response.plot(drop_out.peak_time_s, drop_out.peak, "o", ms=5, color="black", label=label)
