@@ -21,11 +21,11 @@ import cantools
 import numpy as np
 
 from benchmarks.can_multicast import RATE_HZ, STALL_S, multicast
-from rig.wire.can.dbc import compile_text
 from rig.wire.can.frames import Frame
+from rig.wire.can.layout import compile_text
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.can.slcan_lines import encode_line
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 
 ROUNDS = 60
 BATCH = 16

@@ -34,7 +34,7 @@ from rig.errors import RigError
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.recording.store import finalise
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 
 RUN = """
 import sys

@@ -5,9 +5,8 @@ from collections import Counter
 
 import numpy as np
 
-from rig.emulator.description import Words
 from rig.emulator.faults import Faults
-from rig.emulator.parameters import Parameters
+from rig.emulator.parameters import Parameters, Words
 from rig.emulator.plant import Plant
 from rig.emulator.sampling import Sampling
 from rig.emulator.sending import FaultySender

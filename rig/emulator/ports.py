@@ -9,7 +9,7 @@ from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqRefused
 from rig.wire.link import Link
 from rig.wire.serial.link import SerialLink
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 
 if TYPE_CHECKING:
     from rig.wire.can.bus import FrameBus

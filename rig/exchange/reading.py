@@ -172,9 +172,8 @@ def _from_csv(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
 
 def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
     from rig.exchange.uff.modes import modes_in
-    from rig.exchange.uff.reading import read_uff
+    from rig.exchange.uff.reading import read_uff, time_data_in
     from rig.exchange.uff.responses import responses_in
-    from rig.exchange.uff.time_data import time_data_in
 
     units = options["units"]
     if units not in ("", "labels", "file", "si"):

@@ -16,8 +16,7 @@ from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, See
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
-from rig.tuning.errors import TuningError
-from rig.tuning.spectra import coherence_of, densities, near, voltage_responses
+from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
 __all__ = ["LinearTest", "measure"]
 

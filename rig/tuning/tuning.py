@@ -12,9 +12,8 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.level_search import MultisineSeries
 from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
-from rig.tuning.levels import PART, LevelChoice, choose_levels, lowest_force_n, reach_m
+from rig.tuning.levels import PART, LevelChoice, choose_levels, low_pass, lowest_force_n, reach_m
 from rig.tuning.linear_test import LinearTest, measure
-from rig.tuning.noise import low_pass
 from rig.tuning.plan import plan_text
 from rig.tuning.plant import compared_with_bench, measured_ratios, plant_of
 
@@ -110,7 +109,7 @@ def tune(
 
     ``named`` is what the plan calls the bench.
 
-    Raises `rig.tuning.errors.TuningError` where the rig is unsuited, with the numbers,
+    Raises `rig.tuning.plant.TuningError` where the rig is unsuited, with the numbers,
     `rig.errors.ConfigurationError` for what the bench does not allow, `rig.errors.RecordingError` for a recording that
     cannot be written.
     """

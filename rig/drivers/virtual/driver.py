@@ -10,8 +10,7 @@ from pydantic import Field, ValidationError
 from rig.bench import Bench
 from rig.bench.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
-from rig.drivers.virtual.kernels import exchange_block, fused
-from rig.drivers.virtual.loopback import loopback_of
+from rig.drivers.virtual.kernels import exchange_block, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from rig.tick.safety.kernels import is_over

@@ -1,14 +1,40 @@
-"""Compiled loops around the virtual rig: one block behind the DAQ contract, and tick and rig fused."""
+"""Compiled loops around the virtual rig: one block behind the DAQ contract, tick and rig fused, and the loopback channels."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from rig.drivers.virtual.loopback import Loopback
+from rig.daq import Channel
 from rig.tick.kernels import tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from rig.tick.safety.kernels import is_over
 from simulators.kernels import sample
 from simulators.layout import RigArrays, RigState
 from vibrolock.compiled import kernel
+
+__all__ = ["Loopback", "loopback_of"]
+
+
+class Loopback(NamedTuple):
+    """Channels that read the output: the last columns of a row."""
+
+    past: np.ndarray
+    """float64[m]: ring of outputs on the converter, V."""
+    v_per_v: np.ndarray
+    """float64[k]: sensitivity of each channel; k may be 0."""
+    whole: int
+    """Whole samples by which they read late."""
+    part: float
+    """The fraction of a sample, linear between two."""
+
+
+def loopback_of(channels: Sequence[Channel], delay_samples: float) -> Loopback:
+    """Of those ``channels`` that are loopbacks; ``delay_samples`` is that of hold and filters."""
+    whole = math.floor(delay_samples)
+    v_per_v = np.array([channel.sensitivity_v_per_unit for channel in channels if channel.loopback])
+    return Loopback(np.zeros(whole + 2), v_per_v, whole, delay_samples - whole)
 
 
 @kernel

@@ -7,9 +7,8 @@ from pathlib import Path
 from struct import Struct
 
 from rig.errors import ConfigurationError
-from rig.wire.can.dbc import compile_layout, compile_text
 from rig.wire.can.definition import HIGHEST_NODE, NODE_MASK, Shape, definition, shape_of
-from rig.wire.can.layout import Layout
+from rig.wire.can.layout import Layout, compile_layout, compile_text
 
 __all__ = ["FrameKind", "Protocol", "protocol"]
 

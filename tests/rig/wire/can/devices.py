@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.bench import Bench, DriverChoice, load_bench
 from rig.emulator import Device, Faults, VirtualPlant
-from rig.emulator.description import described
+from rig.emulator.parameters import described
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.link import CanLink
 

@@ -13,7 +13,7 @@ from rig.errors import ConfigurationError, DaqDisconnected, DaqMismatch, DaqProt
 from rig.wire.can.bus import PythonCanBus
 from rig.wire.can.definition import definition
 from rig.wire.can.slcan import SlcanBus
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 from tests.rig.wire.can.devices import bench_on, device_on
 
 

@@ -10,8 +10,8 @@ import pytest
 
 import rig.wire.can
 from rig.errors import ConfigurationError, DaqRefused
-from rig.wire.can.dbc import compile_layout, compile_text
 from rig.wire.can.definition import definition, shape_of
+from rig.wire.can.layout import compile_layout, compile_text
 from rig.wire.can.protocol import protocol
 
 SHIPPED = {

@@ -13,7 +13,7 @@ from rig.errors import DaqBusy, DaqDisconnected, DaqRefused
 from rig.wire.can.frames import FD_LENGTHS, Frame
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.can.slcan_lines import LONGEST_LINE, SlcanLines, encode_line
-from rig.wire.serial.pty import PseudoTerminal, open_pseudo_terminal
+from rig.wire.serial.port import PseudoTerminal, open_pseudo_terminal
 
 
 @st.composite
