@@ -94,7 +94,9 @@ def integrity_of(path: Path) -> str:
 
 def _read_by_child(path: Path, size: int) -> str:
     try:
-        answer = json.loads(ask_child("rig.recording.walk", str(path), timeout_s=_PATIENCE_S + size / _SLOWEST_BYTES_S))
+        answer = json.loads(
+            ask_child("rig.recording.whole_read", str(path), timeout_s=_PATIENCE_S + size / _SLOWEST_BYTES_S)
+        )
     except ChildFailed as error:
         raise RecordingError(f"{path}: damaged: the HDF5 library {error} over it") from error
     if answer["memory"]:

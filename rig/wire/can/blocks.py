@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.errors import DaqMismatch, DaqRefused
-from rig.wire.can.definition import Shape
 from rig.wire.can.frames import Frame, padded_length
-from rig.wire.can.protocol import FrameKind, Protocol
+from rig.wire.can.protocol import FrameKind, Protocol, Shape
 from rig.wire.messages import Stream
 
 __all__ = ["COUNT", "OPEN_BLOCKS", "Blocks", "Piece", "StreamFrames", "check_stream"]
@@ -42,7 +41,7 @@ class Piece(NamedTuple):
 
 
 class StreamFrames:
-    """The frames of one direction, for blocks of one size: `rig.wire.can.definition.Shape` worked out.
+    """The frames of one direction, for blocks of one size: `rig.wire.can.protocol.Shape` worked out.
 
     Whole blocks go into the sequence numbers, so that a loss of a whole wrap cannot make one block of the frames of two.
     """

@@ -9,8 +9,8 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from rig.errors import DaqDisconnected, DaqRefused
-from rig.wire.can.definition import NODE_MASK
 from rig.wire.can.frames import Frame
+from rig.wire.can.protocol import NODE_MASK
 
 __all__ = ["BUS_COUNTERS", "FrameBus", "PythonCanBus", "only_loopback"]
 

@@ -7,9 +7,8 @@ from typing import NamedTuple
 from rig.wire.can.blocks import check_stream
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
-from rig.wire.can.definition import Shape
 from rig.wire.can.frames import DATA_BIT_RATE_HZ, frame_seconds, padded_length
-from rig.wire.can.protocol import protocol
+from rig.wire.can.protocol import Shape, protocol
 from rig.wire.link import Link, Load
 from rig.wire.messages import HEARTBEATS_HZ, Message, Output, Samples, Stream
 

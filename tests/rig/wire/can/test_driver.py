@@ -11,7 +11,7 @@ from rig.drivers.can import CanDAQ
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, DaqDisconnected, DaqMismatch, DaqProtocol, DaqRefused
 from rig.wire.can.bus import PythonCanBus
-from rig.wire.can.definition import definition
+from rig.wire.can.protocol import definition
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.serial.port import open_pseudo_terminal
 from tests.rig.wire.can.devices import bench_on, device_on
