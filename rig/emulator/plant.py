@@ -11,7 +11,7 @@ import numpy as np
 from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.virtual.driver import HOLD_SAMPLES
-from rig.drivers.virtual.kernels import exchange_block, loopback_of
+from rig.drivers.virtual.kernels import Converters, exchange_block, loopback_of
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.layout import Flag
@@ -118,7 +118,6 @@ class VirtualPlant:
         self.rate_hz = bench.sample_rate_hz
         self.filter_delay_s = self._rig.filter_delay_samples / bench.sample_rate_hz
         self._wiring = wiring if wiring is not None and not wiring.as_it_should_be else None
-        self._raised_count = np.zeros(len(Flag), np.int64)
         self._dtype = np.dtype(f"<i{self.bits // 8}")
         self._device_flags = {
             int(Flag.SENSOR_CLIPPED): int(DeviceFlag.OVERLOAD),
@@ -132,7 +131,8 @@ class VirtualPlant:
         """Back to rest, at sample 0, with the noise of the same seed."""
         self._realised = self._rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)
-        self._loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
+        loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
+        self._converters = Converters(NO_QUEUE, np.zeros(len(Flag), np.int64), loopback)
         self._first = 0
         self._buffers_for(0)
 
@@ -151,13 +151,11 @@ class VirtualPlant:
             exchange_block(
                 self._arrays,
                 self._state,
-                NO_QUEUE,
+                self._converters,
                 self._first + part.start,
                 voltages[part],
                 self._readings_v[part],
                 self._raised[part],
-                self._raised_count,
-                self._loopback,
             )
         counts, flags = self._counted()
         if self._wiring is not None:

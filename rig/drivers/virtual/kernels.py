@@ -14,7 +14,7 @@ from simulators.kernels import sample
 from simulators.layout import RigArrays, RigState
 from vibrolock.compiled import kernel
 
-__all__ = ["Loopback", "loopback_of"]
+__all__ = ["Converters", "Loopback", "exchange_block", "fused", "loopback_of"]
 
 
 class Loopback(NamedTuple):
@@ -31,10 +31,21 @@ class Loopback(NamedTuple):
 
 
 def loopback_of(channels: Sequence[Channel], delay_samples: float) -> Loopback:
-    """Of those ``channels`` that are loopbacks; ``delay_samples`` is that of hold and filters."""
+    """The loopbacks among ``channels``; ``delay_samples`` is the delay of hold and filters."""
     whole = math.floor(delay_samples)
     v_per_v = np.array([channel.sensitivity_v_per_unit for channel in channels if channel.loopback])
     return Loopback(np.zeros(whole + 2), v_per_v, whole, delay_samples - whole)
+
+
+class Converters(NamedTuple):
+    """What stands between the host and the rig: outputs under way, channels that read the output, counts of flags."""
+
+    queue: np.ndarray
+    """float64[d], d may be 0: ring of outputs that are not on the converter yet, V."""
+    counts: np.ndarray
+    """int64[bits]: samples at which each flag of the rig was up."""
+    loopback: Loopback
+    """Channels that read the output."""
 
 
 @kernel
@@ -53,19 +64,17 @@ def read_output(loop: Loopback, index: int, voltage: float, row: np.ndarray) -> 
 def exchange_block(
     rig: RigArrays,
     state: RigState,
-    queue: np.ndarray,
+    converters: Converters,
     first: int,
     voltages: np.ndarray,
     inputs: np.ndarray,
     flags: np.ndarray,
-    counts: np.ndarray,
-    loop: Loopback,
 ) -> None:
     """Swap one block with the rig; ``flags`` (uint16[n]) are the rig's for each sample.
 
-    ``queue`` (float64[d], d may be 0) holds the outputs that the device still keeps back; ``first`` is the number of
-    the block's first sample; ``counts`` (int64[bits]) counts the samples at which each flag of the rig was up.
+    ``first`` is the number of the block's first sample. The queue holds the outputs that the device keeps back.
     """
+    queue, loop = converters.queue, converters.loopback
     delay = queue.size
     sensed = inputs.shape[1] - loop.v_per_v.size
     for index in range(voltages.size):
@@ -77,7 +86,7 @@ def exchange_block(
         row = inputs[index]
         read_output(loop, first + index, voltage, row)
         flags[index] = sample(rig, state, voltage, row[:sensed])
-        count_flags(flags[index], counts)
+        count_flags(flags[index], converters.counts)
 
 
 @kernel
@@ -94,17 +103,16 @@ def fused(
     t: TickArrays,
     rig: RigArrays,
     state: RigState,
-    queue: np.ndarray,
+    converters: Converters,
     volts: np.ndarray,
     readings: np.ndarray,
     rows: np.ndarray,
-    counts: np.ndarray,
-    loop: Loopback,
 ) -> int:
     """Tick and rig in one loop; returns the number of samples done, fewer than ``rows`` once the output is off.
 
-    ``queue`` (float64[d]) holds the outputs under way: what the tick computes at a sample is on the converter d later.
+    The queue (float64[d]) holds the outputs under way: what the tick computes at a sample is on the converter d later.
     """
+    queue, loop = converters.queue, converters.loopback
     delay = queue.size
     looped, sensed = loop.v_per_v.size > 0, volts[: volts.size - loop.v_per_v.size]
     for index in range(rows.size):
@@ -112,7 +120,7 @@ def fused(
         if looped:
             read_output(loop, t.loop[0].sample, queue[slot], volts)
         flags = sample(rig, state, queue[slot], sensed)
-        count_flags(flags, counts)
+        count_flags(flags, converters.counts)
         queue[slot] = tick(t, volts, False, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
         if is_over(t.guard[0], t.loop[0].lead_whole):

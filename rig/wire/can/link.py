@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rig.wire.can.blocks import check_stream
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
-from rig.wire.can.frames import DATA_BIT_RATE_HZ, frame_seconds, padded_length
+from rig.wire.can.frames import BusTiming, frame_seconds, padded_length
 from rig.wire.can.protocol import Shape, protocol
 from rig.wire.link import Link, Load
 from rig.wire.messages import HEARTBEATS_HZ, Message, Output, Samples, Stream
@@ -87,19 +87,17 @@ class CanLink(Link):
         self,
         bus: FrameBus,
         n_channels: int,
-        fd: bool = False,
+        timing: BusTiming = BusTiming(),  # noqa: B008 (a tuple)
         node: int = 1,
-        bit_rate_hz: float = 1e6,
-        data_bit_rate_hz: float = DATA_BIT_RATE_HZ,
         dbc: str | Path | None = None,
         device: bool = False,
     ) -> None:
         super().__init__(f"{bus.name}, node {node}")
         self._bus = bus
-        self._protocol = protocol(n_channels, fd, node, dbc)
+        self._protocol = protocol(n_channels, timing.fd, node, dbc)
         self.counters = bus.counters
         self._codec = CanCodec(self._protocol, device, self.counters)
-        self._rates_hz = (bit_rate_hz, data_bit_rate_hz)
+        self._rates_hz = timing.bit_rate_hz, timing.data_bit_rate_hz
         self._deadline_s = COMMAND_S
 
     def open(self) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rig.errors import DaqDisconnected
 from rig.wire.can.bus import FrameBus
-from rig.wire.can.frames import DATA_BIT_RATE_HZ, Frame
+from rig.wire.can.frames import BusTiming, Frame
 from rig.wire.can.slcan_lines import SlcanLines, encode_line, opening
 
 __all__ = ["SlcanBus", "TextPort"]
@@ -115,15 +115,12 @@ class SlcanBus(FrameBus):
     def __init__(
         self,
         port: str | int,
-        fd: bool = False,
-        bit_rate_hz: int = 1_000_000,
-        data_bit_rate_hz: int = DATA_BIT_RATE_HZ,
+        timing: BusTiming = BusTiming(),  # noqa: B008 (a tuple)
         baud: int = 3_000_000,
         adapter: bool = False,
     ) -> None:
         super().__init__(f"slcan {port}" if isinstance(port, str) else "slcan")
-        self._given, self._fd, self._baud = port, fd, baud
-        self._bit_rate_hz, self._data_bit_rate_hz = bit_rate_hz, data_bit_rate_hz
+        self._given, self._timing, self._baud = port, timing, baud
         self._adapter = adapter
         self._port: Any = None
         self._text: TextPort | None = None
@@ -132,7 +129,7 @@ class SlcanBus(FrameBus):
 
     def open(self) -> None:
         """Open port and adapter. `DaqRefused` for a bit rate that adapters have no command for."""
-        commands = opening(self._fd, self._bit_rate_hz, self._data_bit_rate_hz)
+        commands = opening(self._timing)
         if isinstance(self._given, int):
             descriptor = self._given
         else:
