@@ -49,15 +49,15 @@ class Converters(NamedTuple):
 
 
 @kernel
-def read_output(loop: Loopback, index: int, voltage: float, row: np.ndarray) -> None:
+def read_output(loopback: Loopback, index: int, voltage: float, row: np.ndarray) -> None:
     """Note the ``voltage`` that is on the converter at sample ``index``, and fill the loopback columns of its row, V."""
-    size, n = loop.past.size, loop.v_per_v.size
-    loop.past[index % size] = voltage
+    size, n = loopback.past.size, loopback.v_per_v.size
+    loopback.past[index % size] = voltage
     if n > 0:
-        seen = (1.0 - loop.part) * loop.past[(index - loop.whole) % size]
-        seen += loop.part * loop.past[(index - loop.whole - 1) % size]
+        seen = (1.0 - loopback.part) * loopback.past[(index - loopback.whole) % size]
+        seen += loopback.part * loopback.past[(index - loopback.whole - 1) % size]
         for c in range(n):
-            row[row.size - n + c] = seen * loop.v_per_v[c]
+            row[row.size - n + c] = seen * loopback.v_per_v[c]
 
 
 @kernel
@@ -74,9 +74,9 @@ def exchange_block(
 
     ``first`` is the number of the block's first sample. The queue holds the outputs that the device keeps back.
     """
-    queue, loop = converters.queue, converters.loopback
+    queue, loopback = converters.queue, converters.loopback
     delay = queue.size
-    sensed = inputs.shape[1] - loop.v_per_v.size
+    sensed = inputs.shape[1] - loopback.v_per_v.size
     for index in range(voltages.size):
         voltage = voltages[index]
         if delay > 0:
@@ -84,7 +84,7 @@ def exchange_block(
             voltage = queue[slot]
             queue[slot] = voltages[index]
         row = inputs[index]
-        read_output(loop, first + index, voltage, row)
+        read_output(loopback, first + index, voltage, row)
         flags[index] = sample(rig, state, voltage, row[:sensed])
         count_flags(flags[index], converters.counts)
 
@@ -112,13 +112,13 @@ def fused(
 
     The queue (float64[d]) holds the outputs under way: what the tick computes at a sample is on the converter d later.
     """
-    queue, loop = converters.queue, converters.loopback
+    queue, loopback = converters.queue, converters.loopback
     delay = queue.size
-    looped, sensed = loop.v_per_v.size > 0, volts[: volts.size - loop.v_per_v.size]
+    looped, sensed = loopback.v_per_v.size > 0, volts[: volts.size - loopback.v_per_v.size]
     for index in range(rows.size):
         slot = t.loop[0].sample % delay
         if looped:
-            read_output(loop, t.loop[0].sample, queue[slot], volts)
+            read_output(loopback, t.loop[0].sample, queue[slot], volts)
         flags = sample(rig, state, queue[slot], sensed)
         count_flags(flags, converters.counts)
         queue[slot] = tick(t, volts, False, readings[index], rows[index])
