@@ -21,8 +21,7 @@ from identification import (
 from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
 from rig.exchange.pnlss import pnlss_from, pnlss_parts
-from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
-from rig.exchange.time_data import TimeData
+from rig.exchange.time_data import TimeData, time_data_from, time_data_parts, transient_from, transient_parts
 from rig.measurements.backbone_table import backbone_from, backbone_parts
 from rig.text.contents import Contents, Labels, unit_of
 
