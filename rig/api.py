@@ -15,12 +15,11 @@ from identification import (
 )
 from rig.arming.arming import Arm
 from rig.arming.run_facts import About
+from rig.arming.run_options import Progress, RunOptions, Silent
 from rig.bench import Bench, load_bench
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
-from rig.campaigns.running.execution import Progress
 from rig.campaigns.running.runner import carry_out, take_up
-from rig.errors import ConfigurationError
 from rig.measurements import Estimator, backbone, force_surface, frequency_responses, response_matrices, spectra, sweeps
 from rig.measurements.experiments import experiments
 from rig.measurements.experiments.periods import Periods
@@ -129,8 +128,14 @@ def run(
     file that cannot be written, `rig.errors.DaqError` for a device that cannot be started, `rig.errors.NotArmed`. A run that
     ends early raises nothing; ``complete`` is false and the recording says why.
     """
-    if not 0 <= seed < 2**63:
-        raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
+    options = RunOptions(
+        seed=seed,
+        realtime=realtime,
+        overwrite=overwrite,
+        progress=progress or Silent(),
+        arm=arm,
+        about=About(operator, specimen_serial, tuple(notes)),
+    )
     source = "" if isinstance(plan, Plan) else plan
     plan = plan if isinstance(plan, Plan) else load_plan(plan)
     if bench is None:
@@ -140,17 +145,7 @@ def run(
     folder = TemporaryDirectory(prefix="vibrolock-") if output is None else None
     path = Path(output) if output is not None else Path(folder.name if folder else "") / "run.h5"
     try:
-        recording = carry_out(
-            plan,
-            bench,
-            path,
-            seed=seed,
-            realtime=realtime,
-            overwrite=overwrite,
-            progress=progress,
-            arm=arm,
-            about=About(operator, specimen_serial, tuple(notes)),
-        )
+        recording = carry_out(plan, bench, path, options)
     except BaseException:
         if folder is not None:
             folder.cleanup()
@@ -183,21 +178,16 @@ def resume(
     Raises `rig.errors.ConfigurationError` for a plan that cannot follow or asks for a level that tripped,
     `rig.errors.RecordingError` for a file that cannot be read or written.
     """
-    if seed is not None and not 0 <= seed < 2**63:
-        raise ConfigurationError(f"seed = {seed}: allowed is 0 to 2**63 - 1")
+    options = RunOptions(
+        seed=seed,
+        realtime=realtime,
+        progress=progress or Silent(),
+        arm=arm,
+        about=About(operator, specimen_serial, tuple(notes)),
+    )
     source = "" if plan is None or isinstance(plan, Plan) else plan
     change = plan if plan is None or isinstance(plan, Plan) else load_plan(plan)
-    return Run(
-        take_up(
-            Path(output),
-            change=change,
-            source=source,
-            seed=seed,
-            realtime=realtime,
-            progress=progress,
-            arm=arm,
-            about=About(operator, specimen_serial, tuple(notes)),
-            retry_tripped=retry_tripped,
-            trust_code=trust_code,
-        )
+    recording = take_up(
+        Path(output), options, change=change, source=source, retry_tripped=retry_tripped, trust_code=trust_code
     )
+    return Run(recording)

@@ -25,7 +25,7 @@ Damping = Literal["fundamental", "total-power"]
 
 FLAGGED_BEYOND = 1.25
 REFUSED_BEYOND = 2.0
-HIGHER_LEVELS = "measure higher levels, or allow extrapolation (allow_extrapolation, --allow-extrapolation)"
+HIGHER_LEVELS = "measure higher levels, or allow extrapolation (`allow_extrapolation`)"
 """What to do about an `ExtrapolationError`, from Python and at the command line."""
 _TAIL_FROM = 0.5
 _FEWEST_TAIL_LEVELS = 3

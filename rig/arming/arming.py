@@ -41,7 +41,7 @@ class ArmingRequest:
     def unguarded_refusal(self) -> str:
         """The line with which a switch, or a bench that arms itself, is refused where it is ``unguarded``."""
         return (
-            f"bench {self.bench.name}: {self.unguarded}; run at a terminal without --arm and type the bench's name, or test "
+            f"bench {self.bench.name}: {self.unguarded}; run at a terminal without `arm` and type the bench's name, or test "
             "such a stop and set [arming] hardware_emergency_stop = true"
         )
 
@@ -101,12 +101,12 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
     if request.unseen:
         raise NotArmed(
             f"bench {bench.name}: something physical would move and nobody has seen that {'; '.join(request.unseen)}; run at a "
-            "terminal without --arm and type the bench's name, or ask with a callable (arm=ask from Python)"
+            "terminal without `arm` and type the bench's name, or ask with a callable (arm=ask from Python)"
         )
     if request.unguarded and (arm or bench.arming.automated):
         raise NotArmed(request.unguarded_refusal)
     against = f" ({'; '.join(request.cautions)})" if request.cautions else ""
-    switch = "" if request.unguarded else ", or give --arm (arm=True from Python)"
+    switch = "" if request.unguarded else ", or give `arm`"
     automated = "" if bench.arming.automated else ", or [arming] automated = true in a bench made for it"
     raise NotArmed(
         f"bench {bench.name}: something physical would move and nobody has armed it{against}; run on a terminal and type the "

@@ -27,7 +27,7 @@ def refuse_code(bench: Bench, source: str) -> None:
     if code := named_code(bench):
         raise ConfigurationError(
             f"{source}: bench: function = {code[0]!r}: is code that the recording names, and is not imported unless you "
-            "trust it: --trust-code (trust_code=True)"
+            "trust it: `trust_code`"
         )
 
 

@@ -13,8 +13,7 @@ from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
 from rig.check.findings import Finding, failed
-from rig.check.judging import driven_findings
-from rig.check.latency import latency_findings
+from rig.check.judging import driven_findings, latency_findings
 from rig.check.reference import reference_findings
 from rig.check.responses import Mode, Responses, responses_of
 from rig.check.silence import silent_findings

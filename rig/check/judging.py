@@ -1,16 +1,68 @@
-"""Findings from the driven part of a check: what lives, what is reversed or swapped, how large and how late it is."""
+"""Findings from the driven part of a check: which channels live, are reversed, swapped, wrong in size, or late."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
 from rig.check.responses import BAND, FITS, Mode, Responses, fit_mode
-from rig.check.wiring import ALIKE, best_assignment, by_magnitude
 
-__all__ = ["driven_findings"]
+__all__ = ["ALIKE", "best_assignment", "by_magnitude", "by_shape", "driven_findings", "latency_findings"]
+
+Float = NDArray[np.float64]
+ALIKE = 0.03  # log ratio below which two channels cannot be told apart
+BETTER = 0.5  # of the misfit as wired: what another assignment must come down to
+WRONG = 0.05  # RMS log ratio from which on the wiring is in doubt at all
+
+
+def by_magnitude(found: Float, expected: Float) -> Float:
+    """Cost [n, n] of taking channel i for j: squared log ratio of sizes [n] in sensor volts."""
+    return np.asarray((np.log(found)[:, None] - np.log(expected)[None, :]) ** 2)
+
+
+def by_shape(found: NDArray[np.complex128], expected: NDArray[np.complex128]) -> Float:
+    """Cost [n, n] of taking response i for j over all lines [n, n_lines]: mean squared log ratio of their sizes."""
+    sizes, known = np.log(np.abs(found)), np.log(np.abs(expected))
+    return np.asarray(np.mean((sizes[:, None] - known[None]) ** 2, axis=-1))
+
+
+def best_assignment(cost: Float) -> tuple[int, ...] | None:
+    """What each channel really is where that fits far better than the wiring as declared; None where it does not."""
+    rows, columns = linear_sum_assignment(cost)
+    as_wired, best = float(np.mean(np.diag(cost))), float(np.mean(cost[rows, columns]))
+    if as_wired < WRONG**2 or best > BETTER**2 * as_wired or np.array_equal(rows, columns):
+        return None
+    return tuple(int(column) for column in columns)
+
+
+LATE_SAMPLES = 0.25
+
+
+def latency_findings(bench: Bench, responses: Responses, lead_fraction: float) -> list[Finding]:
+    """Delay of each loopback behind what the driver says; ``lead_fraction``: part of a sample that rows leave in it.
+
+    The slope of its phase over the band, by least squares.
+    """
+    rows = [i for i, channel in enumerate(bench.channels) if channel.loopback]
+    if not rows:
+        text = "no channel is declared with loopback = true"
+        return [Finding("latency", "", "not tested", text=text)]
+    return [_slope(bench, responses, row, lead_fraction) for row in rows]
+
+
+def _slope(bench: Bench, responses: Responses, row: int, lead_fraction: float) -> Finding:
+    value, omega = responses.per_volt[row], 2.0 * math.pi * responses.frequency_hz / bench.sample_rate_hz
+    phase = np.unwrap(np.angle(value))
+    late = -float(np.polyfit(omega, phase, 1, w=np.abs(value))[0]) - lead_fraction
+    bad = abs(late) > LATE_SAMPLES
+    text = "more than the driver says: its queue or filter delay, or this channel's skew_samples" if bad else ""
+    name = bench.channels[row].name
+    return Finding("latency", name, "fail" if bad else "ok", late, "samples", f"+-{LATE_SAMPLES:g}", text)
+
 
 LIVES, CLEAR = 0.5, 0.98  # coherence
 POWER = 0.5  # part of the power's absolute sum that must flow one way for the way to be told

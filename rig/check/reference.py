@@ -5,9 +5,8 @@ from numpy.typing import NDArray
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
-from rig.check.judging import SIZE_OK, SIZE_TOLERATED
+from rig.check.judging import SIZE_OK, SIZE_TOLERATED, best_assignment, by_shape
 from rig.check.responses import Responses
-from rig.check.wiring import best_assignment, by_shape
 
 __all__ = ["on_lines_of", "reference_findings"]
 

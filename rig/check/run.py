@@ -1,91 +1,63 @@
 """The check of a bench: silence, then a multisine from a thousandth of the largest voltage upwards, as an ordinary run."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from rig.arming.arming import Arm, asked_once
 from rig.arming.bench_memory import RememberedCheck, fingerprint, now, remember
-from rig.arming.run_facts import About
+from rig.arming.run_options import RunOptions
 from rig.bench import Bench, load_bench
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.running.execution import Progress
-from rig.campaigns.running.runner import carry_out, take_up
+from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, Seen, share_of_limits
 from rig.check.assessment import PURPOSE, Assessment, assess, responses_in
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 
-__all__ = ["check", "next_level", "share_of_limits"]
+__all__ = ["SEARCH", "check", "seen_in"]
 
 BAND = (0.4, 2.5)  # of the linear frequency
 LINES = 200.0  # up to the linear frequency
-FIRST = 1e-3  # of the largest voltage, RMS
-SAFE = 0.1  # of every limit: what peaks may reach
-RISE = 4.0
 ENOUGH = 0.999  # coherence of the worst channel
-CLEAR = 0.9999  # of the best: what another does not show now, it will not show louder
+CLEAR = 0.9999  # coherence of the best channel from which on a dead one will not show at a higher level either
 DEAD = 0.1
-MOST_LEVELS = 5
 SILENT_S = 3.0
+SEARCH = LevelSearch(safe_share=0.1, least_rise=1.2, most_levels=5)
 
 
 def check(
     bench: Bench | str | Path,
     recording: str | Path,
+    options: RunOptions | None = None,
     *,
     named: str | None = None,
     reference: str | Path | None = None,
-    seed: int = 0,
-    realtime: bool = False,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-    arm: Arm = None,
-    about: About | None = None,
 ) -> Assessment:
     """Check a bench, record it in ``recording``, and remember the result for arming unless the rig is virtual.
 
-    ``named`` is what the recorded plan calls the bench.
-    ``reference`` is the recording of an earlier check. ``arm`` and ``about`` as for
-    `rig.campaigns.running.runner.carry_out`: a check moves the rig, gently, and so it must be armed too.
+    ``named`` is what the recorded plan calls the bench. ``reference`` is the recording of an earlier check. A check moves the
+    rig, gently, so it must be armed like a campaign.
 
     Raises `rig.errors.ConfigurationError`, `rig.errors.RecordingError`, `rig.errors.DaqError` and `rig.errors.NotArmed`
-    where nothing could be checked; what is wrong with the rig are findings.
+    where nothing could be checked. Faults of the rig are findings, not errors.
     """
     name = named or str(bench.name if isinstance(bench, Bench) else bench)
     bench = bench if isinstance(bench, Bench) else load_bench(bench)
-    path, about = Path(recording), replace(about or About(), purpose=PURPOSE)
+    path = Path(recording)
     if reference is not None:
         if Path(reference).exists() and path.exists() and path.samefile(reference):
             raise RecordingError(f"{path}: is the reference that is read; choose another name")
         with Recording(reference) as known:
-            responses_in(known)  # refused before anything moves
-    level, arm = FIRST * bench.limits.voltage_v, asked_once(arm)
-    for tried in range(MOST_LEVELS):
-        plan = _plan(bench, name, level, silent=tried == 0)
-        if tried == 0:
-            done = carry_out(
-                plan,
-                bench,
-                path,
-                seed=seed,
-                realtime=realtime,
-                overwrite=overwrite,
-                progress=progress,
-                arm=arm,
-                about=about,
-            )
-        else:
-            done = take_up(
-                path, change=plan, realtime=realtime, progress=progress, arm=arm, about=about, trust_code=True
-            )
-        with done as recorded:
-            higher = next_level(bench, recorded, level)
-        if higher is None:
-            break
-        level = higher
+            responses_in(known)  # refuses what is not a check before anything moves
+    series = MultisineSeries(bench, path, options or RunOptions(), PURPOSE)
+    silent_s = SILENT_S
+
+    def listen(level_rms_v: float) -> Seen:
+        nonlocal silent_s
+        plan, silent_s = _plan(bench, name, level_rms_v, silent_s), 0.0
+        with series.play(plan) as recorded:
+            return seen_in(bench, recorded)
+
+    SEARCH.search(bench, listen)
     return _assessed(bench, path, reference)
 
 
@@ -104,7 +76,7 @@ def _assessed(bench: Bench, path: Path, reference: str | Path | None) -> Assessm
     return found
 
 
-def _plan(bench: Bench, name: str, level_rms_v: float, *, silent: bool) -> MultisinePlan:
+def _plan(bench: Bench, name: str, level_rms_v: float, silent_s: float) -> MultisinePlan:
     linear, allowed = bench.specimen.linear_frequency_hz, bench.limits.frequency_hz
     lowest, highest = max(BAND[0] * linear, allowed[0]), min(BAND[1] * linear, allowed[1])
     samples = round(bench.sample_rate_hz * LINES / linear)
@@ -124,45 +96,27 @@ def _plan(bench: Bench, name: str, level_rms_v: float, *, silent: bool) -> Multi
         realisations=1,
         periods=2,
         transient_periods=1,
-        silent_s=SILENT_S if silent else 0.0,
+        silent_s=silent_s,
         accepted_change=1.0,
     )
 
 
-def next_level(bench: Bench, recorded: Recording, level: float) -> float | None:
-    """The level to go on with; None where this one suffices, none would, or the run ended early."""
+def seen_in(bench: Bench, recorded: Recording) -> Seen:
+    """How the last multisine of a check was seen; with no room for another level where the run ended early."""
     end = recorded.parts[-1].end
     found = responses_in(recorded)
     if found is None or end is None or end["reason"] != EndReason.COMPLETED.name.lower():
-        return None
+        return Seen(enough=False, share_of_limits=math.inf)
     counted = [i for i, channel in enumerate(bench.channels) if channel.role != "monitor"]
     coherence = found.coherence[counted]
     hopeless = (coherence < DEAD) & (coherence.max() > CLEAR)
-    if np.all((coherence >= ENOUGH) | hopeless):
-        return None
-    share = share_of_limits(bench, recorded)
-    if not math.isfinite(share):
-        return None
-    rise = min(RISE, SAFE / share)
-    return level * rise if rise > 1.2 else None
-
-
-def share_of_limits(bench: Bench, recorded: Recording) -> float:
-    """Largest peak of the last realisation against its limit, lost samples left out; inf where a channel has none left."""
     point = [point for point in recorded.latest.values() if "end_sample" in point][-1]
     rows = recorded.parts[-1].read(point["first_sample"], point["end_sample"])
-    limits = bench.limits
-    shares = [float(np.abs(rows["output_v"]).max()) / limits.voltage_v]
-    lowest = 2.0 * math.pi * max(BAND[0] * bench.specimen.linear_frequency_hz, limits.frequency_hz[0])
-    for index, channel in enumerate(bench.channels):
-        if channel.role == "monitor":
-            continue
-        values = rows["inputs"][:, index].astype(float)
-        values = values[np.isfinite(values)]
-        if not values.size:
-            return math.inf  # what was never seen may have been anything
-        largest = float(np.abs(values - values.mean()).max())
-        shares.append(largest / (limits.force_n if channel.role == "force" else limits.acceleration_m_s2))
-        if channel.role != "force":  # as if all of it were at the lowest frequency, where it moves the farthest
-            shares.append(largest / lowest**2 / limits.displacement_m)
-    return max(shares)
+    lowest_hz = max(BAND[0] * bench.specimen.linear_frequency_hz, bench.limits.frequency_hz[0])
+
+    def farthest_m(_: str, acceleration_m_s2: float) -> float:
+        """The displacement if all of the acceleration were at the lowest frequency."""
+        return acceleration_m_s2 / (2.0 * math.pi * lowest_hz) ** 2
+
+    enough = bool(((coherence >= ENOUGH) | hopeless).all())
+    return Seen(enough, share_of_limits(bench, rows, farthest_m))

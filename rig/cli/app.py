@@ -3,22 +3,28 @@
 import io
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.analyse import app as analyse_app
-from rig.cli.arming import ArmNow, Notes, Operator, SpecimenSerial, arm_from
 from rig.cli.check import check_
 from rig.cli.conformance import conformance
 from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
+from rig.cli.flags import with_flags
 from rig.cli.identify import identify, predict
 from rig.cli.list import list_
-from rig.cli.options import Json, Output, Overwrite, Realtime, say_what_is_imported, show_file
+from rig.cli.options import Json, Output, say_what_is_imported, show_file
 from rig.cli.reproduce import reproduce_
+from rig.cli.run_options import of_a_further_part, of_a_recording, shown, with_run_options
 from rig.cli.tune import tune_
+
+if TYPE_CHECKING:
+    from rig.arming.run_options import RunOptions
+    from rig.recording.reader import Recording
 
 __all__ = ["app", "main"]
 
@@ -53,114 +59,81 @@ app.command("reproduce")(reproduce_)
 
 
 @app.command()
+@with_run_options(of_a_recording)
 def run(
+    *,
     plan: Annotated[str, typer.Argument(help="Shipped plan (magnet-beam/backbone) or TOML file.")],
     output: Output,
     bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
     daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
-    realtime: Realtime = False,
-    arm: ArmNow = False,
-    operator: Operator = None,
-    specimen_serial: SpecimenSerial = "",
-    note: Notes = None,
-    overwrite: Overwrite = False,
+    options: "RunOptions",
     json: Json = False,
 ) -> None:
     """Carry out a plan and record it."""
-    import rig
     from rig.bench import load_bench
     from rig.campaigns.plans import bench_of, load_plan
+    from rig.campaigns.running.runner import carry_out
 
     loaded = load_plan(plan)
     chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
     if daq is not None:
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
-    _carry(
-        json,
-        loaded.kind,
-        lambda progress: rig.run(
-            loaded,
-            bench=chosen,
-            output=output,
-            seed=seed,
-            realtime=realtime,
-            overwrite=overwrite,
-            progress=progress,
-            arm=arm_from(arm),
-            operator=operator,
-            specimen_serial=specimen_serial,
-            notes=note or (),
-        ),
-    )
+    _carry(loaded.kind, options, lambda watched: carry_out(loaded, chosen, output, watched), json)
 
 
 @app.command()
+@with_run_options(of_a_further_part)
 def resume(
+    *,
     output: Annotated[Path, typer.Argument(help="Recording of the interrupted run.")],
     plan: Annotated[str | None, typer.Option(help="Changed plan to go on with: a name or TOML file.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)] = None,
     retry_tripped: Annotated[
         bool, typer.Option("--retry-tripped", help="Try a level at which the run tripped again.")
     ] = False,
     trust_code: Annotated[
         bool, typer.Option("--trust-code", help="Import the functions that the recording's bench names.")
     ] = False,
-    realtime: Realtime = False,
-    arm: ArmNow = False,
-    operator: Operator = None,
-    specimen_serial: SpecimenSerial = "",
-    note: Notes = None,
+    options: "RunOptions",
     json: Json = False,
 ) -> None:
     """Finish a run that was interrupted, by its plan or a changed one; points that were accepted stay."""
-    import rig
+    from rig.campaigns.plans import load_plan
+    from rig.campaigns.running.runner import take_up
     from rig.recording.reader import Recording
 
     with Recording(output) as recording:
         kind = recording.kind
+    change = None if plan is None else load_plan(plan)
     _carry(
-        json,
         kind,
-        lambda progress: rig.resume(
-            output,
-            plan=plan,
-            seed=seed,
-            realtime=realtime,
-            progress=progress,
-            arm=arm_from(arm),
-            operator=operator,
-            specimen_serial=specimen_serial,
-            notes=note or (),
-            retry_tripped=retry_tripped,
-            trust_code=trust_code,
+        options,
+        lambda watched: take_up(
+            output, watched, change=change, source=plan or "", retry_tripped=retry_tripped, trust_code=trust_code
         ),
+        json,
     )
 
 
-def _carry(json: bool, kind: str, start: Any) -> None:
-    from rig.api import Run
+def _carry(kind: str, options: "RunOptions", start: "Callable[[RunOptions], Recording]", json: bool) -> None:
+    """Run, show the points as they come and how it ended; exit status 1 where the plan was not completed."""
     from rig.campaigns.kinds import KINDS
     from rig.recording.reader import Recording
-    from rig.show.progress import RunProgress
     from rig.show.summary import summarise_recording
     from rig.show.tables import say_how_it_ended
     from rig.system.stop_signals import Interrupted, Terminated, ignore_from_now_on
     from rig.text.console import print_json
 
-    progress = RunProgress(KINDS[kind].columns)
-    try:
-        result = start(progress)
-    except (Interrupted, Terminated) as signal:  # one that came when all was done
-        if signal.recorded is None:
-            raise
-        result = Run(Recording(signal.recorded))
-    finally:
-        progress.close()
+    with shown(options, KINDS[kind].columns) as watched:
+        try:
+            result = start(watched)
+        except (Interrupted, Terminated) as signal:
+            if signal.recorded is None:
+                raise
+            result = Recording(signal.recorded)  # the signal came when the recording was already complete
     ignore_from_now_on()
     with result:
-        summary = summarise_recording(result.recording)
-        complete, path = result.complete, result.recording.path
+        summary = summarise_recording(result)
+        complete, path = result.complete, result.path
     if json:
         print_json(summary)
     else:
@@ -262,7 +235,7 @@ def _one_line(error: Exception) -> str:
 
     text = str(error)
     if isinstance(error, RigError | IdentificationError):
-        return text
+        return with_flags(text, app)
     if isinstance(error, OSError) and error.filename is not None:
         return f"{os.fsdecode(error.filename)}: cannot be used ({error.strerror})"
     return f"unexpected {type(error).__name__}: {text} (run again with --debug for the details)"

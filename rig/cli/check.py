@@ -2,30 +2,29 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.arming import ArmNow, Notes, Operator, SpecimenSerial, about_from, arm_from
-from rig.cli.options import Json, Overwrite, Realtime, keep_existing
+from rig.cli.options import Json, keep_existing
+from rig.cli.run_options import of_a_recording, shown, with_run_options
+
+if TYPE_CHECKING:
+    from rig.arming.run_options import RunOptions
 
 __all__ = ["check_"]
 
 
+@with_run_options(of_a_recording)
 def check_(
+    *,
     bench: Annotated[str, typer.Option(help="Shipped bench or TOML file.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Recording to write; named by bench and time if left out.")
     ] = None,
     reference: Annotated[Path | None, typer.Option(help="Recording of an earlier check to compare with.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
-    realtime: Realtime = False,
-    arm: ArmNow = False,
-    operator: Operator = None,
-    specimen_serial: SpecimenSerial = "",
-    note: Notes = None,
-    overwrite: Overwrite = False,
+    options: "RunOptions",
     json: Json = False,
 ) -> None:
     """Check noise, dead, reversed and swapped channels, gains and latency, with a low-level multisine; 1 if anything fails."""
@@ -35,7 +34,6 @@ def check_(
     from rig.check.report import say, summary
     from rig.check.run import check
     from rig.errors import ConfigurationError
-    from rig.show.progress import RunProgress
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure
 
@@ -43,25 +41,11 @@ def check_(
     path = Path(f"check-{Path(bench).stem}-{datetime.now():%Y%m%d-%H%M%S}.h5") if output is None else output
     if path.suffix != ".h5":
         raise ConfigurationError(f"-o {path}: recordings are written as .h5")
-    keep_existing([] if reference is None else [reference], path, overwrite)
+    keep_existing([] if reference is None else [reference], path, options.overwrite)
     if figure is not None:
-        check_figure(figure, overwrite)
-    progress = RunProgress(MULTISINE_COLUMNS)
-    try:
-        found = check(
-            loaded,
-            path,
-            named=bench,
-            reference=reference,
-            seed=seed,
-            realtime=realtime,
-            overwrite=overwrite,
-            progress=progress,
-            arm=arm_from(arm),
-            about=about_from(operator, specimen_serial, note),
-        )
-    finally:
-        progress.close()
+        check_figure(figure, options.overwrite)
+    with shown(options, MULTISINE_COLUMNS) as watched:
+        found = check(loaded, path, watched, named=bench, reference=reference)
     if figure is not None:
         write_check(found, figure)
     facts = summary(found)

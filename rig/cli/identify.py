@@ -16,25 +16,28 @@ def identify(
         list[Path], typer.Argument(help="Recordings, or imported measurements. Several are taken together.")
     ],
     output: Output,
-    model: Annotated[
-        str, typer.Option(help="Kind of model: nonlinear-mode, linear, force-surface, exciter or pnlss.")
+    kind: Annotated[
+        str, typer.Option("--model", help="Kind of model: nonlinear-mode, linear, force-surface, exciter or pnlss.")
     ] = "nonlinear-mode",
     modes: Annotated[Path | None, typer.Option(help="Linear model whose mode shapes the nonlinear mode uses.")] = None,
     estimator: Annotated[str, typer.Option(help="Of a linear model's responses: instrument, H1 or H2.")] = "instrument",
-    band: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Lines of a linear or exciter model, Hz.")
+    band_hz: Annotated[
+        tuple[float, float] | None,
+        typer.Option("--band", metavar="LOW HIGH", help="Lines of a linear or exciter model, Hz."),
     ] = None,
     count: Annotated[
         int | None, typer.Option("--count", help="Number of modes of a linear model; found if left out.", min=1)
     ] = None,
-    resistance: Annotated[
-        float | None, typer.Option(metavar="OHM", help="Of an exciter's coil, cable and amplifier, if measured.")
+    resistance_ohm: Annotated[
+        float | None,
+        typer.Option("--resistance", metavar="OHM", help="Of an exciter's coil, cable and amplifier, if measured."),
     ] = None,
     amplifier_gain: Annotated[
         float | None, typer.Option(metavar="V/V", help="Of the exciter's voltage amplifier; 1 if left out.")
     ] = None,
-    stinger_stiffness: Annotated[
-        float | None, typer.Option(metavar="N_PER_M", help="Of the exciter's stinger (E A / l), if known.")
+    stinger_stiffness_n_m: Annotated[
+        float | None,
+        typer.Option("--stinger-stiffness", metavar="N_PER_M", help="Of the exciter's stinger (E A / l), if known."),
     ] = None,
     states: Annotated[
         int | None, typer.Option("--states", help="Of a PNLSS model: two per mode of vibration.", show_default="2")
@@ -47,11 +50,13 @@ def identify(
             show_default="2,3; none beside --saturating",
         ),
     ] = None,
-    rate: Annotated[
+    rate_hz: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Sample rate of a PNLSS model; about 25 per period of the highest frequency."),
+        typer.Option(
+            "--rate", metavar="HZ", help="Sample rate of a PNLSS model; about 25 per period of the highest frequency."
+        ),
     ] = None,
-    input_: Annotated[
+    input: Annotated[
         str | None, typer.Option("--input", help="Of a PNLSS model: force or voltage.", show_default="force")
     ] = None,
     outputs: Annotated[
@@ -84,7 +89,7 @@ def identify(
             show_default="1",
         ),
     ] = None,
-    relative_errors: Annotated[
+    relative: Annotated[
         bool,
         typer.Option(
             "--relative-errors", help="Of a PNLSS model: small levels count as much as large ones in the fit."
@@ -106,26 +111,26 @@ def identify(
 
     keep_existing([*files, *(validation or ())], output, overwrite or resume)
     request = Request(
-        kind=model,
+        kind=kind,
         modes=modes,
         estimator=estimator,
-        band_hz=band,
+        band_hz=band_hz,
         count=count,
-        resistance_ohm=resistance,
+        resistance_ohm=resistance_ohm,
         amplifier_gain=amplifier_gain,
-        stinger_stiffness_n_m=stinger_stiffness,
+        stinger_stiffness_n_m=stinger_stiffness_n_m,
         pnlss=PnlssOptions(
             states=states,
             degrees=degrees,
-            rate_hz=rate,
-            input=input_,
+            rate_hz=rate_hz,
+            input=input,
             outputs=outputs,
             output_polynomials=False if no_output_polynomials else None,
             saturating=saturating,
             iterations=iterations,
             validation=tuple(validation or ()),
             hold_out=hold_out,
-            relative=True if relative_errors else None,
+            relative=True if relative else None,
             resume=output if resume else None,
         ),
     )
@@ -145,35 +150,45 @@ def identify(
 def predict(
     model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model or force surface.")],
     output: Output,
-    frequency_response: Annotated[
-        list[float] | None,
-        typer.Option(metavar="FORCE_N", help="Predict the frequency response at this constant force; may be repeated."),
-    ] = None,
-    voltage_response: Annotated[
+    forces_n: Annotated[
         list[float] | None,
         typer.Option(
+            "--frequency-response",
+            metavar="FORCE_N",
+            help="Predict the frequency response at this constant force; may be repeated.",
+        ),
+    ] = None,
+    voltages_v: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--voltage-response",
             metavar="VOLT",
             help="Predict a PNLSS model's frequency response at this constant voltage (peak), of its input or of the "
             "exciter; may be repeated.",
         ),
     ] = None,
-    force: Annotated[
+    held: Annotated[
         str | None,
         typer.Option(
+            "--force",
             help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; of a PNLSS model "
-            "driven by a force, and without an exciter, pure-sine."
+            "driven by a force, and without an exciter, pure-sine.",
         ),
     ] = None,
-    sweep: Annotated[
-        list[Path] | None, typer.Option(help="Predict the sweeps of this recording; may be repeated.")
+    sweeps: Annotated[
+        list[Path] | None, typer.Option("--sweep", help="Predict the sweeps of this recording; may be repeated.")
     ] = None,
-    multisine: Annotated[
+    multisines: Annotated[
         list[Path] | None,
-        typer.Option(help="Simulate the realisations of this recording with a PNLSS model; may be repeated."),
+        typer.Option(
+            "--multisine", help="Simulate the realisations of this recording with a PNLSS model; may be repeated."
+        ),
     ] = None,
-    planned_sweep: Annotated[
+    planned: Annotated[
         list[str] | None,
-        typer.Option(metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."),
+        typer.Option(
+            "--planned-sweep", metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."
+        ),
     ] = None,
     exciter: Annotated[
         Path | None,
@@ -192,9 +207,9 @@ def predict(
         ),
     ] = None,
     modes: Annotated[Path | None, typer.Option(help="Linear model: other modes and other sensors.")] = None,
-    reference: Annotated[
+    references: Annotated[
         list[Path] | None,
-        typer.Option(help="Stepped sines to compare with (recorded or imported); may be repeated."),
+        typer.Option("--reference", help="Stepped sines to compare with (recorded or imported); may be repeated."),
     ] = None,
     over: Annotated[
         str | None,
@@ -214,19 +229,19 @@ def predict(
     from rig.models.predict.predict import predict_vibrations
     from rig.models.predict.request import PredictionRequest
 
-    given = (model, exciter, modes, *(sweep or ()), *(multisine or ()), *(reference or ()))
+    given = (model, exciter, modes, *(sweeps or ()), *(multisines or ()), *(references or ()))
     keep_existing([path for path in given if path is not None], output, overwrite)
     request = PredictionRequest(
-        forces_n=tuple(frequency_response or ()),
-        voltages_v=tuple(voltage_response or ()),
-        held=force,
-        sweeps=tuple(sweep or ()),
-        multisines=tuple(multisine or ()),
-        planned=tuple(planned_sweep or ()),
+        forces_n=tuple(forces_n or ()),
+        voltages_v=tuple(voltages_v or ()),
+        held=held,
+        sweeps=tuple(sweeps or ()),
+        multisines=tuple(multisines or ()),
+        planned=tuple(planned or ()),
         exciter=exciter,
         zero_crossings=zero_crossings,
         modes=modes,
-        references=tuple(reference or ()),
+        references=tuple(references or ()),
         over=over,
         allow_extrapolation=allow_extrapolation,
     )

@@ -25,7 +25,7 @@ def reproduce_(
         float,
         typer.Option(help="Scatter of modal frequencies from run to run, relative; each realisation then is a run."),
     ] = 0.0,
-    input_: Annotated[str, typer.Option("--input", help="What goes into the models: force or voltage.")] = "force",
+    input: Annotated[str, typer.Option("--input", help="What goes into the models: force or voltage.")] = "force",
     with_backbone: Annotated[
         bool, typer.Option("--with-backbone", help="Fit points of a recorded backbone beside the multisines.")
     ] = False,
@@ -67,7 +67,7 @@ def reproduce_(
         folder=output,
         models=int(models) if models.isdecimal() else models,
         scatter=scatter,
-        input=input_,
+        input=input,
         with_backbone=with_backbone,
         saturating=saturating,
         states=states,

@@ -2,21 +2,27 @@
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.arming import ArmNow, Notes, Operator, SpecimenSerial, about_from, arm_from
-from rig.cli.options import Json, Overwrite, Realtime, keep_existing
+from rig.cli.options import Json, keep_existing
+from rig.cli.run_options import of_a_recording, shown, with_run_options
+
+if TYPE_CHECKING:
+    from rig.arming.run_options import RunOptions
 
 __all__ = ["tune_"]
 
 
+@with_run_options(of_a_recording)
 def tune_(
+    *,
     bench: Annotated[str, typer.Option(help="Shipped bench or TOML file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Plan to write: a TOML file.")],
-    level: Annotated[
-        float | None, typer.Option(metavar="V", help="RMS voltage of the multisine; found by itself if left out.")
+    level_rms_v: Annotated[
+        float | None,
+        typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found by itself if left out."),
     ] = None,
     law: Annotated[
         str, typer.Option(help="frequency-error (levels in metres) or phase (levels in volts).")
@@ -28,56 +34,32 @@ def tune_(
         Path | None, typer.Option(help="Recording of the multisine; beside the plan if left out.")
     ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)] = 0,
-    realtime: Realtime = False,
-    arm: ArmNow = False,
-    operator: Operator = None,
-    specimen_serial: SpecimenSerial = "",
-    note: Notes = None,
-    overwrite: Overwrite = False,
+    options: "RunOptions",
     json: Json = False,
 ) -> None:
     """Measure a rig with a low-level multisine, design gains, and write a plan that uses them."""
     from rig.bench import load_bench
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
     from rig.errors import ConfigurationError
-    from rig.show.progress import RunProgress
     from rig.system.whole_file import whole_file
     from rig.text.console import print_json
     from rig.text.printable import printable_strings
     from rig.tuning.figure import check_figure, draw_tuning
     from rig.tuning.report import lines, summary
-    from rig.tuning.tuning import tune
+    from rig.tuning.tuning import TuningRequest, tune
 
     load_bench(bench)
+    request = TuningRequest(level_rms_v=level_rms_v, law=law, from_m=from_m, to_m=to_m, points=points)
     if output.suffix != ".toml":
         raise ConfigurationError(f"-o {output}: plans are written as .toml")
-    keep_existing([], output, overwrite)
+    keep_existing([], output, options.overwrite)
     recorded = output.with_suffix(".h5") if recording is None else recording
     if recorded.suffix != ".h5":
         raise ConfigurationError(f"--recording {recorded}: recordings are written as .h5")
     if figure is not None:
-        check_figure(figure, overwrite)
-    progress = RunProgress(MULTISINE_COLUMNS)
-    try:
-        found = tune(
-            bench,
-            recorded,
-            named=_as_seen_from(bench, output),
-            level_rms_v=level,
-            law=law,
-            from_m=from_m,
-            to_m=to_m,
-            points=points,
-            seed=seed,
-            realtime=realtime,
-            overwrite=overwrite,
-            progress=progress,
-            arm=arm_from(arm),
-            about=about_from(operator, specimen_serial, note),
-        )
-    finally:
-        progress.close()
+        check_figure(figure, options.overwrite)
+    with shown(options, MULTISINE_COLUMNS) as watched:
+        found = tune(bench, recorded, request, watched, named=_as_seen_from(bench, output))
     with whole_file(output) as part:
         part.write_text(found.plan_toml, encoding="utf-8")
     if figure is not None:

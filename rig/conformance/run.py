@@ -61,7 +61,7 @@ def require_arming(bench: Bench, arm: bool) -> None:
         if not daq.capabilities.virtual and not arm:
             raise NotArmed(
                 f"bench {bench.name}: something physical would move by up to {DriverContract.amplitude_v:g} V; "
-                "look, then give --arm"
+                "look, then give `arm`"
             )
         daq.clear()
 

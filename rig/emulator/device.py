@@ -5,12 +5,10 @@ from collections import Counter
 
 import numpy as np
 
-from rig.emulator.description import Words
-from rig.emulator.faults import Faults
-from rig.emulator.parameters import Parameters
+from rig.emulator.faults import Faults, FaultySender
+from rig.emulator.parameters import Parameters, Words
 from rig.emulator.plant import Plant
 from rig.emulator.sampling import Sampling
-from rig.emulator.sending import FaultySender
 from rig.emulator.states import Life
 from rig.wire.link import Link
 from rig.wire.messages import (

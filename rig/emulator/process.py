@@ -1,24 +1,60 @@
-"""The emulator: a virtual rig behind a wire, until it is told to end."""
+"""The emulator process: a virtual rig behind a wire, served at the pace of the clock until it is told to end."""
 
 import os
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from rig.emulator.description import described
 from rig.emulator.device import Device
 from rig.emulator.faults import Faults
-from rig.emulator.output_log import LoggedPlant
-from rig.emulator.pace import ask_for_priority, keep_serving
-from rig.emulator.plant import Plant, VirtualPlant, Wiring
+from rig.emulator.parameters import described
+from rig.emulator.plant import LoggedPlant, Plant, VirtualPlant, Wiring
 from rig.emulator.ports import device_end
 from rig.emulator.settings import EmulatorSettings
+from rig.system.privileges import prepare
 from rig.wire.link import Link
 
-__all__ = ["Ready", "run_emulator"]
+__all__ = ["Ready", "ask_for_priority", "keep_serving", "run_emulator"]
+
+PRIORITY = 60
+"""Of SCHED_FIFO: below the wall-clock loop's, above the kernel's interrupt threads."""
+MOST_AT_ONCE = 64
+
+
+def keep_serving(device: Device, should_end: Callable[[], bool], clock: Callable[[], float] = time.monotonic) -> None:
+    """Serve a host until ``should_end`` says so, which is asked at every message and ten times a second.
+
+    Deadlines are absolute times of ``clock``. What has come by the time that a deadline is seen to be over counts as come in
+    time: who is late himself cannot know better, and must not hold it against the host. Raises
+    `rig.errors.DaqDisconnected` once the link is gone for good.
+    """
+    receive, handle, advance = device.link.receive, device.handle, device.advance
+    advance(clock())
+    while not should_end():
+        wake_s = device.wake_s
+        message = receive(max(0.0, wake_s - clock()))
+        now_s = clock()
+        if message is not None:
+            handle(message, min(now_s, wake_s))
+            if now_s >= wake_s:
+                for _ in range(MOST_AT_ONCE):
+                    message = receive(0.0)
+                    if message is None:
+                        break
+                    handle(message, wake_s)
+                now_s = clock()
+        advance(now_s)
+    device.switch_off(clock())
+
+
+def ask_for_priority() -> str:
+    """Ask for real-time scheduling, memory that stays, and no garbage collector; says which scheduling was granted."""
+    scheduling = prepare(priority=PRIORITY)["scheduling"]
+    return scheduling if scheduling.startswith("SCHED") else "ordinary scheduling"
 
 
 @dataclass

@@ -1,16 +1,97 @@
-"""A device's converters: blocks of samples at their instants, and outputs at theirs."""
+"""A device's sampling: outputs kept until they are due, the gate before the converter, and the blocks measured."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from rig.emulator.gate import Gate
-from rig.emulator.outputs import OutputQueue
 from rig.emulator.plant import Plant
 from rig.wire.messages import Output
 
-__all__ = ["Measured", "Sampling"]
+__all__ = ["Gate", "Measured", "OutputQueue", "Sampling"]
+
+
+class Gate:
+    """Which part of the outputs gets through, by the index of the sample; instants between two samples are fractions."""
+
+    def __init__(self) -> None:
+        self._opens = math.inf
+        self._closes = math.inf
+        self._ramp_samples = 0.0
+
+    def open(self, first: int) -> None:
+        """Let outputs through from a sample on."""
+        self._opens, self._closes = first, math.inf
+
+    def close(self, instant: float, ramp_samples: float = 0.0) -> None:
+        """0 V from an instant on, or from the end of the ramp that begins there."""
+        self._closes, self._ramp_samples = instant, ramp_samples
+
+    def is_closing(self, first: int) -> bool:
+        """Whether it was closed and a ramp may still be under way at a sample."""
+        return first < self._closes + self._ramp_samples and self._closes < math.inf
+
+    def let_through(self, first: int, volts: np.ndarray) -> np.ndarray:
+        """What is left of the outputs [n] of a block."""
+        if first < self._opens:
+            volts[: int(min(volts.size, self._opens - first))] = 0.0
+        if first + volts.size > self._closes:
+            beyond = np.arange(first, first + volts.size) - self._closes
+            if self._ramp_samples == 0.0:
+                volts[beyond >= 0.0] = 0.0
+            else:
+                volts *= np.clip(1.0 - beyond / self._ramp_samples, 0.0, 1.0)
+        return volts
+
+
+BLOCKS_AHEAD = 4  # beyond the queue: what a host may be early
+
+
+class OutputQueue:
+    """A ring of outputs, ``block`` samples a slot."""
+
+    def __init__(self, block: int, queue: int) -> None:
+        self.block = block
+        self._size = (queue + BLOCKS_AHEAD) * block
+        self._values = np.zeros(self._size)
+        self._there = np.zeros(self._size, bool)
+        self.held = 0.0
+        """Count that the converter holds."""
+
+    def put(self, first: int, counts: np.ndarray, present: int) -> int | None:
+        """Keep the outputs of a block; those before sample ``present`` are too late.
+
+        Returns how many came in time; None where the block makes no sense.
+        """
+        block = self.block
+        if counts.shape != (block,) or first < 0 or first % block:
+            return None
+        if first + block > present - present % block + self._size:
+            return None
+        late = min(max(0, present - first), block)
+        slot = first % self._size
+        self._values[slot + late : slot + block] = counts[late:]
+        self._there[slot + late : slot + block] = True
+        return block - late
+
+    def is_there(self, first: int) -> bool:
+        """Whether a whole block has come."""
+        slot = first % self._size
+        return bool(self._there[slot : slot + self.block].all())
+
+    def take(self, first: int) -> tuple[np.ndarray, bool]:
+        """Counts of a block as the converter puts them out, and whether it had to hold one; the slot is free then."""
+        slot = slice(first % self._size, first % self._size + self.block)
+        values, there = self._values[slot].copy(), self._there[slot]
+        held = not there.all()
+        if held:
+            last = self.held
+            for index in range(self.block):
+                last = values[index] = values[index] if there[index] else last
+        self._there[slot] = False
+        self.held = float(values[-1])
+        return values, held
+
 
 ROUNDING_SAMPLES = 1e-6  # an instant that falls on a sample is that sample's
 

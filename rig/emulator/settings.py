@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.emulator.faults import Faults
-from rig.wire.can.frames import DATA_BIT_RATE_HZ
+from rig.wire.can.frames import DATA_BIT_RATE_HZ, BusTiming
 
 __all__ = ["EmulatorSettings"]
 
@@ -53,6 +53,11 @@ class EmulatorSettings(Configured):
     """CAN: number of the device on its bus."""
     faults: dict[str, Any] = Field(default_factory=dict)
     """What the device shall do wrong; see `Faults`."""
+
+    @property
+    def timing(self) -> BusTiming:
+        """CAN: frames and bit rates of the bus."""
+        return BusTiming(self.fd, self.bitrate, self.data_bitrate)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

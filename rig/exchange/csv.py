@@ -14,8 +14,8 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.exchange.mat import ImportFailed
-from rig.measurements.contents import Contents
 from rig.system.text_files import read_text
+from rig.text.contents import Contents
 
 __all__ = ["read_csv", "table_of_ours", "write_csv"]
 
@@ -27,7 +27,7 @@ def write_csv(items: Sequence[Contents], path: Path) -> None:
     """Write the one table; raises `RecordingError` where there are several."""
     if len(items) > 1:
         titles = "; ".join(f"{number} ({item.kind}, {item.title})" for number, item in enumerate(items, 1))
-        raise RecordingError(f"a CSV file holds one table, here are {len(items)}: choose by --item one of {titles}")
+        raise RecordingError(f"a CSV file holds one table, here are {len(items)}: choose by `item` one of {titles}")
     item = items[0]
     columns = [column for name in item.arrays if name in item.rows for column in item.columns(name)]
     with path.open("w", newline="", encoding="utf-8") as stream:

@@ -14,8 +14,8 @@ import numpy as np
 
 from rig.errors import RigError
 from rig.exchange.mat_values import read_values
-from rig.measurements.contents import Contents
 from rig.system.child import ChildFailed, ask_child
+from rig.text.contents import Contents
 
 __all__ = ["ImportFailed", "read_mat", "structures_of_ours", "write_mat"]
 

@@ -69,7 +69,7 @@ def import_file(
     """
     from identification.errors import IdentificationError
 
-    reader = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}[format_of(path, format_, "--format")]
+    reader = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}[format_of(path, format_, "`format`")]
     try:
         return reader(path, mapping, {"units": units, "drive": drive, "item": item})
     except ImportFailed as error:
@@ -141,7 +141,7 @@ def _response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str)
 
 def _chosen(found: list[Any], path: Path, item: int) -> Any:
     if not 0 <= item <= len(found) or (item == 0 and len(found) > 1):
-        raise ImportFailed(f"{path}: holds {len(found)} objects; choose by --item 1 to {len(found)}")
+        raise ImportFailed(f"{path}: holds {len(found)} objects; choose by `item` 1 to {len(found)}")
     return found[max(item - 1, 0)]
 
 
@@ -153,7 +153,7 @@ def _from_mat(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
         return _mapped(read_mat(path), mapping)
     ours = structures_of_ours(read_mat(path))
     if not ours:
-        raise ImportFailed(f"{path}: was not written by this package; say by --mapping what is where in it")
+        raise ImportFailed(f"{path}: was not written by this package; say by `mapping` what is where in it")
     return put_together(*_chosen(ours, path, options["item"]))
 
 
@@ -166,19 +166,18 @@ def _from_csv(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
         return _mapped(read_csv(path), mapping)
     ours = table_of_ours(path)
     if ours is None:
-        raise ImportFailed(f"{path}: was not written by this package; say by --mapping what is in its columns")
+        raise ImportFailed(f"{path}: was not written by this package; say by `mapping` what is in its columns")
     return put_together(*ours)
 
 
 def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
     from rig.exchange.uff.modes import modes_in
-    from rig.exchange.uff.reading import read_uff
+    from rig.exchange.uff.reading import read_uff, time_data_in
     from rig.exchange.uff.responses import responses_in
-    from rig.exchange.uff.time_data import time_data_in
 
     units = options["units"]
     if units not in ("", "labels", "file", "si"):
-        raise ConfigurationError(f"--units = {units!r}: allowed is labels, file or si")
+        raise ConfigurationError(f"`units` = {units!r}: allowed is labels, file or si")
     if mapping is not None:
         read_mapping(mapping)
     datasets = read_uff(path)
@@ -187,11 +186,11 @@ def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
     kinds = {(dataset["type"], dataset.get("func_type", 0)) for dataset in datasets}
     modes = (55, 0) in kinds
     if modes and (58, 4) in kinds and options["item"] not in (1, 2):
-        raise ImportFailed(f"{path}: holds modes and frequency responses; choose by --item 1 (modes) or 2 (responses)")
+        raise ImportFailed(f"{path}: holds modes and frequency responses; choose by `item` 1 (modes) or 2 (responses)")
     if (58, 4) in kinds and not (modes and options["item"] == 1):
         return responses_in(datasets, units)
     if modes:
         return modes_in(datasets, units, options["drive"])
     if (58, 1) in kinds:
-        raise ImportFailed(f"{path}: holds time data; say by --mapping with kind = 'multisine' what was played")
+        raise ImportFailed(f"{path}: holds time data; say by `mapping` with kind = 'multisine' what was played")
     raise ImportFailed(f"{path}: holds neither frequency responses (58, type 4), modes (55) nor time data (58, type 1)")

@@ -18,9 +18,9 @@ from rig.errors import RecordingError
 from rig.recording import jsontext
 from rig.recording.appending import BlockFile, NameLost
 from rig.recording.blocks import LARGEST_PAYLOAD, TWICE, BlockKind
-from rig.recording.contents import JournalContents
 from rig.recording.header import Column, Header, packed
-from rig.recording.sequence import Tail, read_journal
+from rig.recording.journal_blocks import Tail, read_journal
+from rig.recording.journal_contents import JournalContents
 from rig.system.locking import synchronise_folder
 
 __all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]

@@ -8,10 +8,9 @@ from typing import Any
 
 from rig.errors import RecordingError
 from rig.recording.examination import check_attributes, examine
+from rig.recording.hdf5_sink import Sink
 from rig.recording.header import FORMAT, SCHEMA, check_schema
-from rig.recording.integrity import integrity_of
-from rig.recording.sink import Sink
-from rig.recording.trailer import append_trailer
+from rig.recording.integrity import append_trailer, integrity_of
 from rig.system.locking import synchronise_folder
 from rig.text.printable import error_text
 

@@ -7,14 +7,14 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from rig.errors import RecordingError
-from rig.recording.contents import JournalContents
+from rig.recording.conversion import check_continuation
+from rig.recording.hdf5_recording import read_recording, recording_integrity
 from rig.recording.header import Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.journal import journal_path
+from rig.recording.journal_contents import JournalContents
 from rig.recording.layout import open_file
 from rig.recording.parts import Part
-from rig.recording.store import check_continuation
-from rig.recording.stored import read_recording, recording_integrity
 
 __all__ = ["Part", "RecordedPlan", "Recording"]
 

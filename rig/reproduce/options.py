@@ -65,21 +65,21 @@ class Options:
                 "holds predictions against the truth, which only a virtual bench tells"
             )
         if self.input not in INPUTS:
-            raise ConfigurationError(f"--input {self.input}: allowed is {', '.join(INPUTS)}")
+            raise ConfigurationError(f"`input` {self.input}: allowed is {', '.join(INPUTS)}")
         wrong = self.without - set(PARTS)
         if wrong:
-            raise ConfigurationError(f"--without {min(wrong)}: allowed is {', '.join(PARTS)}")
+            raise ConfigurationError(f"`without` {min(wrong)}: allowed is {', '.join(PARTS)}")
         if self.models != PAPER and not (isinstance(self.models, int) and self.models > 0):
-            raise ConfigurationError(f"--models {self.models}: allowed is a number from 1, or {PAPER}")
+            raise ConfigurationError(f"`models` {self.models}: allowed is a number from 1, or {PAPER}")
         if not 0.0 <= self.scatter <= 0.05:
-            raise ConfigurationError(f"--scatter {self.scatter:g}: allowed is 0 to 0.05")
+            raise ConfigurationError(f"`scatter` {self.scatter:g}: allowed is 0 to 0.05")
         if self.channel not in self.specimen.outputs:
-            raise ConfigurationError(f"--channel {self.channel}: allowed is {', '.join(self.specimen.outputs)}")
+            raise ConfigurationError(f"`channel` {self.channel}: allowed is {', '.join(self.specimen.outputs)}")
         for name, value in (("states", self.states), ("realisations", self.realisations)):
             if value is not None and value < 1:
-                raise ConfigurationError(f"--{name} {value}: allowed is 1 and above")
+                raise ConfigurationError(f"`{name}` {value}: allowed is 1 and above")
         if self.levels is not None and not 1 <= self.levels <= len(self.specimen.levels):
-            raise ConfigurationError(f"--levels {self.levels}: allowed is 1 to {len(self.specimen.levels)}")
+            raise ConfigurationError(f"`levels` {self.levels}: allowed is 1 to {len(self.specimen.levels)}")
 
     @property
     def plans(self) -> dict[str, str]:

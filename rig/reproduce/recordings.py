@@ -1,18 +1,16 @@
 """The recordings of a study: made once, taken up where they were interrupted."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import rig
 from identification import Experiment
+from rig.arming.run_options import Progress, RunOptions, Silent
 from rig.bench import Bench
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan
-from rig.campaigns.running.execution import Progress
+from rig.campaigns.running.runner import carry_out, take_up
 from rig.errors import RigError
 from rig.measurements.experiments import experiments
 from rig.recording.journal import journal_path
@@ -77,26 +75,21 @@ def _make(plan: Plan, bench: Bench, path: Path, seed: int, *, quiet: bool = Fals
         with Recording(path) as recording:
             if recording.complete:
                 return True
-    progress: Any = None if quiet else RunProgress(KINDS[plan.kind].columns)
-    with _closed(progress):
-        if path.exists() or journal_path(path).exists():
-            run = rig.resume(path, progress=progress, retry_tripped=True)  # these rigs are virtual
+    shown = RunProgress(KINDS[plan.kind].columns)
+    watcher: Progress = Silent() if quiet else shown
+    try:
+        if path.exists() or journal_path(path).exists():  # tripped levels are tried again: these rigs are virtual
+            recording = take_up(path, RunOptions(progress=watcher), retry_tripped=True)
         else:
-            run = rig.run(plan, bench=bench, output=path, seed=seed, progress=progress)
-    with run:
-        end = run.recording.parts[-1].end or {}
+            recording = carry_out(plan, bench, path, RunOptions(seed=seed, progress=watcher))
+    finally:
+        if not quiet:
+            shown.close()
+    with recording:
+        end = recording.parts[-1].end or {}
         if end.get("reason") == _STOPPED:
             raise KeyboardInterrupt
-        return run.complete
-
-
-@contextmanager
-def _closed(progress: "Progress | None") -> Iterator[None]:
-    try:
-        yield
-    finally:
-        if isinstance(progress, RunProgress):
-            progress.close()
+        return recording.complete
 
 
 def training_data(options: Options, path: Path, *, given: str | None = None) -> tuple[Experiment, ...]:

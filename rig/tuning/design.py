@@ -23,8 +23,7 @@ from controller.tuning import (
 )
 from controller.tuning.exact import frequencies_for
 from identification import FrequencyResponseMatrix
-from rig.tuning.errors import TuningError
-from rig.tuning.plant import largest_outside
+from rig.tuning.plant import TuningError, largest_outside
 
 __all__ = ["Chosen", "LawName", "choose", "gains_of"]
 

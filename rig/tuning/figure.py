@@ -29,7 +29,7 @@ def check_figure(figure: Path, overwrite: bool) -> None:
     if not figure.parent.is_dir():
         raise RecordingError(f"{figure}: there is no folder {figure.parent}")
     if figure.exists() and not overwrite:
-        raise RecordingError(f"{figure}: exists already; choose another name, or --overwrite")
+        raise RecordingError(f"{figure}: exists already; choose another name, or `overwrite`")
 
 
 def draw_tuning(tuning: "Tuning", figure: Path) -> None:

@@ -1,4 +1,4 @@
-"""Levels of the backbone that a tuning proposes: from what can be told from noise to a part of the bench's limits."""
+"""Levels and low-pass of the proposed test: from the lowest force that noise allows to a part of the limits."""
 
 import math
 from collections.abc import Mapping
@@ -6,12 +6,46 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.tuning import PlantModel
+from controller.tuning import LowPassChoice, PlantModel, low_pass_from_densities
 from rig.bench import Bench
 from rig.campaigns.planning.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
 
-__all__ = ["LevelChoice", "choose_levels", "lowest_force_n", "needed_v", "reach_m"]
+__all__ = ["LevelChoice", "choose_levels", "low_pass", "lowest_force_n", "needed_v", "reach_m"]
+
+LAG_STD_DEG = 0.75  # of the raw lag: the settle rule averages it over ten periods
+RAISED = 3.0  # times the lowest force wanted
+
+
+def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float) -> tuple[float, float, str]:
+    """Largest low-pass (rad/s), the lowest force (N) that the lag can be told at with it, and why.
+
+    The lag fluctuates by `LAG_STD_DEG` at that force. Where that is not more than `RAISED` times the force wanted, the
+    force is raised rather than the low-pass lowered: a slow low-pass waits at every level.
+    """
+    omega = plant.lock_frequency_rad_s()
+    accelerance = abs(complex(plant.accelerance(1j * omega)))
+
+    def fluctuation(force_n: float) -> LowPassChoice:
+        amplitudes = (densities[0], force_n, densities[1], force_n * accelerance)
+        return low_pass_from_densities(omega, *amplitudes, lag_std_deg=LAG_STD_DEG)
+
+    quickest = fluctuation(1e6 * lowest_n)  # bounded by the frequency alone
+    needed_n = 1e6 * lowest_n * quickest.lag_std_deg / LAG_STD_DEG
+    if needed_n <= lowest_n:
+        choice = fluctuation(lowest_n)
+        return (
+            choice.low_pass_rad_s,
+            lowest_n,
+            f"the lag then fluctuates by {choice.lag_std_deg:.2g} deg at {lowest_n:.3g} N",
+        )
+    why = f"the lag then fluctuates by {LAG_STD_DEG:g} deg at"
+    if needed_n <= RAISED * lowest_n:
+        return quickest.low_pass_rad_s, needed_n, f"{why} {needed_n:.3g} N, the lowest level, raised for that"
+    choice = fluctuation(lowest_n)
+    force_n = lowest_n * max(1.0, choice.lag_std_deg / LAG_STD_DEG)
+    return choice.low_pass_rad_s, force_n, f"{why} {force_n:.3g} N, the lowest level"
+
 
 PART = 1.0 / 3.0  # of the limits at the linear plant: room for what the nonlinearity asks for on top
 SPAN = 30.0  # highest level over lowest, where noise allows
@@ -87,7 +121,7 @@ def choose_levels(
     lowest = lowest_n / needed_n(plant, 1.0) if from_m is None else from_m
     if highest > reach:
         raise ConfigurationError(
-            f"--to-m = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "
+            f"`to_m` = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "
             f"linear plant (it would need {needed_v(plant, highest):.3g} V)"
         )
     if not 0.0 < lowest < highest:

@@ -5,23 +5,18 @@ All of it goes through the ordinary runner into one recording, level by level a 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
 from identification import FrequencyResponseMatrix, PeriodicSpectra
-from rig.arming.arming import Arm, asked_once
-from rig.arming.run_facts import About
 from rig.bench import Bench
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.running.execution import Progress
-from rig.campaigns.running.runner import carry_out, take_up
+from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, Seen, share_of_limits
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
-from rig.tuning.errors import TuningError
-from rig.tuning.spectra import coherence_of, densities, near, voltage_responses
+from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
 __all__ = ["LinearTest", "measure"]
 
@@ -29,10 +24,9 @@ BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could exci
 LINES = 400.0  # lines up to the linear frequency while the level is sought
 LINES_A_BANDWIDTH = 4.0
 ENOUGH = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
-FIRST = 1e-3  # of the largest voltage, RMS
-SAFE = 0.5  # of every limit: what peaks may reach while the level is sought
-LARGEST_RISE = 4.0
-MOST_LEVELS = 12
+AUDIBLE = 0.9  # coherence that a level chosen by the user must reach at least
+CREST = 4.0  # peak over RMS of a multisine's response, at most
+SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,81 +52,66 @@ class LinearTest:
 
 
 def measure(
-    bench: Bench,
+    series: MultisineSeries,
     bench_name: str,
-    recording: Path,
-    *,
-    level_rms_v: float | None = None,
-    seed: int = 0,
-    realtime: bool = False,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-    arm: Arm = None,
-    about: About | None = None,
     damping_of: Callable[[FrequencyResponseMatrix, float], float],
+    level_rms_v: float | None = None,
 ) -> LinearTest:
     """Raise the level until the coherence suffices, then measure with lines as close as the damping asks for.
 
-    ``level_rms_v`` spares the search. ``damping_of`` tells the damping ratio from coarse responses and
-    the samples from an output to the input that shows it.
+    ``bench_name`` is what the recorded plan calls the bench. ``damping_of`` returns the damping ratio from coarse responses
+    and the samples from an output to the input that shows it. With ``level_rms_v`` there is no search.
 
     Raises `TuningError` where a run was stopped or no level within half of the bench's limits suffices,
     `ConfigurationError` for a level beyond the limits.
     """
-    run = _Runs(bench, bench_name, recording, seed, realtime, overwrite, progress, asked_once(arm), about)
-    level = FIRST * bench.limits.voltage_v if level_rms_v is None else level_rms_v
-    tried: list[float] = []
-    while True:
-        tried.append(level)
-        found = run.at(level, _coarse(bench), 1)
-        seen = coherence_of(bench, found)
-        if min(seen) >= ENOUGH or level_rms_v is not None:
-            break
-        level = _raised(bench, level, seen, run.share_of_limits, len(tried))
-    _audible(bench, level, seen)
-    matrix = voltage_responses(bench, found)
-    resolution = 2.0 * damping_of(matrix, run.lead_samples) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
-    found = run.at(level, _on_samples(bench, min(resolution, _coarse(bench))), 3)
+    bench, runs = series.bench, _Runs(series, bench_name)
+    if level_rms_v is None:
+        levels = SEARCH.search(bench, runs.listen)
+        tried = levels.tried_v
+        if not levels.enough:
+            raise TuningError(_silent(bench, tried[-1], runs.coherence, "at half of the bench's limits"))
+    else:
+        runs.listen(level_rms_v)
+        tried = (level_rms_v,)
+        if min(runs.coherence) < AUDIBLE:
+            raise TuningError(_silent(bench, level_rms_v, runs.coherence, "at the level asked for"))
+    matrix = voltage_responses(bench, runs.measured)
+    resolution = 2.0 * damping_of(matrix, runs.lead_samples) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
+    found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), 3)
     matrix = voltage_responses(bench, found)
     around = near(bench, matrix.frequency_hz)
     nonlinear = np.maximum(matrix.total_std[around, 0, 0] ** 2 - matrix.noise_std[around, 0, 0] ** 2, 0.0)
     noise = densities(bench, found)
     return LinearTest(
-        level_rms_v=level,
+        level_rms_v=tried[-1],
         responses=matrix,
-        lead_samples=run.lead_samples,
+        lead_samples=runs.lead_samples,
         coherence=coherence_of(bench, found),
         distortion=float(np.median(np.sqrt(nonlinear) / np.abs(matrix.value[around, 0, 0]))),
         force_density=noise[0],
         acceleration_density=noise[1],
-        levels_tried_v=tuple(tried),
+        levels_tried_v=tried,
     )
 
 
 class _Runs:
-    """One recording that is gone on with at every level."""
+    """The multisines of a tuning, and what the last one has measured."""
 
-    def __init__(
-        self,
-        bench: Bench,
-        name: str,
-        recording: Path,
-        seed: int,
-        realtime: bool,
-        overwrite: bool,
-        progress: Progress | None,
-        arm: Arm,
-        about: About | None,
-    ) -> None:
-        self.bench, self.name, self.path = bench, name, recording
-        self.seed, self.realtime, self.overwrite, self.progress = seed, realtime, overwrite, progress
-        self.arm, self.about = arm, replace(about or About(), purpose="tuning")
-        self.begun = False
-        self.share_of_limits = 0.0
-        self.lead_samples = 0.0
+    measured: PeriodicSpectra
+    """Spectra."""
+    rows: np.ndarray
+    """Its telemetry rows."""
+    lead_samples: float
+    """Lead of the device."""
+    coherence: tuple[float, float]
+    """Coherence of force and drive at the last level that was listened to."""
+
+    def __init__(self, series: MultisineSeries, bench_name: str) -> None:
+        self.series, self.bench, self.name = series, series.bench, bench_name
 
     def at(self, level_rms_v: float, resolution_hz: float, realisations: int) -> PeriodicSpectra:
-        """Spectra at a level; notes how far its peaks went towards the limits, and the lead of the device."""
+        """Play a level; its spectra."""
         lowest, highest = (part * self.bench.specimen.linear_frequency_hz for part in BAND)
         allowed = self.bench.limits.frequency_hz
         plan = MultisinePlan(
@@ -146,50 +125,28 @@ class _Runs:
             transient_periods=1,
             periods=2,
         )
-        if self.begun:
-            done = take_up(
-                self.path,
-                change=plan,
-                realtime=self.realtime,
-                progress=self.progress,
-                arm=self.arm,
-                about=self.about,
-                trust_code=True,
-            )
-        else:
-            done = carry_out(
-                plan,
-                self.bench,
-                self.path,
-                seed=self.seed,
-                realtime=self.realtime,
-                overwrite=self.overwrite,
-                progress=self.progress,
-                arm=self.arm,
-                about=self.about,
-            )
-            self.begun = True
-        with done as recording:
+        with self.series.play(plan) as recording:
             _ended_well(recording, level_rms_v)
             self.lead_samples = float(recording.parts[-1].information["about"]["lead_samples"])
-            measured = spectra(recording)[level_rms_v]
-            self.share_of_limits = self._share(recording, measured)
-        return measured
+            self.measured = spectra(recording)[level_rms_v]
+            number = next(number for number, point in recording.latest.items() if point["accepted"])
+            self.rows = point_rows(recording, number)
+        return self.measured
 
-    def _share(self, recording: Recording, measured: PeriodicSpectra) -> float:
-        """Largest peak against its limit."""
-        number = next(number for number, point in recording.latest.items() if point["accepted"])
-        rows, limits = point_rows(recording, number), self.bench.limits
-        shares = [float(np.abs(rows["output_v"]).max()) / limits.voltage_v]
-        crest = 4.0
-        for index, channel in enumerate(self.bench.channels):
-            limit = {"force": limits.force_n, "monitor": math.inf}.get(channel.role, limits.acceleration_m_s2)
-            shares.append(float(np.nanmax(np.abs(rows["inputs"][:, index]))) / limit)
-            if channel.role in ("drive", "response"):
-                amplitude = measured.amplitude[measured.index(channel.name)]
-                moved = amplitude / (2.0 * np.pi * measured.frequency_hz) ** 2
-                shares.append(crest * float(np.sqrt(0.5 * np.sum(moved**2))) / limits.displacement_m)
-        return max(shares)
+    def listen(self, level_rms_v: float) -> Seen:
+        """Play a level with coarse lines; how its responses stood out of the noise."""
+        self.at(level_rms_v, _coarse(self.bench), 1)
+        self.coherence = coherence_of(self.bench, self.measured)
+        least = min(self.coherence)
+        noise = math.sqrt(max(1.0 / max(least, 1e-9) - 1.0, 0.0) / (1.0 / ENOUGH - 1.0))
+        share = share_of_limits(self.bench, self.rows, self._moved_m)
+        return Seen(least >= ENOUGH, share, max(1.3 * noise, 1.5))
+
+    def _moved_m(self, name: str, _: float) -> float:
+        """Peak displacement of a channel, from its spectrum."""
+        amplitude = self.measured.amplitude[self.measured.index(name)]
+        moved = amplitude / (2.0 * np.pi * self.measured.frequency_hz) ** 2
+        return CREST * float(np.sqrt(0.5 * np.sum(moved**2)))
 
 
 def _ended_well(recording: Recording, level: float) -> None:
@@ -200,20 +157,6 @@ def _ended_well(recording: Recording, level: float) -> None:
     failed = [point for point in recording.latest.values() if not point["accepted"]]
     if failed:
         raise TuningError(f"multisine at {level:.4g} V RMS: {failed[0]['reason']}; recorded in {recording.path}")
-
-
-def _raised(bench: Bench, level: float, seen: tuple[float, float], share: float, tried: int) -> float:
-    """The next level: by the noise it must overcome, up to half of the limits."""
-    noise = math.sqrt(max(1.0 / max(min(seen), 1e-9) - 1.0, 0.0) / (1.0 / ENOUGH - 1.0))
-    rise = min(max(1.3 * noise, 1.5), LARGEST_RISE, SAFE / share)
-    if rise < 1.05 or tried >= MOST_LEVELS:
-        raise TuningError(_silent(bench, level, seen, "at half of the bench's limits"))
-    return level * rise
-
-
-def _audible(bench: Bench, level: float, seen: tuple[float, float]) -> None:
-    if min(seen) < 0.9:
-        raise TuningError(_silent(bench, level, seen, "at the level asked for"))
 
 
 def _silent(bench: Bench, level: float, seen: tuple[float, float], when: str) -> str:

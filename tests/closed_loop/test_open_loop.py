@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import rig
+from rig.arming.run_options import Silent
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import MULTISINE_COLUMNS
-from rig.campaigns.running.execution import Silent
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 from rig.campaigns.stepped_sine.points import STEPPED_SINE_COLUMNS
 from rig.campaigns.sweep.plan import SweepPlan

@@ -62,7 +62,7 @@ KILLED = """
 import os, signal
 from pathlib import Path
 
-from rig.campaigns.running.execution import Silent
+from rig.arming.run_options import Silent
 from rig.campaigns.plans import load_plan
 
 def test_a_emulator_dies_in_mid_run(armed_rig, monkeypatch):
@@ -107,7 +107,7 @@ INTERRUPTED = """
 from pathlib import Path
 
 import numpy as np
-from rig.campaigns.running.execution import Silent
+from rig.arming.run_options import Silent
 from rig.campaigns.plans import load_plan
 
 def test_a(armed_rig, monkeypatch):

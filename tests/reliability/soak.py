@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import rig
+from rig.arming.run_options import Silent
 from rig.bench import Bench, load_bench
-from rig.campaigns.running.execution import Silent
 from rig.emulator.emulated import emulated
 from rig.recording.reader import Recording
 from rig.tick.tick import Tick

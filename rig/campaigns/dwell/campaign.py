@@ -10,6 +10,7 @@ from rig.campaigns.dwell.plan import DwellPlan
 from rig.campaigns.dwell.points import DWELL_COLUMNS, measure_mean, watch_drift
 from rig.campaigns.evaluation.recorded import accepted_points, specimen_of
 from rig.recording.reader import Recording
+from rig.text.contents import Contents
 
 __all__ = ["DWELL", "DwellCourse", "recorded_course"]
 
@@ -55,6 +56,12 @@ def recorded_course(recording: Recording) -> DwellCourse:
     )
 
 
+def _table(recording: Recording) -> Contents:
+    course = vars(recorded_course(recording))
+    arrays = {name: values for name, values in course.items() if name != "specimen"}
+    return Contents("dwell", course["specimen"], arrays, {"specimen": course["specimen"]}, dict.fromkeys(arrays, 0))
+
+
 DWELL = Campaign(
     plan=DwellPlan,
     measure=measure_mean,
@@ -64,4 +71,5 @@ DWELL = Campaign(
     identity=("controller.phase_lag_deg", "mean_s"),
     fixed=("harmonics", "mean_s"),
     measurements={DwellCourse: recorded_course},
+    exchanged=lambda recording: [_table(recording)],
 )

@@ -1,11 +1,13 @@
 """Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from controller import LockState
+from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
@@ -26,9 +28,8 @@ from rig.system.stop_signals import asking, held
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
-from rig.tick.tick import Tick
 
-__all__ = ["Execution", "Progress", "Silent", "nothing_left"]
+__all__ = ["Execution", "MeasuredBefore", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
@@ -44,30 +45,16 @@ OVER = {
 }
 
 
-class Progress(Protocol):
-    """Whoever wants to watch a run."""
+@dataclass(frozen=True)
+class MeasuredBefore:
+    """What earlier parts of the recording have measured of the plan."""
 
-    def point(self, point: dict[str, Any], number: int, total: int) -> None:
-        """A point is done, measured or failed; ``number`` of ``total``."""
-
-    def advance(self, rows: np.ndarray, tick: Tick) -> None:
-        """A chunk of telemetry has come in."""
-
-    def remark(self, text: str) -> None:
-        """The driver has something to say about the bench."""
-
-
-class Silent:
-    """Watches and says nothing."""
-
-    def point(self, point: dict[str, Any], number: int, total: int) -> None:
-        """Nothing."""
-
-    def advance(self, rows: np.ndarray, tick: Tick) -> None:
-        """Nothing."""
-
-    def remark(self, text: str) -> None:
-        """Nothing."""
+    done: frozenset[int] = frozenset()
+    """Numbers, in the plan, of points that were accepted."""
+    numbers: Sequence[int] | None = None
+    """Number in the recording of every point of the plan; None where the two are the same."""
+    points: tuple[Mapping[str, Any], ...] = ()
+    """Points of the recording."""
 
 
 class Execution:
@@ -80,25 +67,24 @@ class Execution:
         loop: RunningLoop,
         journal: JournalWriter,
         progress: Progress,
-        done: frozenset[int] = frozenset(),
-        numbers: Sequence[int] | None = None,
-        before: Sequence[Mapping[str, Any]] = (),
+        before: MeasuredBefore | None = None,
     ) -> None:
+        before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
         self.journal, self.progress = journal, progress
         self.measure = KINDS[plan.kind].measure
         self.in_one_go = KINDS[plan.kind].in_one_go
         self.watch = KINDS[plan.kind].watch
         self.targets = plan.targets()
-        self.measured_before = done
-        self.numbers = range(len(self.targets)) if numbers is None else numbers
-        self.known = list(before)
-        self.done = len(done)
+        self.measured_before = before.done
+        self.numbers = range(len(self.targets)) if before.numbers is None else before.numbers
+        self.known = list(before.points)
+        self.done = len(before.done)
         self.finished = self.done
         self.accepted = self.done
         self.reported: dict[int, dict[str, Any]] = {}
         self.next_segment = 0
-        self.locked = any(point["accepted"] for point in before)
+        self.locked = any(point["accepted"] for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = KeptRows(loop.tick.row_dtype)
         self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
-from rig.recording.contents import JournalContents
 from rig.recording.journal import journal_path
+from rig.recording.journal_contents import JournalContents
 from rig.system.locking import exclusive
 
 __all__ = ["forget_before", "make_way", "put_back", "set_aside"]
@@ -22,7 +22,7 @@ def make_way(output: Path, overwrite: bool) -> None:
             raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
         for path in (output, journal_path(output)):
             if path.exists() and not overwrite:
-                raise RecordingError(f"{path}: exists already; choose another name, or --overwrite")
+                raise RecordingError(f"{path}: exists already; choose another name, or `overwrite`")
         if output.exists():
             kind_of(output)  # only what is ours is overwritten
     except OSError as error:

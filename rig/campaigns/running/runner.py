@@ -7,24 +7,25 @@ from pathlib import Path
 from typing import Any
 
 import vibrolock
-from rig.arming.arming import Arm, armed
+from rig.arming.arming import armed
 from rig.arming.bench_memory import RememberedTrip, now, remember
-from rig.arming.run_facts import About, calibration_remarks
+from rig.arming.run_facts import calibration_remarks
+from rig.arming.run_options import Progress, RunOptions
 from rig.bench import Bench
 from rig.bench.user_code import imported_code, refuse_code
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.continuation import what_is_left
-from rig.campaigns.running.execution import Execution, Progress, Silent, nothing_left
+from rig.campaigns.running.execution import Execution, MeasuredBefore, nothing_left
 from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
 from rig.campaigns.running.trips import refuse_tripped
 from rig.errors import RigError
 from rig.loop.loop import RunningLoop
 from rig.loop.session import Session, open_session
+from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import continue_recording, finalise
 from rig.system.stop_signals import ended_in_order, held
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason
@@ -36,32 +37,22 @@ __all__ = ["carry_out", "take_up"]
 
 
 @ended_in_order()
-def carry_out(
-    plan: Plan,
-    bench: Bench,
-    output: Path,
-    *,
-    seed: int = 0,
-    realtime: bool = False,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-    arm: Arm = None,
-    about: About | None = None,
-) -> Recording:
+def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None = None) -> Recording:
     """Carry out a plan from its beginning and record it in the HDF5 file ``output``.
 
     Raises `ConfigurationError` before anything is started where plan and bench do not fit, `RecordingError` where the
     file exists or cannot be written, `rig.errors.DaqError` where the driver cannot be started. A run that ends early
-    raises nothing: the recording's last part says how it ended. Where something physical would move it must be armed
-    (`rig.arming.arming`), else `rig.errors.NotArmed`; ``about`` is recorded with the part.
+    raises nothing: the recording's last part says how it ended. A bench on which something physical moves must be armed
+    (`rig.arming.arming`), else `rig.errors.NotArmed`.
     """
     plan.check(bench)
     check_length(plan, bench)
-    progress = progress or Silent()
-    _put_back(output, progress)
-    make_way(output, overwrite)
-    with open_session(bench, seed, realtime=realtime) as session:
-        facts = _facts(plan, bench, session, arm, about, progress)
+    options = options or RunOptions()
+    seed = options.seed or 0
+    _put_back(output, options.progress)
+    make_way(output, options.overwrite)
+    with open_session(bench, seed, realtime=options.realtime) as session:
+        facts = _facts(plan, bench, session, options)
         header = Header(
             kind=plan.kind,
             configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
@@ -78,36 +69,33 @@ def carry_out(
             _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
             _started(session, settings, output) as loop,
         ):
-            execution = Execution(plan, bench, loop, journal, progress)
+            execution = Execution(plan, bench, loop, journal, options.progress)
             execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
-    return _whole(output, progress)
+    return _whole(output, options.progress)
 
 
 @ended_in_order()
 def take_up(
     output: Path,
+    options: RunOptions | None = None,
     *,
     change: Plan | None = None,
     source: str | Path = "",
-    seed: int | None = None,
-    realtime: bool = False,
-    progress: Progress | None = None,
-    arm: Arm = None,
-    about: About | None = None,
     retry_tripped: bool = False,
     trust_code: bool = False,
 ) -> Recording:
-    """Finish a run that was interrupted: finished points stay, the others are measured in a further part of the file.
+    """Finish a run that was interrupted: accepted points stay, the others are measured in a further part of the file.
 
-    Points that had failed are tried again. A ``change`` of the plan, read from ``source``, takes the place of the one in
-    force with that part: what it asks for and was accepted before is not measured again. ``seed`` draws the noise of the
-    part. A recording that is complete and asked for nothing new is returned as it is.
+    Points that failed are tried again. A ``change`` of the plan, read from ``source``, replaces the plan in force from this
+    part on; points that it asks for and that were accepted before are not measured again. A recording that is complete, with
+    no change of its plan, is returned as it is.
 
-    Raises as `carry_out`, and `ConfigurationError` for a plan that cannot follow on the one before, or that asks for a level
-    that tripped or a higher one, unless ``retry_tripped``, or for a bench with functions of the user's own, unless
-    ``trust_code``: whoever wrote the recording has named the module that is imported.
+    Raises as `carry_out`. Raises `ConfigurationError` for a plan that cannot follow the one before; for a level that tripped
+    or a higher one, unless ``retry_tripped``; and for a bench with functions of the user's own, unless ``trust_code``: the
+    recording names the module that would be imported, so its author chooses the code.
     """
-    progress = progress or Silent()
+    options = options or RunOptions()
+    progress = options.progress
     _put_back(output, progress)
     with Recording(output) as recording:
         for number, part in enumerate(recording.parts):
@@ -117,10 +105,10 @@ def take_up(
                 )
         left = what_is_left(recording, change, source)
         # A further part draws its own noise: the same seed again would repeat the first part's.
-        drawn = (recording.seed or 0) + len(recording.parts) if seed is None else seed
+        drawn = (recording.seed or 0) + len(recording.parts) if options.seed is None else options.seed
         information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
         finished = recording.complete and not left.changed
-        before = recording.points
+        before = MeasuredBefore(left.done, left.numbers, tuple(recording.points))
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench
@@ -128,15 +116,15 @@ def take_up(
     if segments and not trust_code:
         refuse_code(bench, output.name)
     if segments:
-        with open_session(bench, drawn, realtime=realtime) as session:
-            facts = _facts(plan, bench, session, arm, about, progress)
+        with open_session(bench, drawn, realtime=options.realtime) as session:
+            facts = _facts(plan, bench, session, options)
             columns = [Column(**column) for column in ROW_COLUMNS]
             rows = recorded_row(len(bench.channels))
             with (
                 _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
                 _started(session, _settings(plan, bench, segments), output) as loop,
             ):
-                execution = Execution(plan, bench, loop, journal, progress, left.done, left.numbers, before)
+                execution = Execution(plan, bench, loop, journal, progress, before)
                 execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
     elif not finished:
         with continue_recording(output) as journal:
@@ -163,20 +151,17 @@ def _whole(output: Path, progress: Progress) -> Recording:
     return Recording(output)
 
 
-def _facts(
-    plan: Plan, bench: Bench, session: Session, arm: Arm, about: About | None, progress: Progress
-) -> dict[str, Any]:
-    """Arm the bench; who did, who runs the test on what, and what stands behind the driver."""
-    about = about or About()
+def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> dict[str, Any]:
+    """Arm the bench, and collect what is recorded of the part: who armed it, operator, specimen, device, code."""
     facts = {
-        **about.facts(),
-        "armed": armed(bench, session, about.purpose or plan.kind, arm),
+        **options.about.facts(),
+        "armed": armed(bench, session, options.about.purpose or plan.kind, options.arm),
         "device": session.identity,
         "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
         "code": imported_code(bench),
     }
     for remark in facts["remarks"]:
-        progress.remark(remark)
+        options.progress.remark(remark)
     return facts
 
 

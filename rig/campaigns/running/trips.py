@@ -67,10 +67,10 @@ def refuse_tripped(recording: Recording, plan: Plan, left: Sequence[Target]) -> 
         if at is not None and (_reached_since(recording.parts[number + 1 :], at) or not _asks_for(plan, left, at)):
             continue
         head = f"{recording.path.name}: the run tripped{'' if at is None else f' at {at.text}'} ({part.end['text']})"
-        lower = "" if at is None else f"--plan with levels below {at.text}, or "
+        lower = "" if at is None else f"`plan` with levels below {at.text}, or "
         if at is not None and at.start:
-            lower = f"--plan with start_v below {at.level:g}, or "
-        raise ConfigurationError(f"{head}; to go on: {lower}--retry-tripped (retry_tripped=True) to try it again")
+            lower = f"`plan` with start_v below {at.level:g}, or "
+        raise ConfigurationError(f"{head}; to go on: {lower}`retry_tripped` to try it again")
 
 
 def _said(part: Part) -> TrippedAt | None:

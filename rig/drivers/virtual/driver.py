@@ -10,8 +10,7 @@ from pydantic import Field, ValidationError
 from rig.bench import Bench
 from rig.bench.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
-from rig.drivers.virtual.kernels import exchange_block, fused
-from rig.drivers.virtual.loopback import loopback_of
+from rig.drivers.virtual.kernels import Converters, exchange_block, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from rig.tick.safety.kernels import is_over
@@ -59,7 +58,7 @@ class VirtualDAQ(DAQ):
         self._queue_options = validated(Queue, queue, "driver.options")
         converter = {"sample_rate_hz": bench.sample_rate_hz, "dac_range_v": bench.output_range_v}
         if "seed" in options:
-            raise ConfigurationError("driver.options.seed: is given to the run (--seed), not to the bench")
+            raise ConfigurationError("driver.options.seed: is given to the run (`seed`), not to the bench")
         given = options.get("converter", {})
         if not isinstance(given, dict):
             raise ConfigurationError(f"driver.options.converter = {given!r}: allowed is a table")
@@ -69,9 +68,8 @@ class VirtualDAQ(DAQ):
         self._check_arrays(seed)
         self._seed = seed
         self._specimen = bench.specimen
-        self._queue = np.zeros(0)
-        self._loopback = loopback_of(self.channels, 0.0)
         self._counts = np.zeros(len(Flag), np.int64)
+        self._exchanged = Converters(np.zeros(0), self._counts, loopback_of(self.channels, 0.0))
         self._first = 0
 
     def _check_arrays(self, seed: int) -> None:
@@ -173,7 +171,7 @@ class VirtualDAQ(DAQ):
     @property
     def output_v(self) -> float:
         """What is on the converter, V, as it would be measured at the output; of a rig that is exchanged, not fused."""
-        past = self._loopback.past
+        past = self._exchanged.loopback.past
         return float(past[(self._first - 1) % past.size])
 
     def _open(self) -> None:
@@ -182,9 +180,9 @@ class VirtualDAQ(DAQ):
     def _start(self) -> None:
         self._realised = self.rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)
-        self._queue = np.zeros(self.queue_samples)
-        self._loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
-        self._under_way = np.zeros(self.block + self.queue_samples)
+        loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
+        self._exchanged = Converters(np.zeros(self.queue_samples), self._counts, loopback)
+        self._fused = Converters(np.zeros(self.block + self.queue_samples), self._counts, loopback)
         self._counts[:] = 0
         self._first = 0
 
@@ -198,9 +196,7 @@ class VirtualDAQ(DAQ):
 
     def _swap(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
         """Swap samples over which the plant stays as it is."""
-        exchange_block(
-            self._arrays, self._state, self._queue, self._first, voltages, inputs, flags, self._counts, self._loopback
-        )
+        exchange_block(self._arrays, self._state, self._exchanged, self._first, voltages, inputs, flags)
         self._first += voltages.size
 
     def _pieces(self, n: int) -> Iterator[tuple[RigArrays, slice]]:
@@ -221,17 +217,7 @@ class VirtualDAQ(DAQ):
         done = 0
         for arrays, part in self._pieces(rows.size):
             self._arrays = arrays
-            done += fused(
-                t,
-                self._arrays,
-                self._state,
-                self._under_way,
-                volts,
-                readings[part],
-                rows[part],
-                self._counts,
-                self._loopback,
-            )
+            done += fused(t, self._arrays, self._state, self._fused, volts, readings[part], rows[part])
             if is_over(t.guard[0], lead):
                 break
         return done
@@ -244,5 +230,5 @@ class VirtualDAQ(DAQ):
 
     def _rest(self) -> None:
         """0 V on the converter and on the way there."""
-        self._queue[:] = 0.0
-        self._loopback.past[:] = 0.0
+        self._exchanged.queue[:] = 0.0
+        self._exchanged.loopback.past[:] = 0.0

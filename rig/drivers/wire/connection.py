@@ -4,16 +4,45 @@ import contextlib
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from rig.bench import Bench
-from rig.drivers.wire.dialogue import ANSWER_S, Dialogue, why_not
+from rig.drivers.wire.dialogue import ANSWER_S, STOPPED, Dialogue, latched_text, stopped, why_not
 from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
-from rig.drivers.wire.latch import STOPPED, latched_text, stopped
-from rig.drivers.wire.round_trips import RoundTrips
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
 from rig.wire.messages import Command, DeviceFlag, DeviceState, Parameter, Status, Stream
 
-__all__ = ["Connection"]
+__all__ = ["Connection", "RoundTrips"]
+
+KEPT = 4096
+
+
+class RoundTrips:
+    """The last few thousand round trips; `report` gives their median and 99th percentile in microseconds."""
+
+    def __init__(self) -> None:
+        self._kept_s = np.zeros(KEPT)
+        self._count = 0
+
+    def add(self, round_trip_s: float) -> None:
+        """One more."""
+        self._kept_s[self._count % KEPT] = round_trip_s
+        self._count += 1
+
+    def report(self) -> dict[str, float]:
+        """Median, 99th percentile and largest; empty before the first."""
+        if not self._count:
+            return {}
+        kept_us = 1e6 * self._kept_s[: min(self._count, KEPT)]
+        p50, p99, largest = np.percentile(kept_us, (50.0, 99.0, 100.0))
+        return {
+            "round_trip_p50_us": round(float(p50), 1),
+            "round_trip_p99_us": round(float(p99), 1),
+            "round_trip_largest_us": round(float(largest), 1),
+            "round_trips": float(self._count),
+        }
+
 
 MOST_LOAD = 0.9  # of what the wire carries
 FIND_TRIES = 20

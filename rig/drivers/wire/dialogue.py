@@ -3,12 +3,12 @@
 from collections import deque
 from collections.abc import Callable
 
-from rig.drivers.wire.latch import stopped
-from rig.errors import DaqProtocol, DaqRefused, DaqTimeout
+from rig.errors import DaqEmergencyStop, DaqError, DaqProtocol, DaqRefused, DaqTimeout, DaqWatchdog
 from rig.wire.link import Link
 from rig.wire.messages import (
     Answer,
     Command,
+    DeviceFlag,
     DeviceState,
     Heartbeat,
     Parameter,
@@ -18,7 +18,23 @@ from rig.wire.messages import (
 )
 from rig.wire.parameter_words import NAME_WORDS, as_float, as_text
 
-__all__ = ["ANSWER_S", "Dialogue", "why_not"]
+__all__ = ["ANSWER_S", "STOPPED", "Dialogue", "latched_text", "stopped", "why_not"]
+
+STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
+
+
+def latched_text(latched: DeviceFlag) -> str:
+    """In words; empty for nothing."""
+    names = {DeviceFlag.EMERGENCY_STOP: "emergency stop", DeviceFlag.WATCHDOG: "watchdog"}
+    said = " and ".join(name for flag, name in names.items() if latched & flag)
+    return f"the device's {said} had latched" if said else ""
+
+
+def stopped(name: str, flags: int, text: str) -> DaqError:
+    """The error of the graver of what has latched at the port of a name."""
+    kind = DaqEmergencyStop if flags & DeviceFlag.EMERGENCY_STOP else DaqWatchdog
+    return kind(f"{name}: {text}")
+
 
 TRIES = 5
 ANSWER_S = 0.1

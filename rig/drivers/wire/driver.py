@@ -10,11 +10,10 @@ import numpy as np
 from rig.bench import Bench
 from rig.daq import DAQ, Capabilities
 from rig.drivers.wire.connection import Connection
+from rig.drivers.wire.dialogue import latched_text
 from rig.drivers.wire.facts import DeviceFacts, remarks_on
-from rig.drivers.wire.latch import latched_text
-from rig.drivers.wire.options import WireOptions
+from rig.drivers.wire.options import WireOptions, raised_remark
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
-from rig.drivers.wire.watchdog import raised_remark
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
 

@@ -52,7 +52,7 @@ def _degrees(nodes: Any, columns: Any, drive: str) -> tuple[tuple[Channel, ...],
     moving = [(k, j) for j in range(columns.shape[2]) for k in range(3) if np.any(columns[:, k, j])]
     names = [f"{int(nodes[j])}+{'XYZ'[k]}" for k, j in moving]
     if drive not in names:
-        raise ImportFailed(f"--drive: is '{drive}', which says where the force acts; allowed are {', '.join(names)}")
+        raise ImportFailed(f"`drive`: is '{drive}', which says where the force acts; allowed are {', '.join(names)}")
     channels = tuple(Channel(name, "drive" if name == drive else "response", "m") for name in names)
     return channels, np.array([columns[:, k, j] for k, j in moving])
 

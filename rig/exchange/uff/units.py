@@ -45,13 +45,13 @@ class FileUnits:
             if labelled[0] != filed[0] or abs(labelled[1] / filed[1] - 1.0) > _TOLERANCE:
                 raise ImportFailed(
                     f"{where}: mixed units: the {prefix} is labelled {label} (times {labelled[1]:g} gives {labelled[0]}), "
-                    f"dataset 164 says {self.name} (times {filed[1]:g} gives {filed[0]}); choose one by --units labels or "
-                    "--units file"
+                    f"dataset 164 says {self.name} (times {filed[1]:g} gives {filed[0]}); choose one by `units` labels or "
+                    "`units` file"
                 )
             return labelled
         if filed is None:
             raise ImportFailed(
-                f"{where}: the {prefix} has no unit, and the file no dataset 164; where it is in SI, say --units si"
+                f"{where}: the {prefix} has no unit, and the file no dataset 164; where it is in SI, say `units` si"
             )
         return filed
 
@@ -60,7 +60,7 @@ class FileUnits:
         if self._assumed == "si":
             return 1.0
         if self._dataset is None:
-            raise ImportFailed(f"{where}: the file has no units (dataset 164); where it is in SI, say --units si")
+            raise ImportFailed(f"{where}: the file has no units (dataset 164); where it is in SI, say `units` si")
         return float(self._dataset["length"]) / float(self._dataset["force"])
 
     @property

@@ -11,10 +11,9 @@ import numpy as np
 from rig.daq import DAQ
 from rig.errors import DaqError
 from rig.loop.driven_loop import DrivenLoop
-from rig.loop.worker.disturbances import disturbances, since
 from rig.loop.worker.memory import STOP, SharedMemory, Slot
 from rig.loop.worker.pace import pace_of
-from rig.loop.worker.times import BlockTimes
+from rig.loop.worker.times import BlockTimes, disturbances, since
 from rig.tick.kernels import tick_block
 from rig.tick.safety.layout import GuardMode
 from rig.tick.tick import Tick

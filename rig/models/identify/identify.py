@@ -78,7 +78,7 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
     modes = None if request.modes is None else modes_in(request.modes)
     if set(kinds) <= {FREQUENCY_RESPONSES.name, *STEPPED}:
         if modes is not None:
-            raise ConfigurationError("--modes: stepped sines of one sensor have no use for mode shapes; leave it out")
+            raise ConfigurationError("`modes`: stepped sines of one sensor have no use for mode shapes; leave it out")
         return _stepped_mode(paths)
     identified = []
     for path in paths:
@@ -105,7 +105,7 @@ def _stepped_mode(paths: Sequence[Path]) -> NonlinearMode:
         found = stepped_sine_mode(stepped)
     except IdentificationError as error:
         raise IdentificationError(
-            f"{error}; --model force-surface takes levels of held displacement as they are"
+            f"{error}; `kind` force-surface takes levels of held displacement as they are"
         ) from None
     return replace(found, notes=(*missing, *found.notes))
 
@@ -204,7 +204,7 @@ def _over_voltage(measured: PeriodicSpectra, specimen: str) -> FrequencyResponse
 def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
     """From one multisine: its highest level."""
     if len(paths) != 1:
-        raise ConfigurationError(f"--model exciter: {len(paths)} files given, allowed is one multisine recording")
+        raise ConfigurationError(f"`kind` exciter: {len(paths)} files given, allowed is one multisine recording")
     kind = kind_of(paths[0])
     if kind not in kinds_that_yield(PeriodicSpectra):
         raise RecordingError(f"{paths[0]}: holds a {kind}; an exciter model comes from a multisine")

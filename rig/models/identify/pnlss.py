@@ -67,7 +67,7 @@ def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Pro
 def _earlier(path: Path) -> IdentifiedPnlss:
     """The fit that is to go on."""
     if not path.exists():
-        raise RecordingError(f"{path}: there is nothing to resume; leave --resume out")
+        raise RecordingError(f"{path}: there is nothing to resume; leave `resume` out")
     found: IdentifiedPnlss = load_as(PNLSS, path)
     if found.fit is None:
         raise RecordingError(f"{path}: holds a model from elsewhere and no fit that could go on")
@@ -80,12 +80,12 @@ def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssD
         uses = [run.use for run in earlier.runs]
         raise ConfigurationError(
             f"{options.resume}: was fitted to other data ({uses.count('training')} experiments in training, "
-            f"{uses.count('validation')} in validation, the first {earlier.runs[0].name}); give the same files, --hold-out, "
-            "--validation and --relative-errors"
+            f"{uses.count('validation')} in validation, the first {earlier.runs[0].name}); give the same files, `hold_out`, "
+            "`validation` and `relative`"
         )
     done = 0 if earlier.fit is None else earlier.fit.history.iterations
     if options.iterations is not None and options.iterations <= done:
-        raise ConfigurationError(f"--iterations = {options.iterations}: {done} are done; allowed is more")
+        raise ConfigurationError(f"`iterations` = {options.iterations}: {done} are done; allowed is more")
 
 
 def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPnlss:

@@ -81,7 +81,7 @@ def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: Identified
         validation += out
     if options.hold_out is not None and options.hold_out >= max(most, 2):
         raise ConfigurationError(
-            f"--hold-out = {options.hold_out}: no level has more than {most} realisations; allowed is 0 to {max(most - 1, 1)}"
+            f"`hold_out` = {options.hold_out}: no level has more than {most} realisations; allowed is 0 to {max(most - 1, 1)}"
         )
     for path in options.validation:
         with Recording(path) as recording:
@@ -90,7 +90,9 @@ def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: Identified
     if not validation:
         notes.append("no data to choose the iterate by: the last one is taken, however it does on other data")
     if "force" not in [channel.role for channel in (*training[0].input_channels, *training[0].output_channels)]:
-        notes.append("the force is neither input nor output: the model predicts multisines alone; add it to --outputs")
+        notes.append(
+            "the force is neither input nor output: the model predicts multisines alone; add it to the outputs"
+        )
     if "voltage" in [channel.name for channel in training[0].input_channels]:
         notes.append(f"the input is the voltage: the model holds for the exciter of {_benches(paths)} alone")
     if options.relative:
@@ -104,7 +106,7 @@ def _check_alive(experiments: Sequence[Experiment]) -> None:
         for channel, values in zip(one.output_channels, one.counted_outputs, strict=True):
             if not np.any(values):
                 raise ConfigurationError(
-                    f"{one.name}: output {channel.name} is zero throughout (dead channel); leave it out with --outputs"
+                    f"{one.name}: output {channel.name} is zero throughout (dead channel); leave it out with `outputs`"
                 )
 
 
@@ -119,11 +121,11 @@ def _check_files(paths: Sequence[Path], validation: Sequence[Path], *, needs_lin
     for path in validation:
         if any(path.samefile(other) for other in paths):
             raise ConfigurationError(
-                f"--validation = {path}: is among the files that the model is fitted to; leave it out for --hold-out, or take "
+                f"`validation` = {path}: is among the files that the model is fitted to; leave it out for `hold_out`, or take "
                 "another recording"
             )
     if twice := next((one for one, other in combinations(validation, 2) if one.samefile(other)), None):
-        raise ConfigurationError(f"--validation = {twice}: is given twice; each file once")
+        raise ConfigurationError(f"`validation` = {twice}: is given twice; each file once")
     if needs_lines and "multisine" not in [kinds[path] for path in paths]:
         raise ConfigurationError(
             f"{', '.join(f'{path} ({kinds[path]})' for path in paths)}: no multisine among them, from which the linear model "

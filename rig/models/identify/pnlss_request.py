@@ -47,27 +47,25 @@ class PnlssOptions:
 
     def __post_init__(self) -> None:
         for name, value, least in (
-            ("--states", self.states, 1),
-            ("--saturating", self.saturating, 0),
-            ("--iterations", self.iterations, 0),
-            ("--hold-out", self.hold_out, 0),
+            ("states", self.states, 1),
+            ("saturating", self.saturating, 0),
+            ("iterations", self.iterations, 0),
+            ("hold_out", self.hold_out, 0),
         ):
             if value is not None and value < least:
-                raise ConfigurationError(f"{name} = {value}: allowed is {least} and above")
+                raise ConfigurationError(f"`{name}` = {value}: allowed is {least} and above")
         if self.rate_hz is not None and not 0.0 < self.rate_hz < math.inf:
-            raise ConfigurationError(f"--rate = {self.rate_hz:g}: allowed is any number above 0, Hz")
+            raise ConfigurationError(f"`rate_hz` = {self.rate_hz:g}: allowed is any number above 0, Hz")
         if self.input not in (None, *_INPUTS):
-            raise ConfigurationError(f"--input = {self.input!r}: allowed are {', '.join(_INPUTS)}")
+            raise ConfigurationError(f"`input` = {self.input!r}: allowed are {', '.join(_INPUTS)}")
         self.chosen_degrees  # noqa: B018  refused here, not when it is asked for
         if self.validation and self.hold_out:
-            raise ConfigurationError("--hold-out: is instead of --validation; leave one of the two out")
+            raise ConfigurationError("`hold_out`: is instead of `validation`; leave one of the two out")
         if self.resume is not None:
             fixed = ("states", "degrees", "rate_hz", "output_polynomials", "saturating", "input", "outputs")
             for field in fields(self):
                 if field.name in fixed and getattr(self, field.name) is not None:
-                    raise ConfigurationError(
-                        f"{_OPTION.get(field.name, '--' + field.name)}: is that of the fit that goes on; leave it out"
-                    )
+                    raise ConfigurationError(f"`{field.name}`: is that of the fit that goes on; leave it out")
 
     @property
     def chosen_degrees(self) -> tuple[int, ...]:
@@ -78,7 +76,7 @@ class PnlssOptions:
             found = (0,)
         if any(not 2 <= degree <= 12 for degree in found):
             raise ConfigurationError(
-                f"--degrees = {self.degrees!r}: allowed are whole numbers from 2 to 12 with commas, such as 2,3; 1 is the "
+                f"`degrees` = {self.degrees!r}: allowed are whole numbers from 2 to 12 with commas, such as 2,3; 1 is the "
                 'linear part, "" is none'
             )
         if self.degrees is None:
@@ -97,16 +95,5 @@ class PnlssOptions:
         return {"inputs": (self.input or "force",), "outputs": outputs}
 
     def given(self) -> dict[str, bool]:
-        """Which options were given, by their names on the command line."""
-        return {
-            _OPTION.get(field.name, f"--{field.name}"): getattr(self, field.name) not in (None, ())
-            for field in fields(self)
-        }
-
-
-_OPTION = {
-    "rate_hz": "--rate",
-    "output_polynomials": "--no-output-polynomials",
-    "hold_out": "--hold-out",
-    "relative": "--relative-errors",
-}
+        """Which fields were given."""
+        return {field.name: getattr(self, field.name) not in (None, ()) for field in fields(self)}

@@ -12,10 +12,10 @@ from rig.models.identify.pnlss_request import PnlssOptions
 __all__ = ["Request"]
 
 _OPTIONS: dict[str, tuple[str, ...]] = {
-    "nonlinear-mode": ("--modes",),
-    "linear": ("--estimator", "--band", "--count"),
+    "nonlinear-mode": ("modes",),
+    "linear": ("estimator", "band_hz", "count"),
     "force-surface": (),
-    "exciter": ("--band", "--resistance", "--amplifier-gain", "--stinger-stiffness"),
+    "exciter": ("band_hz", "resistance_ohm", "amplifier_gain", "stinger_stiffness_n_m"),
     "pnlss": tuple(PnlssOptions().given()),
 }
 
@@ -45,32 +45,32 @@ class Request:
 
     def __post_init__(self) -> None:
         if self.kind not in _OPTIONS:
-            raise ConfigurationError(f"--model = {self.kind!r}: allowed are {', '.join(_OPTIONS)}")
+            raise ConfigurationError(f"`kind` = {self.kind!r}: allowed are {', '.join(_OPTIONS)}")
         if self.estimator not in get_args(Estimator):
-            raise ConfigurationError(f"--estimator = {self.estimator!r}: allowed are {', '.join(get_args(Estimator))}")
+            raise ConfigurationError(f"`estimator` = {self.estimator!r}: allowed are {', '.join(get_args(Estimator))}")
         if self.band_hz is not None and not 0.0 <= self.band_hz[0] < self.band_hz[1]:
             raise ConfigurationError(
-                f"--band = {self.band_hz[0]:g} {self.band_hz[1]:g}: allowed is 0 <= LOW < HIGH, Hz"
+                f"`band_hz` = {self.band_hz[0]:g} {self.band_hz[1]:g}: allowed is 0 <= LOW < HIGH, Hz"
             )
         numbers = {
-            "--resistance": self.resistance_ohm,
-            "--amplifier-gain": self.amplifier_gain,
-            "--stinger-stiffness": self.stinger_stiffness_n_m,
+            "resistance_ohm": self.resistance_ohm,
+            "amplifier_gain": self.amplifier_gain,
+            "stinger_stiffness_n_m": self.stinger_stiffness_n_m,
         }
         for name, value in numbers.items():
             if value is not None and not 0.0 < value < math.inf:
-                raise ConfigurationError(f"{name} = {value:g}: allowed is any number above 0")
+                raise ConfigurationError(f"`{name}` = {value:g}: allowed is any number above 0")
         given = {
-            "--modes": self.modes is not None,
-            "--band": self.band_hz is not None,
-            "--count": self.count is not None,
-            "--estimator": self.estimator != "instrument",
+            "modes": self.modes is not None,
+            "band_hz": self.band_hz is not None,
+            "count": self.count is not None,
+            "estimator": self.estimator != "instrument",
             **{name: value is not None for name, value in numbers.items()},
             **self.pnlss.given(),
         }
         for name in (name for name, is_given in given.items() if is_given):
             if name not in _OPTIONS[self.kind]:
-                allowed = ", ".join(_OPTIONS[self.kind]) or "no such option"
-                raise ConfigurationError(f"{name}: means nothing to --model {self.kind}, which takes {allowed}")
+                allowed = ", ".join(f"`{field}`" for field in _OPTIONS[self.kind]) or "no such option"
+                raise ConfigurationError(f"`{name}`: means nothing to `kind` {self.kind}, which takes {allowed}")
         if self.amplifier_gain is not None and self.resistance_ohm is None:
-            raise ConfigurationError("--amplifier-gain: is for the resistance; add --resistance, or leave it out")
+            raise ConfigurationError("`amplifier_gain`: is for the resistance; add `resistance_ohm`, or leave it out")

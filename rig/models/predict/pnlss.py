@@ -79,14 +79,14 @@ def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequen
 def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
     """Refuse what is asked of a nonlinear mode alone, and what the model's channels do not allow."""
     given = {
-        "--zero-crossings": request.zero_crossings is not None,
-        "--modes": request.modes is not None,
-        "--allow-extrapolation": request.allow_extrapolation,
+        "zero_crossings": request.zero_crossings is not None,
+        "modes": request.modes is not None,
+        "allow_extrapolation": request.allow_extrapolation,
     }
     for name in (name for name, is_given in given.items() if is_given):
         raise ConfigurationError(
-            f"{name}: means nothing to a PNLSS model, which answers --frequency-response, --voltage-response, --reference, "
-            "--sweep, --planned-sweep and --multisine"
+            f"`{name}`: means nothing to a PNLSS model, which answers `forces_n`, `voltages_v`, `references`, "
+            "`sweeps`, `planned` and `multisines`"
         )
     steady = bool(request.forces_n or request.voltages_v or request.references)
     swept = bool(request.sweeps or request.planned)
@@ -94,23 +94,23 @@ def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
     named = ", ".join(channel.name for channel in (*model.inputs, *model.outputs))
     if (steady or swept) and "force" not in (*inputs, *outputs):
         raise ConfigurationError(
-            f"{path}: has no force among its channels ({named}), without which it answers --multisine alone; identify it with "
-            "the force among --outputs"
+            f"{path}: has no force among its channels ({named}), without which it answers `multisines` alone; identify it with "
+            "the force among `outputs`"
         )
     if swept and "drive" not in outputs:
         raise ConfigurationError(
             f"{path}: has no drive point among its channels ({named}), which sweeps are compared at; identify it with the "
-            "drive point among --outputs"
+            "drive point among `outputs`"
         )
     if request.exciter is None and "force" in inputs:
-        for name, asked in (("--voltage-response", request.voltages_v), ("--planned-sweep", request.planned)):
+        for name, asked in (("voltages_v", request.voltages_v), ("planned", request.planned)):
             if asked:
-                raise ConfigurationError(f"{name}: gives a voltage, and {path} is driven by a force; add --exciter")
+                raise ConfigurationError(f"`{name}`: gives a voltage, and {path} is driven by a force; add `exciter`")
     if request.exciter is not None and "force" not in inputs:
-        raise ConfigurationError(f"--exciter: is inside {path}, whose input is the voltage; leave it out")
+        raise ConfigurationError(f"`exciter`: is inside {path}, whose input is the voltage; leave it out")
     if request.exciter is not None and not (steady or swept):
         raise ConfigurationError(
-            "--exciter: means nothing to --multisine, which takes the recorded force; leave it out"
+            "`exciter`: means nothing to `multisines`, which takes the recorded force; leave it out"
         )
 
 
@@ -119,8 +119,8 @@ def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
     if request.held is not None or held != "pure-sine":
         return ()
     return (
-        "constant is a force without harmonics, for nothing in the model makes any: add --exciter for the fundamental or "
-        "the RMS of a force that a shaker makes",
+        "constant is a force without harmonics, for nothing in the model makes any: an exciter model gives the "
+        "fundamental or the RMS of a force that a shaker makes",
     )
 
 

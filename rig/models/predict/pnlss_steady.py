@@ -78,7 +78,7 @@ def compared(
     if held == "pure-sine" and (reference.second_harmonic or 0.0) > _HARMONIC:
         notes.append(
             f"the forces differ: the reference's has F2/F1 = {reference.second_harmonic:.2g} where it responds most, the "
-            "predicted one has no harmonics; --exciter makes them"
+            "predicted one has no harmonics; with an exciter model it has"
         )
     predicted = replace(predicted, notes=(*predicted.notes, *notes))
     return predicted, measured, compare(predicted, measured, over=over).error

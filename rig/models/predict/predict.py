@@ -69,7 +69,7 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
             model, request, [one for path in request.references for one in _references(path, request)]
         )
     if request.voltages_v:
-        raise ConfigurationError(f"--voltage-response: means nothing to a {kind}; a PNLSS model answers it")
+        raise ConfigurationError(f"`voltages_v`: means nothing to a {kind}; a PNLSS model answers it")
     if kind == FORCE_SURFACE.name:
         references = [measured for path in request.references for measured in _stepped_sines(path)]
         return surface_predictions(load_as(FORCE_SURFACE, model), request, references)
@@ -99,13 +99,13 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
 def _check_mode(request: PredictionRequest) -> None:
     """Refuse what is asked of other models than a nonlinear mode."""
     if request.exciter is None and request.planned:
-        raise ConfigurationError("--planned-sweep: gives a voltage, which needs an exciter; add --exciter")
+        raise ConfigurationError("`planned`: gives a voltage, which needs an exciter; add `exciter`")
     if request.exciter is not None and not (request.sweeps or request.planned):
         raise ConfigurationError(
-            "--exciter: is for sweeps, and none is given; add --sweep or --planned-sweep, or leave it out"
+            "`exciter`: is for sweeps, and none is given; add `sweeps` or `planned`, or leave it out"
         )
     if request.multisines:
-        raise ConfigurationError("--multisine: means nothing to a nonlinear mode; a PNLSS model simulates multisines")
+        raise ConfigurationError("`multisines`: means nothing to a nonlinear mode; a PNLSS model simulates multisines")
 
 
 def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:

@@ -46,34 +46,33 @@ class PredictionRequest:
     def __post_init__(self) -> None:
         if not (self.forces_n or self.voltages_v or self.sweeps or self.multisines or self.planned or self.references):
             raise ConfigurationError(
-                "nothing to predict: give --frequency-response, --voltage-response, --sweep, --planned-sweep, --multisine or "
-                "--reference"
+                "nothing to predict: give `forces_n`, `voltages_v`, `sweeps`, `planned`, `multisines` or `references`"
             )
         for name, values, unit in (
-            ("--frequency-response", self.forces_n, "N"),
-            ("--voltage-response", self.voltages_v, "V"),
+            ("forces_n", self.forces_n, "N"),
+            ("voltages_v", self.voltages_v, "V"),
         ):
             for level in values:
                 if not 0.0 < level < math.inf:
-                    raise ConfigurationError(f"{name} = {level:g}: allowed is any number above 0, {unit}")
+                    raise ConfigurationError(f"`{name}` = {level:g}: allowed is any number above 0, {unit}")
         for name, paths in (
-            ("--sweep", self.sweeps),
-            ("--multisine", self.multisines),
-            ("--reference", self.references),
+            ("sweeps", self.sweeps),
+            ("multisines", self.multisines),
+            ("references", self.references),
         ):
             for one, other in combinations(paths, 2):
                 if one.exists() and other.exists() and one.samefile(other):
-                    raise ConfigurationError(f"{name} = {other}: is given twice; each file once")
+                    raise ConfigurationError(f"`{name}` = {other}: is given twice; each file once")
         for name, value, allowed in (
-            ("--force", self.held, (None, *get_args(HeldForce))),
-            ("--over", self.over, (None, *get_args(Over))),
-            ("--zero-crossings", self.zero_crossings, (None, *CROSSINGS)),
+            ("held", self.held, (None, *get_args(HeldForce))),
+            ("over", self.over, (None, *get_args(Over))),
+            ("zero_crossings", self.zero_crossings, (None, *CROSSINGS)),
         ):
             if value not in allowed:
-                raise ConfigurationError(f"{name} = {value!r}: allowed are {', '.join(filter(None, allowed))}")
+                raise ConfigurationError(f"`{name}` = {value!r}: allowed are {', '.join(filter(None, allowed))}")
         if self.exciter is not None and self.zero_crossings is not None:
             raise ConfigurationError(
-                "--zero-crossings: are those of an imposed force; with --exciter the voltage is imposed"
+                "`zero_crossings`: are those of an imposed force; with `exciter` the voltage is imposed"
             )
         if self.zero_crossings is not None and not self.sweeps:
-            raise ConfigurationError("--zero-crossings: is for recorded sweeps; add --sweep, or leave it out")
+            raise ConfigurationError("`zero_crossings`: is for recorded sweeps; add `sweeps`, or leave it out")

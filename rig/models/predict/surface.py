@@ -35,7 +35,7 @@ def surface_predictions(
     for measured_at in references:
         if measured_at.controlled != "force":
             raise RecordingError(
-                f"--reference: '{measured_at.label}' is not at constant force; a force surface is compared with responses "
+                f"`references`: '{measured_at.label}' is not at constant force; a force surface is compared with responses "
                 "whose fundamental force was held"
             )
     forces: list[tuple[float, FrequencyResponse | None]] = [(force, None) for force in request.forces_n]
@@ -61,17 +61,17 @@ def surface_predictions(
 def _check(request: PredictionRequest) -> None:
     """Refuse what is asked of a nonlinear mode alone."""
     given = {
-        "--force": request.held not in (None, "fundamental"),
-        "--sweep": bool(request.sweeps),
-        "--multisine": bool(request.multisines),
-        "--planned-sweep": bool(request.planned),
-        "--exciter": request.exciter is not None,
-        "--modes": request.modes is not None,
-        "--allow-extrapolation": request.allow_extrapolation,
+        "held": request.held not in (None, "fundamental"),
+        "sweeps": bool(request.sweeps),
+        "multisines": bool(request.multisines),
+        "planned": bool(request.planned),
+        "exciter": request.exciter is not None,
+        "modes": request.modes is not None,
+        "allow_extrapolation": request.allow_extrapolation,
     }
     for name in (name for name, is_given in given.items() if is_given):
         raise ConfigurationError(
-            f"{name}: means nothing to a force surface, which answers --frequency-response and --reference, at constant "
+            f"`{name}`: means nothing to a force surface, which answers `forces_n` and `references`, at constant "
             "fundamental force between its measured levels"
         )
 

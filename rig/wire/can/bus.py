@@ -9,8 +9,8 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from rig.errors import DaqDisconnected, DaqRefused
-from rig.wire.can.definition import NODE_MASK
-from rig.wire.can.frames import Frame
+from rig.wire.can.frames import BusTiming, Frame
+from rig.wire.can.protocol import NODE_MASK
 
 __all__ = ["BUS_COUNTERS", "FrameBus", "PythonCanBus", "only_loopback"]
 
@@ -65,19 +65,17 @@ class PythonCanBus(FrameBus):
         self,
         interface: str,
         channel: str | int,
-        fd: bool,
-        bit_rate_hz: int,
-        data_bit_rate_hz: int,
+        timing: BusTiming,
         node: int | None = None,
         options: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(f"{interface} {channel}")
-        self._interface, self._fd = interface, fd
-        self._arguments: dict[str, Any] = {"interface": interface, "channel": channel, "bitrate": bit_rate_hz}
-        if fd or interface == "udp_multicast":
-            self._arguments["fd"] = fd
-        if fd:
-            self._arguments["data_bitrate"] = data_bit_rate_hz
+        self._interface = interface
+        self._arguments: dict[str, Any] = {"interface": interface, "channel": channel, "bitrate": timing.bit_rate_hz}
+        if timing.fd or interface == "udp_multicast":
+            self._arguments["fd"] = timing.fd
+        if timing.fd:
+            self._arguments["data_bitrate"] = timing.data_bit_rate_hz
         if node is not None:  # ours, and the emergency stop
             shared = {"extended": False}
             self._arguments["can_filters"] = [

@@ -5,10 +5,9 @@ import struct
 import numpy as np
 
 from rig.errors import DaqRefused
+from rig.wire.can.blocks import COUNT, Blocks, StreamFrames, check_stream
 from rig.wire.can.frames import Frame
-from rig.wire.can.groups import Blocks
 from rig.wire.can.protocol import FrameKind, Protocol
-from rig.wire.can.streams import COUNT, StreamFrames, check_stream
 from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
 
 __all__ = ["COUNTERS", "CanCodec"]

@@ -1,5 +1,6 @@
-"""`SerialLink`: messages over a serial port or any other descriptor that carries bytes."""
+"""`SerialLink`: one end of the protocol on a serial line, and what a stream asks of the line."""
 
+import math
 import os
 import time
 from collections import deque
@@ -10,14 +11,31 @@ from typing import Self
 
 from rig.errors import DaqDisconnected, DaqTimeout
 from rig.wire.link import Link, Load
-from rig.wire.messages import Message, Output, Samples, Stream
-from rig.wire.serial.codec import Codec
-from rig.wire.serial.frames import FrameReader, frame
-from rig.wire.serial.load import line_load
-from rig.wire.serial.pty import is_pseudo_terminal
+from rig.wire.messages import HEARTBEATS_HZ, Message, Output, Samples, Stream
+from rig.wire.serial.codec import HEARTBEAT_BODY, Codec
+from rig.wire.serial.frames import FrameReader, frame, largest_frame
+from rig.wire.serial.port import is_pseudo_terminal
 from rig.wire.serial.reading import Input, NoInput, PolledInput, TimedInput
 
-__all__ = ["SerialLink"]
+__all__ = ["SerialLink", "line_load"]
+
+BITS_A_BYTE = 10  # 8N1: start, eight bits, stop
+
+
+def line_load(stream: Stream, baud: int | None) -> Load:
+    """Bits per second against those of the line; None for a line without a rate.
+
+    Of the direction from the device alone: the line carries both at a time, and outputs are always less than samples.
+    """
+    blocks_hz = stream.rate_hz / stream.block
+    samples = largest_frame(Codec.sizes(stream)[0])
+    heartbeat = largest_frame(HEARTBEAT_BODY.size) + 1  # and the zero before it
+    needed = BITS_A_BYTE * (blocks_hz * samples + HEARTBEATS_HZ * heartbeat)
+    terms = f"{blocks_hz:g}/s x {samples} bytes of samples + {HEARTBEATS_HZ}/s x {heartbeat} bytes of heartbeats"
+    carried = "a pseudo-terminal carries any" if baud is None else f"{baud} baud carry {baud / 1e3:g} kbit/s"
+    sum_text = f"({terms}) x {BITS_A_BYTE} bits = {needed / 1e3:.1f} kbit/s; {carried}"
+    return Load(needed, math.inf if baud is None else float(baud), sum_text)
+
 
 STREAMED = (Samples, Output)
 PATIENCE_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs

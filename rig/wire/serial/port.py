@@ -1,4 +1,4 @@
-"""Serial ports: found, opened and configured by pyserial, then read and written by their descriptor."""
+"""Serial ports, opened and configured by pyserial, and pseudo-terminals."""
 
 import errno
 import os
@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import serial
 from serial.tools import list_ports
@@ -17,7 +17,54 @@ from rig.wire.serial.reading import wait_of_a_read
 if sys.platform != "win32":
     import termios
 
-__all__ = ["open_port", "port_names", "second_descriptor"]
+__all__ = [
+    "PseudoTerminal",
+    "is_pseudo_terminal",
+    "open_port",
+    "open_pseudo_terminal",
+    "port_names",
+    "second_descriptor",
+]
+
+MASTER_DEVICE = (5, 2)  # /dev/ptmx in Linux's list of devices
+SLAVE_MAJORS = range(136, 144)  # /dev/pts/*
+
+
+class PseudoTerminal(NamedTuple):
+    """A line whose near end is a descriptor and whose far end is a port that any program can open."""
+
+    descriptor: int
+    far_descriptor: int
+    """Kept open, so that the near end lives on when the program at the far end comes and goes."""
+    path: str
+
+    def close(self) -> None:
+        """Close both ends; whoever has opened the port sees it unplugged. Any number of times."""
+        for descriptor in (self.descriptor, self.far_descriptor):
+            with suppress(OSError):
+                os.close(descriptor)
+
+
+def open_pseudo_terminal() -> PseudoTerminal:
+    """A new line that passes bytes as they are. Raises `OSError` where the system has no pseudo-terminals."""
+    import pty
+    import tty
+
+    near, far = pty.openpty()
+    tty.setraw(far)
+    return PseudoTerminal(near, far, os.ttyname(far))
+
+
+def is_pseudo_terminal(descriptor: int) -> bool:
+    """Whether a descriptor is an end of a pseudo-terminal, or no terminal at all: then its baud rate means nothing."""
+    if not os.isatty(descriptor):
+        return True
+    if sys.platform == "linux":
+        device = os.fstat(descriptor).st_rdev
+        numbers = os.major(device), os.minor(device)
+        return numbers == MASTER_DEVICE or numbers[0] in SLAVE_MAJORS
+    return os.ttyname(descriptor).startswith("/dev/ttys")  # macOS names its serial ports /dev/tty.* and /dev/cu.*
+
 
 BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: somebody holds its lock
 LASTING_NAMES = "/dev/serial/by-id"

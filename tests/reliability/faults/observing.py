@@ -11,12 +11,13 @@ from unittest.mock import patch
 
 import numpy as np
 
+from rig.arming.run_options import RunOptions
 from rig.bench import Bench
 from rig.campaigns.running.runner import carry_out
+from rig.recording.conversion import finalise
 from rig.recording.journal import journal_path
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from tests.reliability.faults.devices import EmulatedRig, HostKilledError, VirtualRigInProcess
 from tests.reliability.faults.plans import bench_for, plan_for
 from tests.reliability.faults.plant import BrokenRig
@@ -98,7 +99,7 @@ def carried_out(levels: str, device: str, *given: Any) -> tuple[Any, "Kept", str
     with tempfile.TemporaryDirectory() as folder, driver(DEVICES[device], *given) as made:
         output, raised = Path(folder) / "run.h5", ""
         try:
-            carry_out(plan_for(levels), bench_for(levels), output, seed=SEED).close()
+            carry_out(plan_for(levels), bench_for(levels), output, RunOptions(seed=SEED)).close()
         except (Exception, HostKilledError) as error:
             raised = f"{type(error).__name__}: {error}"
         if device == "emulated":

@@ -11,9 +11,10 @@ import rig
 from rig.arming.arming import ArmingRequest, asked_once, unguarded_text
 from rig.arming.bench_memory import RememberedCheck, RememberedTrip, fingerprint, memory_of, memory_path, remember
 from rig.arming.run_facts import About
+from rig.arming.run_options import RunOptions
 from rig.bench import Bench
 from rig.check.run import check
-from rig.cli.arming import ask
+from rig.cli.run_options import ask
 from rig.daq import DAQ, Capabilities
 from rig.errors import ConfigurationError, DaqDisconnected, DaqRefused, NotArmed, RecordingError
 from rig.loop.session import LocalSession
@@ -67,7 +68,7 @@ def test_a_virtual_rig_arms_itself_and_nothing_is_remembered_of_it(tmp_path, sta
 @pytest.mark.usefixtures("physical")
 @pytest.mark.parametrize("arm", [None, False])
 def test_nobody_has_armed_it_nothing_moves_and_the_line_says_how(tmp_path, arm):
-    with pytest.raises(NotArmed, match=r"beam next door: .*--arm.*arm=True"):
+    with pytest.raises(NotArmed, match=r"beam next door: .*give `arm`"):
         rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=arm)
     assert not (tmp_path / "run.h5").exists()
 
@@ -129,7 +130,7 @@ def test_after_a_trip_an_automated_bench_waits_for_a_person(tmp_path):
     with pytest.raises(NotArmed, match="the last run tripped: response above its limit"):
         rig.run(PLAN, bench=chosen)
     with pytest.raises(
-        NotArmed, match=r"nobody has seen that the last run tripped: response .* terminal without --arm .* callable"
+        NotArmed, match=r"nobody has seen that the last run tripped: response .* terminal without `arm` .* callable"
     ):
         rig.run(PLAN, bench=chosen, arm=True)
     assert memory_of(chosen).trip is not None
@@ -165,7 +166,7 @@ def test_a_check_needs_arming_and_is_remembered_with_what_failed(tmp_path, monke
     with pytest.raises(NotArmed):
         check(bench(), tmp_path / "check.h5")
     asked = []
-    check(bench(), tmp_path / "check.h5", arm=lambda request: asked.append(request.what) or True)
+    check(bench(), tmp_path / "check.h5", RunOptions(arm=lambda request: asked.append(request.what) or True))
     assert asked == ["check"]
     memory = memory_of(bench())
     assert memory.check.failed == ("polarity acc_magnet",)
@@ -245,7 +246,7 @@ def test_a_check_counts_for_one_device_and_one_emergency_stop_behind_any_port():
 def test_a_device_that_has_latched_waits_for_a_person(monkeypatch, capsys, word):
     monkeypatch.setattr(DAQ, "latched", "the device's watchdog had latched")
     chosen = bench(automated=True, require_check=False)
-    with pytest.raises(NotArmed, match=r"nobody has seen that the device's watchdog had latched; .*without --arm"):
+    with pytest.raises(NotArmed, match=r"nobody has seen that the device's watchdog had latched; .*without `arm`"):
         rig.run(PLAN, bench=chosen, arm=word)
     monkeypatch.setattr("sys.stdin", io.StringIO("beam next door\n"))
     with rig.run(PLAN, bench=chosen, arm=ask) as run:
@@ -275,7 +276,7 @@ def test_an_output_that_outlives_the_host_is_not_armed_by_a_switch_or_by_itself(
 def test_where_nobody_said_anything_the_switch_that_would_be_refused_is_not_offered():
     with pytest.raises(NotArmed, match=r"nobody has armed it .*0 V by itself") as refused:
         rig.run(PLAN, bench=bench())
-    assert "--arm" not in str(refused.value)
+    assert "give `arm`" not in str(refused.value)
 
 
 @pytest.mark.usefixtures("outliving")

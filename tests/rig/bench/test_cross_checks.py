@@ -8,6 +8,7 @@ import pytest
 import rig
 from rig.arming.arming import CHECK, cautions_of
 from rig.arming.bench_memory import BenchMemory
+from rig.arming.run_options import RunOptions
 from rig.bench import Bench, load_bench, shipped_benches
 from rig.bench.cross_checks import cautions, refuse
 from rig.campaigns.plans import load_plan
@@ -117,7 +118,7 @@ def test_a_limit_near_the_end_of_the_sensors_range_is_said_before_a_person_arms_
 
 
 def test_a_check_finds_limits_that_do_not_fit(tmp_path):
-    found = check(bench_with({"block": 50, "limits": {"force_n": 40.0}}), tmp_path / "check.h5", seed=1)
+    found = check(bench_with({"block": 50, "limits": {"force_n": 40.0}}), tmp_path / "check.h5", RunOptions(seed=1))
     (limits,) = [finding for finding in found.findings if finding.name == "limits"]
     assert (limits.verdict, limits.value, limits.unit) == ("warn", 40.0, "N")
     assert "force_n" in limits.text

@@ -95,7 +95,7 @@ def test_what_a_recording_names_is_imported_by_resume_with_trust_only(lab, comma
     assert status == 1
     assert err == (
         f"rig: run.h5: bench: function = '{lab}:drag': is code that the recording names, and is not imported unless you "
-        "trust it: --trust-code (trust_code=True)\n"
+        "trust it: --trust-code\n"
     )
     with pytest.raises(ConfigurationError, match=r"trust_code=True"):
         rig.resume("run.h5", plan="other.toml")

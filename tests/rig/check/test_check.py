@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from rig.arming.run_options import RunOptions
 from rig.check.findings import Finding
 from rig.check.report import say, summary
 from rig.check.run import check
@@ -21,12 +22,12 @@ BLOCK = {"block": 50}
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
     """A check of the magnet beam as it is."""
-    return check(bench_with(BLOCK), tmp_path_factory.mktemp("sound") / "sound.h5", seed=1)
+    return check(bench_with(BLOCK), tmp_path_factory.mktemp("sound") / "sound.h5", RunOptions(seed=1))
 
 
 def checked(tmp_path, monkeypatch, rewiring, name="magnet-beam", **options):
     rewire(monkeypatch, rewiring)
-    return check(bench_with(BLOCK, name), tmp_path / "check.h5", seed=2, **options)
+    return check(bench_with(BLOCK, name), tmp_path / "check.h5", RunOptions(seed=2, overwrite=True), **options)
 
 
 def finding(found, name, channel) -> Finding:
@@ -35,7 +36,7 @@ def finding(found, name, channel) -> Finding:
 
 @pytest.mark.parametrize("name", ["magnet-beam", "magnet-beam-symmetric", "friction-beam"])
 def test_nothing_is_wrong_with_the_shipped_benches(name, tmp_path):
-    found = check(bench_with({"block": 50}, name), tmp_path / "check.h5", seed=7)
+    found = check(bench_with({"block": 50}, name), tmp_path / "check.h5", RunOptions(seed=7))
     assert [f for f in found.findings if f.verdict in ("warn", "fail") and f.name != "limits"] == []
     # The multisines of the paper leave the friction beam no room between its limits and its sensors' ranges.
     said = [f.text.split(" = ")[0] for f in found.findings if f.name == "limits"]
@@ -115,7 +116,7 @@ def test_against_a_reference_gains_are_compared_and_turned_drives_seen(tmp_path,
     def turned(volts, bench):
         volts *= -1.2
 
-    found = checked(tmp_path, monkeypatch, turned, reference=sound.recording, overwrite=True)
+    found = checked(tmp_path, monkeypatch, turned, reference=sound.recording)
     assert {f.channel for f in found.findings if f.name == "polarity" and f.verdict == "fail"} == {
         channel.name for channel in found.bench.channels
     }

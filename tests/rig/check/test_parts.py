@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import freqs
 
+from rig.campaigns.running.level_search import share_of_limits
 from rig.check.findings import graded
+from rig.check.judging import best_assignment, by_magnitude
 from rig.check.responses import fit_mode
-from rig.check.run import next_level, share_of_limits
+from rig.check.run import SEARCH, seen_in
 from rig.check.silence import hum, silent_findings
-from rig.check.wiring import best_assignment, by_magnitude
 from rig.tick.layout import recorded_row
 from tests.rig.rigs import bench_with
 
@@ -125,7 +126,9 @@ def test_lost_samples_do_not_hide_how_near_a_limit_the_others_were():
     inputs = np.zeros((100, len(bench.channels)))
     inputs[::2, 0], inputs[1::2, 0] = 30.6, -30.6  # of 34 N
     inputs[10:14] = np.nan
-    assert share_of_limits(bench, recorded_with(bench, inputs)) == pytest.approx(30.6 / bench.limits.force_n, rel=1e-6)
+    rows = recorded_with(bench, inputs).parts[-1].read(0, 100)
+    share = share_of_limits(bench, rows, lambda name, acceleration_m_s2: 0.0)
+    assert share == pytest.approx(30.6 / bench.limits.force_n, rel=1e-6)
 
 
 def test_a_channel_of_which_nothing_was_seen_gives_no_higher_level(monkeypatch):
@@ -133,6 +136,7 @@ def test_a_channel_of_which_nothing_was_seen_gives_no_higher_level(monkeypatch):
     unclear = SimpleNamespace(coherence=np.full(len(bench.channels), 0.9))
     monkeypatch.setattr("rig.check.run.responses_in", lambda recorded: unclear)
     inputs = np.zeros((100, len(bench.channels)))
-    assert next_level(bench, recorded_with(bench, inputs), 0.01) == pytest.approx(0.04)  # four times, the most
+    higher = SEARCH.next_level(0.01, seen_in(bench, recorded_with(bench, inputs)))
+    assert higher == pytest.approx(0.04)  # four times, the most
     inputs[:, -1] = np.nan
-    assert next_level(bench, recorded_with(bench, inputs), 0.01) is None
+    assert SEARCH.next_level(0.01, seen_in(bench, recorded_with(bench, inputs))) is None

@@ -20,7 +20,7 @@ from rig.drivers import make_daq
 from rig.drivers.can import CanOptions
 from rig.emulator import VirtualPlant, Wiring
 from rig.emulator.emulated import Emulator, emulated
-from rig.emulator.output_log import LoggedPlant
+from rig.emulator.plant import LoggedPlant
 from rig.emulator.ports import device_end
 from rig.emulator.process import Ready
 from rig.emulator.settings import EmulatorSettings

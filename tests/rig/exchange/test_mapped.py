@@ -290,7 +290,7 @@ def test_a_table_that_is_none_is_said_so_with_its_line(tmp_path, text, message):
 def test_foreign_files_without_a_mapping_are_refused_with_advice(tmp_path, name):
     table(tmp_path / "frf.csv", {"f": FREQUENCY})
     scipy.io.savemat(tmp_path / "frf.mat", {"f": FREQUENCY})
-    with pytest.raises(ImportFailed, match=r"was not written by this package; say by --mapping"):
+    with pytest.raises(ImportFailed, match=r"was not written by this package; say by `mapping`"):
         import_file(tmp_path / name)
 
 

@@ -11,8 +11,7 @@ from rig.exchange.export import write_contents
 from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import ImportFailed, import_file
 from rig.exchange.time_data import TimeData
-from rig.exchange.uff.reading import read_uff
-from rig.exchange.uff.time_data import time_data_in
+from rig.exchange.uff.reading import read_uff, time_data_in
 from tests.rig.exchange.conftest import CHANNELS
 
 FREQUENCY = np.arange(20.0, 30.0, 0.5)
@@ -162,7 +161,7 @@ def test_units_of_dataset_164_divide(tmp_path):
 def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
     path = written(tmp_path / "mixed.uff", units(5, 1000.0, 1.0), response(np.ones(20), label="m/s^2", force_label="N"))
     with pytest.raises(
-        ImportFailed, match=r"mixed units: the ordinate is labelled m/s\^2 .* dataset 164 says MM .*--units"
+        ImportFailed, match=r"mixed units: the ordinate is labelled m/s\^2 .* dataset 164 says MM .*`units`"
     ):
         import_file(path)
     np.testing.assert_allclose(import_file(path, units=choice).value, factor)
@@ -171,7 +170,7 @@ def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
 @pytest.mark.parametrize(
     ("datasets", "message"),
     [
-        ([response(np.ones(20))], r"the ordinate has no unit.*--units si"),
+        ([response(np.ones(20))], r"the ordinate has no unit.*`units` si"),
         ([units(), response(np.ones(20), label="furlong")], r"is 'furlong', understood are m, mm"),
         ([units(), units(2, 3.28, 0.22), response(np.ones(20))], r"units \(dataset 164\): 2 different ones"),
         ([units(), response(np.ones(20)), response(np.ones(20))], r"a second response of 1\+Z to 1\+Z"),
@@ -183,7 +182,7 @@ def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
             [units(), response(np.ones(20)), response(np.ones(20), rsp=(2, 3), x=FREQUENCY + 1)],
             r"frequencies are not those",
         ),
-        ([units(), signal(np.ones(10))], r"holds time data; say by --mapping"),
+        ([units(), signal(np.ones(10))], r"holds time data; say by `mapping`"),
         ([units()], r"holds neither frequency responses"),
     ],
 )
@@ -261,8 +260,8 @@ def test_a_modal_mass_in_other_units_is_converted(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "drive", "message"),
     [
-        ({}, "", r"--drive: is '', .*allowed are 1\+Z, 7\+Y, 7\+Z"),
-        ({}, "3+X", r"--drive: is '3\+X'"),
+        ({}, "", r"`drive`: is '', .*allowed are 1\+Z, 7\+Y, 7\+Z"),
+        ({}, "3+X", r"`drive`: is '3\+X'"),
         ({"modal_m": 0.0}, "1+Z", r"modal mass 0, wanted is a real shape and a modal mass above zero"),
         ({axis: np.array([1j, 1.0]) for axis in ("r1", "r2", "r3")}, "1+Z", r"wanted is a real shape"),
     ],

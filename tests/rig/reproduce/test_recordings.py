@@ -107,13 +107,13 @@ def test_a_folder_of_other_settings_is_refused_and_what_differs_is_named(asked):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"models": 0}, "--models 0: allowed is a number from 1, or paper"),
-        ({"models": "many"}, "--models many"),
-        ({"scatter": 0.2}, "--scatter 0.2: allowed is 0 to 0.05"),
-        ({"input": "acceleration"}, "--input acceleration: allowed is force, voltage"),
-        ({"channel": "tip"}, "--channel tip: allowed is drive, acc_magnet"),
-        ({"levels": 4}, "--levels 4: allowed is 1 to 3"),
-        ({"without": frozenset({"tables"})}, "--without tables: allowed is steady, sweeps"),
+        ({"models": 0}, "`models` 0: allowed is a number from 1, or paper"),
+        ({"models": "many"}, "`models` many"),
+        ({"scatter": 0.2}, "`scatter` 0.2: allowed is 0 to 0.05"),
+        ({"input": "acceleration"}, "`input` acceleration: allowed is force, voltage"),
+        ({"channel": "tip"}, "`channel` tip: allowed is drive, acc_magnet"),
+        ({"levels": 4}, "`levels` 4: allowed is 1 to 3"),
+        ({"without": frozenset({"tables"})}, "`without` tables: allowed is steady, sweeps"),
     ],
 )
 def test_what_cannot_be_studied_is_one_line(asked, changes, said):

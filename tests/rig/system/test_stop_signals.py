@@ -7,15 +7,18 @@ import pytest
 import typer
 
 import rig
-from rig.campaigns.running.execution import Silent
-from rig.cli import _carry
+from rig.arming.run_options import RunOptions, Silent
+from rig.bench import load_bench
+from rig.campaigns.running.runner import carry_out
+from rig.cli.app import _carry
+from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from rig.system.stop_signals import Interrupted, Terminated, asking, ended_in_order, held, insisting
 from tests.rig.campaigns.running.test_runs import plan_with
 
 PLAN = plan_with(levels_v=(0.4,))
+BENCH = load_bench(PLAN.bench)
 
 
 @pytest.fixture(autouse=True)
@@ -73,7 +76,8 @@ def test_a_signal_once_the_file_is_there_says_so_and_the_command_succeeds(tmp_pa
     with pytest.raises(Terminated) as ended:
         rig.run(PLAN, output=output)
     assert ended.value.recorded == output
-    _carry(False, "backbone", lambda progress: rig.run(PLAN, output=output, overwrite=True, progress=progress))
+    again = RunOptions(overwrite=True)
+    _carry("backbone", again, lambda watched: carry_out(PLAN, BENCH, output, watched), json=False)
     assert "1 of 1 points accepted" in capsys.readouterr().out
     signal.raise_signal(signal.SIGTERM)  # all is done: a run that succeeded is not ended by a signal
 
@@ -85,8 +89,9 @@ class Stopping(Silent):
 
 def test_a_run_that_did_not_complete_fails_whatever_signal_comes_at_its_end(tmp_path, monkeypatch):
     monkeypatch.setattr("rig.campaigns.running.runner.forget_before", lambda path: signal.raise_signal(signal.SIGTERM))
+    stopping = RunOptions(progress=Stopping())
     with pytest.raises(typer.Exit) as ended:
-        _carry(False, "backbone", lambda _: rig.run(PLAN, output=tmp_path / "run.h5", progress=Stopping()))
+        _carry("backbone", RunOptions(), lambda _: carry_out(PLAN, BENCH, tmp_path / "run.h5", stopping), json=False)
     assert ended.value.exit_code == 1
 
 

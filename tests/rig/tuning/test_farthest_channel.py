@@ -5,7 +5,7 @@ import pytest
 from rig.bench import Bench
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
-from rig.tuning import tune
+from rig.tuning import TuningRequest, tune
 from rig.tuning.levels import reach_m
 from tests.rig.rigs import bench_with
 
@@ -23,7 +23,7 @@ def far_tip() -> Bench:
 
 @pytest.fixture(scope="module")
 def tuned(tmp_path_factory):
-    return tune(far_tip(), tmp_path_factory.mktemp("tip") / "test.h5", level_rms_v=0.02)
+    return tune(far_tip(), tmp_path_factory.mktemp("tip") / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
 def tip_ratio() -> float:
@@ -47,9 +47,9 @@ def test_the_highest_level_keeps_the_tip_within_its_limit(tuned):
 
 def test_a_level_asked_for_that_takes_the_tip_beyond_its_limit_is_refused(tmp_path):
     with pytest.raises(
-        ConfigurationError, match=r"--to-m = 0\.001 m: allowed is up to 0\.0005\d+ m, where .*'acc_magnet'"
+        ConfigurationError, match=r"`to_m` = 0\.001 m: allowed is up to 0\.0005\d+ m, where .*'acc_magnet'"
     ):
-        tune(far_tip(), tmp_path / "test.h5", level_rms_v=0.02, to_m=0.001)
+        tune(far_tip(), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02, to_m=0.001))
 
 
 def test_the_plan_refuses_a_level_that_a_person_raised_beyond_the_limit_of_the_tip(tuned):

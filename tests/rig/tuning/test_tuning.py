@@ -16,7 +16,7 @@ from rig.cli import main
 from rig.errors import ConfigurationError
 from rig.measurements import spectra
 from rig.recording.reader import Recording
-from rig.tuning import TuningError, tune
+from rig.tuning import TuningError, TuningRequest, tune
 from rig.tuning.plant import compared_with_bench
 from rig.tuning.report import summary
 from simulators.analysis import phase_resonance_backbone
@@ -113,24 +113,24 @@ def test_a_wrong_mode_shape_of_the_bench_is_said_and_not_used(magnet):
 def test_a_linear_frequency_that_is_30_percent_off_is_refused_with_the_measured_one(factor, tmp_path):
     wrong = bench_with({"specimen": {"linear_frequency_hz": factor * 24.37}})
     with pytest.raises(TuningError, match=r"mode that answers lies at 24\.3"):
-        tune(wrong, tmp_path / "test.h5", level_rms_v=0.02)
+        tune(wrong, tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
 @pytest.mark.parametrize(
     ("request_", "said"),
     [
         ({"level_rms_v": 5.0}, "allows above 0 and up to 9.5 V"),
-        ({"level_rms_v": -1.0}, "--level = -1 V RMS: allowed is above 0"),
+        ({"level_rms_v": -1.0}, "`level_rms_v` = -1 V RMS: allowed is above 0"),
         ({"law": "pid"}, "allowed is frequency-error, phase"),
         ({"to_m": 0.02}, "up to 0.00377 m: a channel's mode_shape moves 1.59 times as far"),
-        ({"to_m": 0.005}, "--to-m = 0.005 m"),
-        ({"from_m": 0.002, "to_m": 0.001}, "--from-m = 0.002 m: allowed is below"),
-        ({"points": 0}, "--points = 0"),
+        ({"to_m": 0.005}, "`to_m` = 0.005 m"),
+        ({"from_m": 0.002, "to_m": 0.001}, "`from_m` = 0.002 m: allowed is below"),
+        ({"points": 0}, "`points` = 0"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_moves(request_, said, tmp_path):
     with pytest.raises(ConfigurationError, match=said):
-        tune("magnet-beam", tmp_path / "test.h5", **request_)
+        tune("magnet-beam", tmp_path / "test.h5", TuningRequest(**request_))
     assert not (tmp_path / "test.h5").exists()
 
 
@@ -149,7 +149,7 @@ def test_a_dead_sensor_is_named(name, tmp_path):
 def test_a_sensor_that_shows_noise_alone_is_named(tmp_path):
     table = bench_with(sensors=sensors_with("drive", sensitivity_v_per_unit=1e-6, noise_rms=200.0)).model_dump()
     with pytest.raises(TuningError, match=r"coherence .* of channel 'drive', needed is"):
-        tune(Bench.model_validate(table), tmp_path / "test.h5", level_rms_v=0.05)
+        tune(Bench.model_validate(table), tmp_path / "test.h5", TuningRequest(level_rms_v=0.05))
 
 
 def test_a_sensor_that_is_mounted_the_other_way_round_is_told(tmp_path):
@@ -161,17 +161,17 @@ def test_a_sensor_that_is_mounted_the_other_way_round_is_told(tmp_path):
         for channel in table["channels"]
     ]
     with pytest.raises(TuningError, match="polarity"):
-        tune(Bench.model_validate(table), tmp_path / "test.h5", level_rms_v=0.02)
+        tune(Bench.model_validate(table), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
 def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_said(tmp_path):
     bench = bench_with(name="friction-beam", delay_samples=300)
     with pytest.raises(TuningError, match=r"unsuited .* max \|S\| = [\d.]+, allowed is 3"):
-        tune(bench, tmp_path / "test.h5", level_rms_v=0.02)
+        tune(bench, tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
 def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):
-    tuned = tune("magnet-beam", tmp_path / "test.h5", level_rms_v=0.05, to_m=0.0037, points=3)
+    tuned = tune("magnet-beam", tmp_path / "test.h5", TuningRequest(level_rms_v=0.05, to_m=0.0037, points=3))
     assert [note for note in tuned.notes if "out of reach where the damping rises beyond 1.7" in note]
     assert not magnet.notes
 

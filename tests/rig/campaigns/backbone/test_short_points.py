@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import rig
+from rig.arming.run_options import Silent
 from rig.campaigns.plans import load_plan
-from rig.campaigns.running.execution import Silent
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
 from rig.tick.sequencer.layout import SegmentKind

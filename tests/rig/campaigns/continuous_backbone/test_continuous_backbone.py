@@ -9,10 +9,10 @@ from scipy.interpolate import PchipInterpolator
 
 import rig
 from identification import IdentificationError, ModalProperties
+from rig.arming.run_options import Silent
 from rig.campaigns.continuous_backbone.ways import turning_point
 from rig.campaigns.evaluation.measured_together import Passage
 from rig.campaigns.plans import load_plan
-from rig.campaigns.running.execution import Silent
 from rig.errors import ConfigurationError
 from rig.measurements import continuous_backbones
 from rig.models.identify.identify import Request, identify_model

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 import rig
+from rig.arming.run_options import Silent
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.running.evaluations import Evaluations
-from rig.campaigns.running.execution import Silent
 from tests.rig.campaigns.running.test_runs import plan_with
 
 

@@ -57,11 +57,11 @@ def test_the_level_that_tripped_is_not_tried_again_unasked(output):
     before = output.read_bytes()
     level = f"{level_of(output):g} V"
     said = (
-        rf"^run\.h5: the run tripped at {level} \(displacement .*: --plan with levels below {level}, or --retry-tripped"
+        rf"^run\.h5: the run tripped at {level} \(displacement .*: `plan` with levels below {level}, or `retry_tripped`"
     )
     with pytest.raises(ConfigurationError, match=said):
         rig.resume(output)
-    with pytest.raises(ConfigurationError, match="--retry-tripped"):
+    with pytest.raises(ConfigurationError, match="`retry_tripped`"):
         rig.resume(output, plan=plan_with(levels_v=(0.4, 0.5, level_of(output) + 0.1)))
     assert output.read_bytes() == before
 
@@ -69,7 +69,7 @@ def test_the_level_that_tripped_is_not_tried_again_unasked(output):
 def test_on_request_it_is_tried_again_and_may_trip_again(output):
     with rig.resume(output, retry_tripped=True) as run:
         assert [part.end["tripped"] for part in run.recording.parts] == [True, True]
-    with pytest.raises(ConfigurationError, match="--retry-tripped"):
+    with pytest.raises(ConfigurationError, match="`retry_tripped`"):
         rig.resume(output)
 
 
@@ -77,7 +77,7 @@ def test_a_plan_that_stays_below_goes_on_and_the_trip_is_not_forgotten(output):
     lower = plan_with(levels_v=(0.4, 0.5))
     with rig.resume(output, plan=lower) as run:
         assert run.complete
-    with pytest.raises(ConfigurationError, match="--retry-tripped"):
+    with pytest.raises(ConfigurationError, match="`retry_tripped`"):
         rig.resume(output, plan=plan_with())
 
 

@@ -13,8 +13,8 @@ import pytest
 
 import rig
 from controller import preset
+from rig.arming.run_options import RunOptions, Silent
 from rig.campaigns.backbone.plan import BackbonePlan
-from rig.campaigns.running.execution import Silent
 from rig.campaigns.running.runner import carry_out
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError, DaqDisconnected, RecordingError
@@ -175,7 +175,7 @@ def test_a_force_that_the_voltage_limit_does_not_reach_is_marked_and_the_rest_go
     law = preset("magnet-beam").model_dump() | {"k3": 0.0, "k4": 10.0}
     plan = plan_with(levels_v=None, levels_n=(0.06, 0.56), controller=law)
     bench = bench_with({"limits": {"voltage_v": 1.0}})
-    with carry_out(plan, bench, tmp_path / "run.h5", seed=1) as recording:
+    with carry_out(plan, bench, tmp_path / "run.h5", RunOptions(seed=1)) as recording:
         first, second = recording.points
     assert first["accepted"]
     assert first["force_n"] == pytest.approx(0.06, rel=0.01)
@@ -234,7 +234,7 @@ def test_skew_between_channels_is_taken_out_of_loop_and_points_alike(tmp_path, m
     channels = [channel.model_dump() for channel in bench_with().channels]
     channels[1]["skew_samples"] = 2.0
     bench = bench_with({"channels": channels, "block": 10})
-    with carry_out(plan_with(), bench, tmp_path / "run.h5", seed=1) as recording:
+    with carry_out(plan_with(), bench, tmp_path / "run.h5", RunOptions(seed=1)) as recording:
         points = {point["number"]: point for point in recording.points}
     _same_points(points, whole)
 
@@ -274,7 +274,7 @@ class _Fails(Silent):
 def test_a_failure_beside_the_loop_ramps_down_before_it_is_raised(tmp_path):
     output = tmp_path / "run.h5"
     with pytest.raises(KeyError, match="a bug"):
-        carry_out(plan_with(), bench_with(), output, progress=_Fails())
+        carry_out(plan_with(), bench_with(), output, RunOptions(progress=_Fails()))
     with Recording(output) as recording:
         assert recording.parts[0].end["reason"] == "stop_requested"
         assert recording.parts[0].rows("command_v")[-1] == 0.0
@@ -292,7 +292,7 @@ class _FailsAtTheEnd(Silent):
 def test_a_failure_at_the_last_point_leaves_no_run_that_calls_itself_complete(tmp_path):
     output = tmp_path / "run.h5"
     with pytest.raises(KeyError, match="a bug"):
-        carry_out(plan_with(levels_v=(0.4,)), bench_with(), output, progress=_FailsAtTheEnd())
+        carry_out(plan_with(levels_v=(0.4,)), bench_with(), output, RunOptions(progress=_FailsAtTheEnd()))
     with Recording(output) as recording:
         assert not recording.complete
 
@@ -300,7 +300,7 @@ def test_a_failure_at_the_last_point_leaves_no_run_that_calls_itself_complete(tm
 @pytest.mark.parametrize("before_the_end", [300, 1500])  # the last 205 samples are not evaluated
 def test_a_sensor_that_dies_shortly_before_the_end_of_a_record_spoils_the_point(tmp_path, monkeypatch, before_the_end):
     plan = plan_with(levels_v=(0.4,))
-    with carry_out(plan, bench_with({"block": 10}), tmp_path / "whole.h5", seed=1) as recording:
+    with carry_out(plan, bench_with({"block": 10}), tmp_path / "whole.h5", RunOptions(seed=1)) as recording:
         end = recording.points[0]["end_sample"]
     exchange, noise, count = VirtualDAQ._exchange, np.random.default_rng(1), 0
 
@@ -313,7 +313,7 @@ def test_a_sensor_that_dies_shortly_before_the_end_of_a_record_spoils_the_point(
 
     monkeypatch.setattr("rig.loop.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", dying)
-    with carry_out(plan, bench_with({"block": 10}), tmp_path / "run.h5", seed=1) as recording:
+    with carry_out(plan, bench_with({"block": 10}), tmp_path / "run.h5", RunOptions(seed=1)) as recording:
         assert not recording.complete
         assert not recording.points[0]["accepted"]
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.contents import JournalContents
+from rig.recording.hdf5_recording import read_recording, recording_integrity, taken_over, write_recording
 from rig.recording.header import SCHEMA, Column, Header, packed
 from rig.recording.journal import JournalWriter, journal_path, set_aside
+from rig.recording.journal_contents import JournalContents
 from rig.recording.layout import new_file, open_file
 from rig.recording.parts import Part
-from rig.recording.stored import read_recording, recording_integrity, taken_over, write_recording
 from rig.system.locking import exclusive
 
 __all__ = ["check_continuation", "continue_recording", "finalise"]

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from rig.errors import RecordingError
 from rig.recording.blocks import Block, BlockKind, Gap
 from rig.recording.header import Header
+from rig.recording.journal_blocks import Tail, read_journal
 from rig.recording.parts import Part, missing_rows, rows_at_once
-from rig.recording.sequence import Tail, read_journal
 
 __all__ = ["JournalContents", "JournalPart"]
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from rig.errors import RecordingError
+from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import continue_recording, finalise
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "file-format.md"

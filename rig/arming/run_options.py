@@ -1,0 +1,68 @@
+"""How a run is carried out, whatever its plan: seed, pace, output file, who watches, who arms, what is recorded about it."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+from rig.arming.arming import Arm
+from rig.arming.run_facts import About
+from rig.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from rig.tick.tick import Tick
+
+__all__ = ["Progress", "RunOptions", "Silent"]
+
+LARGEST_SEED = 2**63 - 1
+
+
+class Progress(Protocol):
+    """Receives what happens while a run is carried out, for a display."""
+
+    def point(self, point: dict[str, Any], number: int, total: int) -> None:
+        """A point was measured or has failed; it is ``number`` of ``total``."""
+
+    def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
+        """A chunk of telemetry rows was recorded."""
+
+    def remark(self, text: str) -> None:
+        """The driver or the bench has something to say, in one line."""
+
+
+class Silent:
+    """A `Progress` that shows nothing."""
+
+    def point(self, point: dict[str, Any], number: int, total: int) -> None:
+        """Do nothing."""
+
+    def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
+        """Do nothing."""
+
+    def remark(self, text: str) -> None:
+        """Do nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Options of a run that do not depend on its plan; campaigns, checks and tunings take the same.
+
+    Raises `ConfigurationError` for a seed outside its range.
+    """
+
+    seed: int | None = None
+    """Seed of a virtual rig's noise, 0 to 2**63 - 1. If None: 0 for a new recording, for a further part one not used before."""
+    realtime: bool = False
+    """Whether a virtual rig is held back to the wall clock."""
+    overwrite: bool = False
+    """Whether a new recording may replace an existing file."""
+    progress: Progress = field(default_factory=Silent)
+    """Watches the run."""
+    arm: Arm = None
+    """Permission to move something physical: True, a callable that asks a person, or None (`rig.arming.arming`)."""
+    about: About = field(default_factory=About)
+    """Operator, specimen and notes, recorded with the part."""
+
+    def __post_init__(self) -> None:
+        if self.seed is not None and not 0 <= self.seed <= LARGEST_SEED:
+            raise ConfigurationError(f"seed = {self.seed}: allowed is 0 to 2**63 - 1")

@@ -1,0 +1,113 @@
+"""Options that ``rig run``, ``resume``, ``check`` and ``tune`` share, and the question before a bench is armed."""
+
+import inspect
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rig.cli.options import Overwrite
+
+if TYPE_CHECKING:
+    from rig.arming.arming import Arm, ArmingRequest
+    from rig.arming.run_options import RunOptions
+
+__all__ = ["ask", "of_a_further_part", "of_a_recording", "shown", "with_run_options"]
+
+Seed = Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)]
+SeedOfTheRest = Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)]
+Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]
+ArmNow = Annotated[bool, typer.Option("--arm", help="Arm a bench that moves, without being asked.")]
+Operator = Annotated[str | None, typer.Option(help="Who runs the test, for the record; the user if left out.")]
+SpecimenSerial = Annotated[str, typer.Option(help="Serial number of the specimen, for the record.")]
+Notes = Annotated[list[str] | None, typer.Option("--note", help="A remark for the record; may be given several times.")]
+
+
+def of_a_recording(
+    seed: Seed = 0,
+    realtime: Realtime = False,
+    arm: ArmNow = False,
+    operator: Operator = None,
+    specimen_serial: SpecimenSerial = "",
+    note: Notes = None,
+    overwrite: Overwrite = False,
+) -> "RunOptions":
+    """The options of a command that begins a recording."""
+    options = of_a_further_part(seed, realtime, arm, operator, specimen_serial, note)
+    return replace(options, overwrite=overwrite)
+
+
+def of_a_further_part(
+    seed: SeedOfTheRest = None,
+    realtime: Realtime = False,
+    arm: ArmNow = False,
+    operator: Operator = None,
+    specimen_serial: SpecimenSerial = "",
+    note: Notes = None,
+) -> "RunOptions":
+    """The options of a command that adds a part to a recording."""
+    from rig.arming.run_facts import About
+    from rig.arming.run_options import RunOptions
+
+    about = About(operator, specimen_serial, tuple(note or ()))
+    return RunOptions(seed=seed, realtime=realtime, arm=_arm_from(arm), about=about)
+
+
+def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the options of ``build`` in place of its parameter ``options``, which receives what ``build`` returns."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        shared = inspect.signature(build).parameters
+        parameters: list[inspect.Parameter] = []
+        for parameter in inspect.signature(command).parameters.values():
+            parameters += shared.values() if parameter.name == "options" else [parameter]
+        parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
+
+        def call(**given: Any) -> None:
+            options = build(**{name: given.pop(name) for name in shared})
+            command(**given, options=options)
+
+        call.__name__, call.__doc__ = command.__name__, command.__doc__
+        call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return call
+
+    return decorate
+
+
+@contextmanager
+def shown(options: "RunOptions", columns: Any) -> "Iterator[RunOptions]":
+    """The options with a display of the run's points; ``columns`` are those of its kind of campaign."""
+    from rig.show.progress import RunProgress
+
+    progress = RunProgress(columns)
+    try:
+        yield replace(options, progress=progress)
+    finally:
+        progress.close()
+
+
+def _arm_from(arm: bool) -> "Arm":
+    """True where the switch was given; else a question on the terminal, if there is one."""
+    if arm:
+        return True
+    on_a_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stderr is not None and sys.stderr.isatty()
+    return ask if on_a_terminal else None
+
+
+def ask(request: "ArmingRequest") -> bool:
+    """Show what is to move; whether the bench's name was typed."""
+    from rig.text.printable import printable
+
+    for line in request.lines():
+        print(printable(line), file=sys.stderr)
+    print(
+        f"{printable(request.what)} will move this rig. Type the bench's name to arm it: ",
+        end="",
+        file=sys.stderr,
+        flush=True,
+    )
+    return sys.stdin.readline().strip() == request.bench.name

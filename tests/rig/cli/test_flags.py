@@ -1,0 +1,25 @@
+from dataclasses import fields
+
+import pytest
+
+from rig.arming.run_options import RunOptions
+from rig.cli.app import app
+from rig.cli.flags import flags, with_flags
+from rig.models.identify.pnlss_request import PnlssOptions
+from rig.models.identify.request import Request
+from rig.models.predict.request import PredictionRequest
+from rig.reproduce.options import Options
+from rig.tuning import TuningRequest
+
+FILLED_OTHERWISE = {"pnlss", "specimen", "folder", "progress", "about"}
+"""Fields that no single option fills."""
+
+
+@pytest.mark.parametrize("request_", [Request, PnlssOptions, PredictionRequest, TuningRequest, Options, RunOptions])
+def test_every_field_of_a_request_has_its_option(request_):
+    assert {field.name for field in fields(request_)} - FILLED_OTHERWISE <= set(flags(app))
+
+
+def test_a_field_becomes_its_option_and_other_words_in_backticks_stay():
+    told = with_flags("`band_hz` = 3 2: add `planned` or `no_such_field`, see `rig show x.h5`", app)
+    assert told == "--band = 3 2: add --planned-sweep or `no_such_field`, see `rig show x.h5`"
