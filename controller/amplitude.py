@@ -17,7 +17,7 @@ from controller.through_response import (
     force_slope,
     wanted_displacement,
 )
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 
 __all__ = ["AMPLITUDE", "AMPLITUDE_STATE", "AmplitudeLaw", "AmplitudeSettings"]
 
@@ -93,7 +93,7 @@ class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings
         return out
 
 
-@kernel
+@inner_kernel
 def held_size(state: Record, vibration: Record) -> float:
     """What the loop of the moment holds: a force (N), its RMS (N) or a displacement (m); 0 without a loop."""
     if state.law == FORCE:
@@ -118,7 +118,7 @@ def take_over(parameters: Record, state: Record, vibration: Record, law: int) ->
     return float(state.output.amplitude_v if law == VOLTAGE else held_size(state, vibration))
 
 
-@kernel
+@inner_kernel
 def demand(
     parameters: Record, state: Record, vibration: Record, level: float, wanted_lag: float, omega: float, by_loop: bool
 ) -> float:
@@ -150,7 +150,7 @@ def demand(
     return float(state.demanded_v)
 
 
-@kernel
+@inner_kernel
 def see_output(state: Record, demanded_v: float, amplitude_v: float, turn: float) -> None:
     """The output that was put out for ``demanded_v`` and the state's ``demanded_turn``, after all limits (V, rad)."""
     output = state.output

@@ -10,7 +10,7 @@ from pydantic import Field
 from controller.adaptive_filter import MOST_HARMONICS, adapt, root_mean_square, turn_phasors
 from controller.primitives import size, track, wrap
 from controller.settings import Settings
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 
 __all__ = ["DETECTOR", "DETECTOR_STATE", "VIBRATION", "Detector", "DetectorSettings"]
 
@@ -129,7 +129,7 @@ def phase_lag(force: complex, response: complex) -> float:
     return math.atan2(product.imag, product.real)
 
 
-@kernel
+@inner_kernel
 def detect(
     parameters: Record, state: Record, vibration: Record, force: float, drive: float, phasor: complex, omega: float
 ) -> None:
@@ -164,7 +164,7 @@ def force_rms(parameters: Record, state: Record) -> float:
     return math.sqrt(state.force_square)
 
 
-@kernel
+@inner_kernel
 def phase_error(parameters: Record, state: Record, vibration: Record, wanted_lag: float, lag_of_skew: float) -> float:
     """Wanted minus measured phase lag in rad; ``lag_of_skew`` is the lag (rad) by which the force's channel is later."""
     if parameters.kind == SIGN:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from controller.primitives import proportional_integral
 from controller.settings import Settings
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 
 __all__ = ["FREQUENCY", "FREQUENCY_STATE", "FrequencyLaw", "FrequencySettings"]
 
@@ -148,7 +148,7 @@ def frequency_error(phase_error: float, compliance: float, omega: float, wanted_
     return float(min(max(error, -bound), bound))
 
 
-@kernel
+@inner_kernel
 def followed_error(parameters: Record, state: Record, vibration: Record, wanted_lag: float) -> float:
     """What the PI law is fed with: one line for each `FrequencyLaw`, in rad or rad/s."""
     if parameters.law == FREQUENCY_ERROR:
@@ -157,7 +157,7 @@ def followed_error(parameters: Record, state: Record, vibration: Record, wanted_
     return float(state.mean_error_rad if parameters.period_mean == 1 else vibration.error_rad)
 
 
-@kernel
+@inner_kernel
 def follow(parameters: Record, state: Record, vibration: Record, wanted_lag: float) -> None:
     """One sample of the frequency law: from the vibration and the wanted lag (rad) to ``state.omega`` (rad/s).
 

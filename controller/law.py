@@ -10,7 +10,7 @@ from controller.frequency import FREQUENCY, FREQUENCY_STATE
 from controller.lock import LOCK, THRESHOLDS, LockRule
 from controller.period import PERIOD
 from controller.rest import REST, REST_STATE, see_rest, take_as_measured
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel
 
 __all__ = ["CONTROL", "LAW", "Law", "OpenLoop", "control_state"]
 
@@ -86,7 +86,7 @@ class OpenLoop(DetectorSettings, AmplitudeSettings):
         return out
 
 
-@kernel
+@inner_kernel
 def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_skew: float, by_loop: bool) -> bool:
     """Behind the detector, once a sample: whether there is a phase to be read, its error, and the force at rest.
 

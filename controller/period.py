@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 
 __all__ = ["PERIOD"]
 
@@ -25,7 +25,7 @@ PERIOD = np.dtype(
 ``saturated``, ``clamped``: whether output and frequency stood at a bound at its end."""
 
 
-@kernel
+@inner_kernel
 def add_sample(period: Record, vibration: Record, held: float) -> None:
     """Take one sample of the vibration, and of the quantity that the amplitude law holds, into the period under way."""
     period.sum_error += vibration.error_rad

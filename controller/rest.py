@@ -8,7 +8,7 @@ from pydantic import Field
 from controller.detector import phase_lag
 from controller.primitives import size, wrap
 from controller.settings import Settings
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel
 
 __all__ = ["REST", "REST_STATE", "RestSettings"]
 
@@ -45,7 +45,7 @@ class RestSettings(Settings):
         return out
 
 
-@kernel
+@inner_kernel
 def take_as_measured(state: Record, vibration: Record) -> None:
     """No estimate: force, motion and phase error at rest are those measured."""
     state.late_force, state.late_drive = vibration.force, vibration.drive
@@ -53,7 +53,7 @@ def take_as_measured(state: Record, vibration: Record) -> None:
     vibration.rest_error_rad = vibration.error_rad
 
 
-@kernel
+@inner_kernel
 def see_rest(
     parameters: Record, state: Record, vibration: Record, omega: float, wanted_lag: float, lag_of_skew: float
 ) -> None:

@@ -30,7 +30,7 @@ from rig.tick.safety.kernels import (
 from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.kernels import advance, is_ramp
 from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
-from vibrolock.compiled import Record, kernel
+from vibrolock.compiled import Record, inner_kernel, kernel
 
 SMALLEST_V = 1e-12  # no division by an output of nothing
 UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
@@ -47,7 +47,7 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
     return float(theta + TWO_PI if theta < 0.0 else theta)
 
 
-@kernel
+@inner_kernel
 def measure_rms(t: TickArrays, amplitude_law: int) -> None:
     """The force's root mean square, where it is what ``amplitude_law`` holds."""
     if amplitude_law == FORCE_RMS:
@@ -84,7 +84,7 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
         progress.level = take_over(t.law[0].amplitude, amplitude, control.vibration, segment.amplitude_law)
 
 
-@kernel
+@inner_kernel
 def step_sequencer(t: TickArrays) -> bool:
     """The plan's level, lag and frequency for this sample; returns whether the run goes on."""
     loop, progress, amplitude = t.loop[0], t.progress[0], t.control[0].amplitude
@@ -104,7 +104,7 @@ def step_sequencer(t: TickArrays) -> bool:
     return bool(running)
 
 
-@kernel
+@inner_kernel
 def choose_frequency(t: TickArrays) -> None:
     """Frequency of the sample: that of the loop, held where no phase can be read, or the plan's."""
     control, loop, progress = t.control[0], t.loop[0], t.progress[0]
@@ -118,7 +118,7 @@ def choose_frequency(t: TickArrays) -> None:
         watch_frequency(t.guard[0], t.limits[0], control.frequency.omega, loop.sample)
 
 
-@kernel
+@inner_kernel
 def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool) -> float:
     """Safety: the amplitude (V) that goes out for the ``demanded`` one, of which the law's watch has ``allowed`` so much."""
     amplitude, guard, limits = t.control[0].amplitude, t.guard[0], t.limits[0]
@@ -130,7 +130,7 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
     return permitted
 
 
-@kernel
+@inner_kernel
 def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
     """The output (V) of this sample, ``Re(U exp(i theta))``, and the oscillator one sample on.
 
