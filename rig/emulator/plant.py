@@ -54,7 +54,7 @@ class Plant(Protocol):
 class Wiring:
     """How the sensors are connected to the channels; mistakes can be made on purpose. The rig itself is unchanged.
 
-    ``flip``: sensors mounted the other way round. ``dead``: channels that are not connected and toggle the converter's last bit.
+    ``flip``: sensors mounted the other way round. ``dead``: channels without a sensor, which toggle their last bit.
     ``swap``: pairs of sensors in each other's sockets.
     """
 
@@ -81,7 +81,7 @@ class Wiring:
         self.as_it_should_be = not (flip or dead or swap)
 
     def connect(self, counts: np.ndarray, first: int) -> np.ndarray:
-        """Counts [n, n_channels] of the device's channels from those of the sensors; ``first`` is the index of the first row."""
+        """Counts [n, n_channels] by channel from counts by sensor; ``first`` is the index of the first row."""
         out = counts[:, self._order] * self._sign
         for channel in self._dead:
             out[:, channel] = (np.arange(first, first + counts.shape[0]) * 7919 >> 4) & 1

@@ -1,8 +1,8 @@
 """The messages that host and device exchange, whatever the wire: requests and answers, samples, outputs, heartbeats.
 
 A device is a dictionary of parameters of four bytes each, a state (`DeviceState`) and two streams. Every command is one
-`Request`, answered by one `Answer` with the same number. The host repeats a request until it is answered; a device that receives
-its last request again repeats the answer and does nothing else. Samples and outputs are never repeated: a lost one stays a gap.
+`Request`, answered by one `Answer` with the same number. The host repeats a request until it is answered; a device that
+receives its last request again only repeats the answer. Samples and outputs are never repeated: a lost one stays a gap.
 """
 
 from enum import IntEnum, IntFlag

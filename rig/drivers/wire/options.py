@@ -15,7 +15,7 @@ class WireOptions(Configured):
     """Options that all wires share; each driver adds those that locate the device."""
 
     queue_blocks: int = Field(1, ge=1, le=64)
-    """q: blocks between handing over an output and its conversion. A longer queue tolerates a later host and delays the loop."""
+    """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop."""
     watchdog_s: float | None = Field(None, gt=0, le=LONGEST_S)
     """Time without an output after which the device brings its own to 0 V, s; by default 0.1 s, or 4 blocks if longer."""
     ramp_s: float = Field(0.05, ge=0, le=LONGEST_S)

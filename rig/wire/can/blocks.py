@@ -156,7 +156,7 @@ class Blocks:
     def put(
         self, group: int, part: int, piece: Piece, counts: np.ndarray, flags: int
     ) -> tuple[int, np.ndarray, int] | None:
-        """Add the counts (int16, rows by columns) of a frame; return number, counts and flags of the block it completes, if any."""
+        """Add the counts (int16, rows by columns) of a frame; return number, counts and flags of a block it completes."""
         if self._mark is not None and group == self._mark:
             self._count("resynchronised")
             self._drop(group // self._per_block)
