@@ -1,4 +1,4 @@
-"""Read a MAT file and leave what is in it in a folder: the child process of `rig.exchange.mat`."""
+"""Read a MAT file and write its values into a folder: the child process of `rig.exchange.mat`."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ __all__ = ["main"]
 
 
 def main(path: Path, folder: Path) -> str:
-    """Why it cannot be read; empty where it was, and its values are in ``folder``."""
+    """Read ``path`` into ``folder``; return why it cannot be read, or an empty text."""
     from scipy.io import loadmat
 
     try:
