@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from rig.campaigns.evaluation.quality import what_was_skipped
+from rig.campaigns.evaluation.drift import drift_of
+from rig.campaigns.evaluation.vibration_quality import what_was_skipped
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.campaigns.planning.drift import drift_of
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
 from rig.check.assessment import assess, is_check

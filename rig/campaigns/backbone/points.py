@@ -16,11 +16,18 @@ from identification import (
 )
 from rig.bench import Bench
 from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.evaluation.acceptance import (
+    alien_objection,
+    first_of,
+    phase_objection,
+    settled_objection,
+    settled_quality,
+    std_objection,
+)
 from rig.campaigns.evaluation.alien_force import alien_force
-from rig.campaigns.evaluation.objections import alien_objection, first_of, phase_objection, std_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record, of_a_vibration
+from rig.campaigns.evaluation.drift import of_the_result
 from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
-from rig.campaigns.evaluation.settled_quality import settled_objection, settled_quality
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, of_a_record, of_a_vibration
 from rig.campaigns.evaluation.vibrations import (
     channels_from,
     head,
@@ -29,7 +36,6 @@ from rig.campaigns.evaluation.vibrations import (
     vibration_from,
     within_periods,
 )
-from rig.campaigns.planning.drift import of_the_result
 from rig.campaigns.planning.plan import Column, Target
 
 __all__ = ["BACKBONE_COLUMNS", "backbone_of", "measure_backbone_point"]

@@ -17,12 +17,12 @@ from identification import (
 from rig.bench import Bench
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
 from rig.campaigns.continuous_backbone.ways import WAYS, Way, both_ways, rows_near
+from rig.campaigns.evaluation.acceptance import alien_objection, first_of, std_objection
 from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.measured_together import Passage
-from rig.campaigns.evaluation.objections import alien_objection, first_of, std_objection
 from rig.campaigns.evaluation.plausibility import with_plausible_ways
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_vibration
 from rig.campaigns.evaluation.recorded_flow import recorded_flow
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, of_a_vibration
 from rig.campaigns.evaluation.vibrations import channels_from, head, not_evaluated, vibration_from
 from rig.campaigns.planning.plan import Column, Target
 

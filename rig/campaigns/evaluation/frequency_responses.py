@@ -7,9 +7,9 @@ import numpy as np
 
 from identification import FrequencyResponse, IdentificationError
 from identification.frequency_responses import Controlled
+from rig.campaigns.evaluation.drift import of_the_result
 from rig.campaigns.evaluation.recorded import specimen_of
 from rig.campaigns.evaluation.vibrations import as_complex
-from rig.campaigns.planning.drift import of_the_result
 from rig.recording.reader import Recording
 
 __all__ = ["frequency_responses_of", "recorded_frequency_responses"]

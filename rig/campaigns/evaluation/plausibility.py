@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from rig.bench import Bench
+from rig.campaigns.evaluation.channel_misfit import Misfit, Seen, told
 from rig.campaigns.evaluation.channel_ratios import (
     motions_of,
     ratios_of,
@@ -26,8 +27,7 @@ from rig.campaigns.evaluation.channel_ratios import (
     softened,
     spread_of,
 )
-from rig.campaigns.evaluation.gaps import rms_of
-from rig.campaigns.evaluation.misfits import Misfit, Seen, told
+from rig.campaigns.evaluation.lost_samples import rms_of
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification import Channel, PeriodicVibration, periodic_vibration
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import lost_rows
+from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
 from rig.tick.safety.layout import POLARITY_HINT
 from rig.tick.sequencer.layout import Outcome

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification import IdentificationError, PeriodicSpectra, periodic_spectra
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import lost_rows, rms_of
+from rig.campaigns.evaluation.lost_samples import lost_rows, rms_of
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, head, skew_turn
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Column, Target

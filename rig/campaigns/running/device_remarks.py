@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.campaigns.evaluation.gaps import lost_rows, lost_warnings
+from rig.campaigns.evaluation.lost_samples import lost_rows, lost_warnings
 from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT
 

@@ -12,16 +12,16 @@ from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
-from rig.campaigns.evaluation.quality import what_was_skipped
+from rig.campaigns.evaluation.vibration_quality import what_was_skipped
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.advice import Before, Trip, advice_on
 from rig.campaigns.running.device_remarks import flag_names, with_device_remarks
-from rig.campaigns.running.evaluations import Evaluations
-from rig.campaigns.running.kept_rows import KeptRows
+from rig.campaigns.running.evaluation_thread import EvaluationThread
+from rig.campaigns.running.row_buffer import RowBuffer
 from rig.campaigns.running.stored_rows import StoredRows
-from rig.campaigns.running.trips import tripped_at
+from rig.campaigns.running.trip_advice import Before, Trip, advice_on
+from rig.campaigns.running.tripped_level import tripped_at
 from rig.errors import RecordingError
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.recording.journal import JournalWriter
@@ -87,9 +87,9 @@ class Execution:
         self.next_segment = 0
         self.locked = any(point["accepted"] for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
-        self.kept = KeptRows(loop.tick.row_dtype)
+        self.kept = RowBuffer(loop.tick.row_dtype)
         self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)
-        self.evaluations = Evaluations()
+        self.evaluations = EvaluationThread()
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 

@@ -18,7 +18,7 @@ from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.continuation import what_is_left
 from rig.campaigns.running.execution import Execution, MeasuredBefore, nothing_left
 from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
-from rig.campaigns.running.trips import refuse_tripped
+from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.errors import RigError
 from rig.loop.loop import RunningLoop
 from rig.loop.session import Session, open_session

@@ -7,10 +7,9 @@ import numpy as np
 
 from identification import Backbone, IdentificationError, nonlinear_mode
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged
-from rig.campaigns.evaluation.objections import level_error, level_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record
-from rig.campaigns.evaluation.settled_quality import settled_objection, settled_quality
+from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_objection, settled_quality
+from rig.campaigns.evaluation.lost_samples import bridged
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, of_a_record
 from rig.campaigns.evaluation.vibrations import head, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan

@@ -6,9 +6,9 @@ import numpy as np
 
 from identification import IdentificationError
 from rig.bench import Bench
+from rig.campaigns.evaluation.acceptance import alien_objection, drift_objection, first_of, level_error, level_objection
 from rig.campaigns.evaluation.alien_force import alien_force
-from rig.campaigns.evaluation.objections import alien_objection, drift_objection, first_of, level_error, level_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, of_a_record
 from rig.campaigns.evaluation.vibrations import head, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan

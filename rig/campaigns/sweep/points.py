@@ -8,7 +8,7 @@ import numpy as np
 from controller import AmplitudeLaw
 from identification import IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged, lost_rows, rms_of
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, head, skew_turn
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.sweep.plan import SweepPlan

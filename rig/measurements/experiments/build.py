@@ -11,9 +11,9 @@ from identification import Experiment, IdentificationError
 from identification.signals.decimation import LARGEST_FACTOR
 from identification.validation import positive
 from rig.bench.configuration import validated
+from rig.campaigns.evaluation.drift import of_the_result
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.planning.drift import of_the_result
 from rig.errors import RecordingError
 from rig.measurements import bench_of_recording, point_rows
 from rig.measurements.experiments.periods import Periods, realisation

@@ -9,7 +9,7 @@ import numpy as np
 from identification import decimated
 from identification.pnlss.experiment import Experiment, InitialState
 from identification.signals.decimation import EDGE_SAMPLES
-from rig.campaigns.evaluation.gaps import lost_rows
+from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.vibrations import as_complex
 from rig.measurements.experiments.signals import Signals
 

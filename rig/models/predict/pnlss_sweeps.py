@@ -15,7 +15,7 @@ from identification import (
 )
 from identification.channels import find_role
 from identification.pnlss.errors import estimated_initial_state
-from rig.campaigns.evaluation.gaps import bridged, lost_rows
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of
 from rig.campaigns.sweep.plan import SweepPlan

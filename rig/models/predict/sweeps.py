@@ -18,7 +18,7 @@ from identification import (
     zero_crossings,
 )
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged
+from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.sweep.plan import SweepPlan

@@ -7,6 +7,10 @@ import numpy as np
 from controller import AmplitudeLaw
 from identification import PeriodicVibration
 from rig.bench import Bench
+from rig.campaigns.evaluation.alien_force import alien_force
+from rig.campaigns.evaluation.vibration_quality import lag_scatter_deg
+from rig.campaigns.evaluation.vibrations import frequency_scatter
+from rig.campaigns.planning.locked import SettledPlan
 
 __all__ = [
     "alien_objection",
@@ -16,6 +20,8 @@ __all__ = [
     "level_error",
     "level_objection",
     "phase_objection",
+    "settled_objection",
+    "settled_quality",
     "std_objection",
 ]
 
@@ -102,3 +108,28 @@ def std_objection(frequency: float, accepted_frequency: float, damping: float, a
         if not std <= accepted:
             return f"standard error of the {name} {100.0 * std:.2g} %, accepted up to {100.0 * accepted:g} %"
     return ""
+
+
+def settled_quality(vibration: PeriodicVibration, bench: Bench, rows: np.ndarray) -> dict[str, float]:
+    """Phase error of the fundamental, scatter of frequency and lag, alien part of the force."""
+    return {
+        "phase_error_deg": vibration.phase_error_deg,
+        "frequency_scatter": frequency_scatter(rows["theta_rad"]),
+        "phase_scatter_deg": lag_scatter_deg(rows),
+        "alien_force": alien_force(bench, [rows]),
+    }
+
+
+def settled_objection(
+    plan: SettledPlan, bench: Bench, vibration: PeriodicVibration, quality: dict[str, float], level: str = ""
+) -> str:
+    """Why a recorded point is not accepted, ``level`` the objection to what was held; empty where it is."""
+    return first_of(
+        (
+            phase_objection(quality["phase_error_deg"], plan.accepted_phase_error_deg),
+            level,
+            alien_objection(quality["alien_force"], plan.accepted_alien_force),
+            hunting_objection(quality["frequency_scatter"], plan.accepted_frequency_scatter),
+            drift_objection(bench, vibration, plan.accepted_drift),
+        )
+    )

@@ -7,7 +7,7 @@ from rig.bench import Bench
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.margins import LIMITS, margin_before
-from rig.campaigns.running.trips import TrippedAt
+from rig.campaigns.running.tripped_level import TrippedAt
 from rig.tick.safety.layout import POLARITY_HINT, EndReason
 
 __all__ = ["Advice", "Before", "Trip", "advice_on"]

@@ -5,13 +5,13 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-__all__ = ["Evaluations"]
+__all__ = ["EvaluationThread"]
 
 Points = list[dict[str, Any]]
 
 
-class Evaluations:
-    """Evaluations in a thread of their own, one after the other, and their points in the order in which they were asked for."""
+class EvaluationThread:
+    """Evaluates points one after the other in a thread of its own, and returns them in the order in which they were asked for."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "evaluation")

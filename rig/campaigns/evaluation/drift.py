@@ -3,19 +3,12 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rig.campaigns.planning.plan import Target
-
-__all__ = ["drift_of", "of_the_result", "with_first_repeated"]
+__all__ = ["drift_of", "of_the_result"]
 
 QUANTITIES = {"frequency": "modal_frequency_hz", "damping": "damping_ratio", "amplitude": "amplitude_m"}
 """What is compared, by the key that a point has it under. The modal frequency, for it knows nothing of the lag's error."""
 
 Point = Mapping[str, Any]
-
-
-def with_first_repeated(targets: tuple[Target, ...]) -> tuple[Target, ...]:
-    """The targets and the first of them once more, numbered behind the last, so that all others keep their numbers."""
-    return (*targets, targets[0].model_copy(update={"number": len(targets), "repeats_first": True}))
 
 
 def of_the_result(points: Iterable[Point]) -> list[Point]:
