@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import Channel, Transient
+from rig.campaigns.evaluation.point import point_name
 from rig.exchange.time_data import TimeData
 from rig.measurements.contents import Contents
 
@@ -30,7 +31,7 @@ def time_data_parts(data: TimeData) -> Contents:
     }
     return Contents(
         kind="time-data",
-        title=f"{data.specimen}, point {data.point}",
+        title=f"{data.specimen}, {point_name(data.point)}",
         arrays={
             "time_s": data.start_s + np.arange(data.samples.shape[1]) / data.sample_rate_hz,
             "samples": data.samples,

@@ -25,7 +25,7 @@ class TimeData:
     start_s
         Time of the first sample.
     point
-        Number of the point in the plan, from 0.
+        Stored number of the point, from 0.
     specimen
         Name of what was tested.
 

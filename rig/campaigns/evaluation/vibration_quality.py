@@ -1,24 +1,21 @@
-"""Quality of a recorded vibration: purity of force and response, what harmonics do to the damping, scatter of the lag."""
+"""Quality of a recorded vibration: purity of force and response, bias of the damping by harmonics, scatter of the lag."""
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
 
 from identification import PeriodicVibration
 from rig.bench import Bench
-from rig.campaigns.evaluation.vibrations import as_pairs, quantisation_warnings
+from rig.campaigns.evaluation.point import Purity, Spectrum, Vibration
+from rig.campaigns.evaluation.vibrations import quantisation_warnings
 from rig.campaigns.planning.plan import Column
 
 __all__ = [
     "PURITY_COLUMNS",
     "lag_scatter_deg",
-    "of_a_record",
-    "of_a_vibration",
     "purity",
     "quality_warnings",
-    "what_was_skipped",
+    "vibration_part",
 ]
 
 PURITY_COLUMNS = (
@@ -26,7 +23,7 @@ PURITY_COLUMNS = (
     Column("response_purity", "response purity", "%", ".2f", 100.0, in_line=False),
     Column("power_indicator", "power indicator", "%", ".2f", 100.0, in_line=False),
 )
-"""What every campaign under a lock shows of its points, last."""
+"""Columns that stand last in the tables of all campaigns under a lock."""
 
 BIASED_DAMPING = (
     0.01  # of the fundamental's power in all other harmonics: from here on the two dampings differ too much
@@ -35,8 +32,8 @@ OTHER_MODE = 0.1  # a nonlinear resonance this far from the linear one is rather
 SCATTERING_DEG = 5.0  # a lag that scatters more tells of a signal that hardly stands out of noise and converter steps
 
 
-def purity(vibration: PeriodicVibration) -> dict[str, float]:
-    """How far force, response and power are of the fundamental alone; harmonics from the first, 1 is pure.
+def purity(vibration: PeriodicVibration) -> Purity:
+    """Purity of force, response and power, from the first harmonic on; 1 is pure.
 
     ``force_purity``, ``response_purity``: ``|Y_1| / sqrt(sum |Y_h|^2)`` of force and drive-point displacement.
     ``power_indicator``: active over apparent power, ``P / (F_rms V_rms)`` with ``P = sum P_h``,
@@ -50,12 +47,12 @@ def purity(vibration: PeriodicVibration) -> dict[str, float]:
     powers = 0.5 * np.real(force * np.conj(velocity))
     apparent = 0.5 * float(np.linalg.norm(force) * np.linalg.norm(velocity))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return {
-            "force_purity": float(np.abs(force[0]) / np.linalg.norm(force)),
-            "response_purity": float(np.abs(motion[0]) / np.linalg.norm(motion)),
-            "power_indicator": float(powers.sum() / np.float64(apparent)),
-            "harmonic_power": float(powers[1:].sum() / powers[0]),
-        }
+        return Purity(
+            force_purity=float(np.abs(force[0]) / np.linalg.norm(force)),
+            response_purity=float(np.abs(motion[0]) / np.linalg.norm(motion)),
+            power_indicator=float(powers.sum() / np.float64(apparent)),
+            harmonic_power=float(powers[1:].sum() / powers[0]),
+        )
 
 
 def lag_scatter_deg(rows: np.ndarray) -> float:
@@ -64,8 +61,10 @@ def lag_scatter_deg(rows: np.ndarray) -> float:
     return math.degrees(float(seen.std())) if seen.size else math.nan
 
 
-def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True) -> list[str]:
-    """All that a user should know of a recorded vibration, one line each. Where it was not ``held`` its lag may swing."""
+def quality_warnings(
+    bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True
+) -> tuple[str, ...]:
+    """What a user should know of a recorded vibration, one line each. A lag that was not ``held`` may scatter."""
     out = [*vibration.warnings, *quantisation_warnings(vibration, bench)]
     scatter = lag_scatter_deg(rows) if held else 0.0
     if scatter > SCATTERING_DEG:
@@ -81,56 +80,28 @@ def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: np.ndarra
             f"locked at {vibration.frequency_hz:.4g} Hz, more than {100.0 * OTHER_MODE:g} % from "
             f"specimen.linear_frequency_hz = {linear_hz:g}: another mode looks the same to a phase"
         )
-    share = purity(vibration)["harmonic_power"]
-    if abs(share) > BIASED_DAMPING:
+    share = purity(vibration).harmonic_power
+    if share is not None and abs(share) > BIASED_DAMPING:
         out.append(
             f"harmonics of the force bias the damping: the whole power gives {100.0 * share:+.1f} % against that of the "
             f"fundamental, trusted up to {100.0 * BIASED_DAMPING:g} %"
         )
-    return out
+    return tuple(out)
 
 
-def of_a_vibration(bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True) -> dict[str, Any]:
-    """What every point holds of its vibration beside the numbers of its kind."""
-    return {
-        "voltage_v": float(np.abs(rows["command_v"]).mean()),
-        **purity(vibration),
-        "periods": vibration.periods,
-        "harmonics": as_pairs(vibration.harmonics),
-        "harmonics_std": None if vibration.harmonics_std is None else vibration.harmonics_std.tolist(),
-        "residual_rms": vibration.residual_rms.tolist(),
-        "drift": None if vibration.drift is None else as_pairs(vibration.drift),
-        "warnings": quality_warnings(bench, vibration, rows, held),
-    }
-
-
-def of_a_record(bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, settling: np.void) -> dict[str, Any]:
-    """The same of one that was settled and recorded; ``settling`` is the outcome record of its settle segment."""
-    return {
-        **of_a_vibration(bench, vibration, rows),
-        "settle_periods": float(settling["periods"]),
-        "amplitude_drift": float(settling["drift"]),
-    }
-
-
-def what_was_skipped(points: Iterable[Mapping[str, Any]], planned: int) -> str:
-    """What a run has not got and why: ``3 of 13 points skipped: not settled (0.1 N), unreachable (2 N, 3 N)``.
-
-    Empty where every point was accepted. ``points`` are the last of each number.
-    """
-    seen = 0
-    without: dict[str, list[str]] = {}
-    for point in points:
-        seen += 1
-        if not point["accepted"]:
-            where = [f"{point['level']:.4g} {point['level_unit']}"]
-            if "asked_frequency_hz" in point:
-                where.append(f"{point['asked_frequency_hz']:.6g} Hz")
-            if "asked_phase_lag_deg" in point:
-                where.append(f"{point['asked_phase_lag_deg']:g} deg")
-            without.setdefault(point.get("quality", "rejected").replace("-", " "), []).append(" ".join(where))
-    causes = [f"{cause} ({', '.join(where)})" for cause, where in without.items()]
-    skipped = sum(map(len, without.values())) + planned - seen
-    if planned > seen:
-        causes.append(f"not tried ({planned - seen})")
-    return f"{skipped} of {planned} points skipped: {'; '.join(causes)}" if skipped else ""
+def vibration_part(vibration: PeriodicVibration, rows: np.ndarray) -> Vibration:
+    """What a point holds of the vibration in its ``rows``."""
+    return Vibration(
+        frequency_hz=vibration.frequency_hz,
+        force_n=vibration.force_n,
+        amplitude_m=vibration.amplitude_m,
+        voltage_v=float(np.abs(rows["command_v"]).mean()),
+        purity=purity(vibration),
+        periods=vibration.periods,
+        spectrum=Spectrum(
+            harmonics=vibration.harmonics,
+            harmonics_std=vibration.harmonics_std,
+            residual_rms=vibration.residual_rms,
+            drift=vibration.drift,
+        ),
+    )

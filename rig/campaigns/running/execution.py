@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
-from rig.campaigns.evaluation.vibration_quality import what_was_skipped
+from rig.campaigns.evaluation.point import Point, Quality, RowRange
+from rig.campaigns.evaluation.skipped import what_was_skipped
+from rig.campaigns.evaluation.stored_point import stored
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
@@ -54,7 +56,7 @@ class MeasuredBefore:
     """Numbers, in the plan, of points that were accepted."""
     numbers: Sequence[int] | None = None
     """Number in the recording of every point of the plan; None where the two are the same."""
-    points: tuple[Mapping[str, Any], ...] = ()
+    points: tuple[Point[Any], ...] = ()
     """Points of the recording."""
 
 
@@ -83,9 +85,9 @@ class Execution:
         self.done = len(before.done)
         self.finished = self.done
         self.accepted = self.done
-        self.reported: dict[int, dict[str, Any]] = {}
+        self.reported: dict[int, Point[Any]] = {}
         self.next_segment = 0
-        self.locked = any(point["accepted"] for point in before.points)
+        self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = RowBuffer(loop.tick.row_dtype)
         self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)
@@ -199,15 +201,15 @@ class Execution:
             for point in self.evaluations.take():
                 self._report(point)
 
-    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[dict[str, Any]]:
+    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[Point[Any]]:
         """The points that come out of rows which begin with sample ``first``."""
         found = self.measure(self.bench, self.plan, target, rows, *told)
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
-        stored = self.stored.row_range(first, first + rows.size)
-        where = {} if stored is None else {"first_sample": stored[0], "end_sample": stored[1]}
-        return [{**point, **where} for point in points]
+        kept = self.stored.row_range(first, first + rows.size)
+        where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
+        return [replace(point, rows=where) for point in points]
 
     def _report_rest(self) -> None:
         """Wait for the points that are still being worked out, also after a failure elsewhere or in one of them."""
@@ -252,20 +254,21 @@ class Execution:
         self.next_segment = found.end_segment
         return True
 
-    def _report(self, point: dict[str, Any]) -> None:
+    def _report(self, point: Point[Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
         point = with_plausibility(self.bench, self.plan, point, self.known)
         if self.watch is not None:
             point, stop = self.watch(self.plan, self.known, point)
             if stop:
                 self.loop.request_stop(stop)
-        quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
-        point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
+        if point.quality is Quality.GOOD and point.warnings:
+            point = replace(point, quality=Quality.WARNED)
+        point = replace(point, number=self.numbers[point.number])
         self.known.append(point)
-        self._write(self.journal.point, point)
-        self.reported[point["number"]] = point
+        self._write(self.journal.point, stored(point))
+        self.reported[point.number] = point
         self.finished += 1
-        self.accepted += 1 if point["accepted"] else 0
+        self.accepted += 1 if point.accepted else 0
         self.progress.point(point, self.finished, len(self.targets))
 
     def _mark_unlocked(self) -> None:
@@ -309,8 +312,8 @@ class Execution:
         at = tripped_at(self.tick, self.plan, self.targets)
         frequency_hz = float(self.tick.arrays.loop["omega"][0]) / (2.0 * math.pi)
         trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
-        recorded = [point for point in self.known if "harmonics" in point or point["accepted"]]
-        points = [point for point in recorded if point.get("quality") != "implausible"]
+        recorded = [point for point in self.known if point.spectrum is not None or point.accepted]
+        points = [point for point in recorded if point.quality is not Quality.IMPLAUSIBLE]
         first = not points and (self.in_one_go or len(self.reported) <= 1)
         advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
         return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}
