@@ -20,8 +20,8 @@ LARGEST_SEED = 2**63 - 1
 class Progress(Protocol):
     """Receives what happens while a run is carried out, for a display."""
 
-    def point(self, point: dict[str, Any], number: int, total: int) -> None:
-        """A point was measured or has failed; it is ``number`` of ``total``."""
+    def point(self, point: Any, number: int, total: int) -> None:
+        """A `rig.campaigns.evaluation.point.Point` was measured or has failed; it is ``number`` of ``total``."""
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
         """A chunk of telemetry rows was recorded."""
@@ -33,7 +33,7 @@ class Progress(Protocol):
 class Silent:
     """A `Progress` that shows nothing."""
 
-    def point(self, point: dict[str, Any], number: int, total: int) -> None:
+    def point(self, point: Any, number: int, total: int) -> None:
         """Do nothing."""
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:

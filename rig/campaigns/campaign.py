@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from rig.campaigns.evaluation.point import Point
 from rig.campaigns.planning.plan import Column, Plan
 from rig.recording.reader import Recording
 
@@ -16,6 +17,8 @@ class Campaign:
 
     plan: type[Plan]
     """Model of its plans."""
+    result: type
+    """What its points hold beside what all points have: class of `Point.result`."""
     measure: Callable[..., Any]
     """``(bench, plan, target, rows, settling) -> point``: the result of a recorded point, with its own quality."""
     columns: tuple[Column, ...]
@@ -24,9 +27,9 @@ class Campaign:
     """``module:function`` that draws a recording on an empty page, ``(page, recording)``; loaded when a figure is wanted."""
     in_one_go: bool = False
     """Whether points are measured together: ``(bench, plan, targets, rows, passages, ended) -> points``."""
-    watch: Callable[[Any, Sequence[Mapping[str, Any]], dict[str, Any]], tuple[dict[str, Any], str]] | None = None
-    """``(plan, points so far, point) -> (point, why to stop)``: what a new point tells beside those before it. The run is
-    brought down where the text is not empty."""
+    watch: Callable[[Any, Sequence[Point[Any]], Point[Any]], tuple[Point[Any], str]] | None = None
+    """``(plan, points so far, point) -> (point, why to stop)``: completes a new point by those before it. If the text is not
+    empty, the output is ramped down and the run ends."""
     identity: tuple[str, ...] = ()
     """Keys of a plan that make all its points other vibrations where they are changed."""
     fixed: tuple[str, ...] = ()

@@ -9,6 +9,7 @@ import numpy as np
 from identification import IdentificationError
 from rig.bench import Bench
 from rig.bench.cross_checks import objections
+from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
@@ -115,13 +116,13 @@ def responses_in(recording: Recording) -> Responses | None:
     if not is_check(recording):
         raise RecordingError(f"{recording.path}: is not the recording of a check")
     bench, plan = bench_of_recording(recording), _plan(recording)
-    points = [point for point in recording.latest.values() if "end_sample" in point]
-    if not points:
+    points = [point for point in points_of(recording) if point.rows is not None]
+    if not points or points[-1].rows is None:
         return None
     part = recording.parts[-1]
-    rows = part.read(points[-1]["first_sample"], points[-1]["end_sample"])
+    rows = part.read(points[-1].rows.first_sample, points[-1].rows.end_sample)
     try:
-        return responses_of(bench, spectra_of(bench, plan, {points[-1].get("realisation") or 0: rows}))
+        return responses_of(bench, spectra_of(bench, plan, {points[-1].realisation or 0: rows}))
     except IdentificationError:
         return None
 

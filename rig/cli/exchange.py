@@ -36,7 +36,9 @@ def export_(
     output: Output,
     to: Annotated[str, typer.Option("--to", help="uff, mat or csv; by the ending of OUTPUT.")] = "",
     data: Annotated[str, typer.Option(help="Of a recording: results, or time (samples of its points).")] = "results",
-    point: Annotated[list[int] | None, typer.Option(help="Point whose samples are wanted; may be repeated.")] = None,
+    point: Annotated[
+        list[int] | None, typer.Option(help="Point whose samples are wanted, from 1; may be repeated.", min=1)
+    ] = None,
     item: Annotated[int, typer.Option(help="Which object, where the file holds several.", min=0)] = 0,
     overwrite: Overwrite = False,
     json: Json = False,
@@ -49,7 +51,9 @@ def export_(
 
     format_ = format_of(output, to, "--to")
     keep_existing([file], output, overwrite)
-    written = export_file(file, output, format_, data=data, points=tuple(point or ()), item=item)
+    written = export_file(
+        file, output, format_, data=data, points=tuple(number - 1 for number in point or ()), item=item
+    )
     if json:
         print_json({"file": str(output), "format": format_, "written": [one.summary() for one in written]})
         return

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError, ModalAnalysis
+from rig.campaigns.evaluation.point import point_name
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.errors import ConfigurationError, RecordingError, RigError
@@ -41,7 +43,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     data
         ``results`` (what `rig.measurements` makes of a recording) or ``time`` (the samples of its points).
     points
-        Numbers of the points whose samples are wanted; all that were recorded if empty.
+        Stored numbers, from 0, of the points whose samples are wanted; all that were recorded if empty.
 
     Raises
     ------
@@ -69,9 +71,10 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
 def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:
     """Samples of points in SI as they were recorded, with the output's voltage as the last channel."""
     bench = bench_of_recording(recording)
-    known = sorted({point["number"] for point in recording.points if "end_sample" in point})
+    known = sorted({point.number for point in map(point_from, recording.points) if point.rows is not None})
     if unknown := sorted(set(points) - set(known)):
-        raise RecordingError(f"point {unknown[0]}: nothing was recorded of it; there are {', '.join(map(str, known))}")
+        there = ", ".join(str(number + 1) for number in known)
+        raise RecordingError(f"{point_name(unknown[0])}: nothing was recorded of it; there are {there}")
     empty = TimeData((*channels_of(bench), VOLTAGE), np.zeros((len(bench.channels) + 1, 1)), bench.sample_rate_hz)
     out = []
     for number in points or known:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import Channel, IdentificationError, Transient
+from rig.campaigns.evaluation.point import point_name
 from rig.text.contents import Contents
 
 __all__ = ["TimeData", "time_data_from", "time_data_parts", "transient_from", "transient_parts"]
@@ -28,7 +29,7 @@ class TimeData:
     start_s
         Time of the first sample.
     point
-        Number of the point in the plan, from 0.
+        Stored number of the point, from 0.
     specimen
         Name of what was tested.
 
@@ -77,7 +78,7 @@ def time_data_parts(data: TimeData) -> Contents:
     }
     return Contents(
         kind="time-data",
-        title=f"{data.specimen}, point {data.point}",
+        title=f"{data.specimen}, {point_name(data.point)}",
         arrays={
             "time_s": data.start_s + np.arange(data.samples.shape[1]) / data.sample_rate_hz,
             "samples": data.samples,

@@ -85,7 +85,9 @@ def force_surface(recording: Recording) -> ForceSurface:
 
 
 def sweeps(recording: Recording) -> dict[int, Transient]:
-    """Fundamentals over time of every accepted sweep, by the number of its point; the output is channel ``voltage``.
+    """Fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
+
+    The output is channel ``voltage``.
 
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any sweep.
     """

@@ -2,9 +2,11 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rig.campaigns.evaluation.point import Point, Quality
+from rig.campaigns.evaluation.stored_point import value_of
 from rig.text.console import number
 from rig.text.printable import printable
 
@@ -20,9 +22,9 @@ __all__ = ["FitLines", "RunProgress"]
 LOCK_WORDS = ("searching", "acquiring", "locked", "lost")
 
 
-def _in_a_line(column: "Column", point: Mapping[str, Any]) -> str:
-    """A quantity of a point with its unit, and its name where the unit does not say it."""
-    text = f"{number(point.get(column.key), column.pattern, column.scale):>8} {column.unit}".rstrip()
+def _in_a_line(column: "Column", point: Point[Any]) -> str:
+    """A quantity of a point with its unit; its heading is left out where the unit already identifies it."""
+    text = f"{number(value_of(point, column.key), column.pattern, column.scale):>8} {column.unit}".rstrip()
     return text if column.plain else f"{column.heading} {text}"
 
 
@@ -34,20 +36,19 @@ class RunProgress:
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._finished = 0
 
-    def point(self, point: dict[str, Any], number_done: int, total: int) -> None:
+    def point(self, point: Point[Any], number_done: int, total: int) -> None:
         """Print the point's line."""
         self._finished = number_done
-        head = f"point {number_done:>3}/{total}  {point['level']:>7.4g} {point['level_unit']}"
-        if any(column.key in point for column in self._columns[-1:]):  # the last is a result, whatever comes first
-            columns = [c for c in self._columns if c.in_line and not (c.optional and point.get(c.key) is None)]
-            shown = "  ".join(_in_a_line(column, point) for column in columns)
-            line = f"{head}  {shown}"
-            if "settle_periods" in point:
-                line += f"  settled in {number(point['settle_periods'], '.0f'):>4} periods"
-            line += "" if point["accepted"] else f"  NOT ACCEPTED: {point['reason']}"
-        else:
-            line = f"{head}  FAILED: {point['reason']}"
-        self._print(line)
+        of = f"/{total}" if point.number < total else ""  # a changed plan numbers on behind those before it
+        parts = [f"point {point.number + 1:>3}{of}  {point.level:>7.4g} {point.level_unit}"]
+        if point.evaluated:
+            shown = [c for c in self._columns if c.in_line and not (c.optional and value_of(point, c.key) is None)]
+            parts += [_in_a_line(column, point) for column in shown]
+            if point.settle_periods is not None:
+                parts.append(f"settled in {number(point.settle_periods, '.0f'):>4} periods")
+        if point.quality is not Quality.GOOD:
+            parts.append(f"{point.quality}: {point.reason}" if point.reason else str(point.quality))
+        self._print("  ".join(parts))
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
         """Renew the status line."""

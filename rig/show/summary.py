@@ -1,11 +1,14 @@
 """What is in a file, as one JSON-able dictionary: the answer of ``rig show``."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from rig.campaigns.evaluation.quality import what_was_skipped
+from rig.campaigns.evaluation.drift import drift_of
+from rig.campaigns.evaluation.point import Spectrum
+from rig.campaigns.evaluation.recorded import points_of
+from rig.campaigns.evaluation.skipped import what_was_skipped
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.campaigns.planning.drift import drift_of
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
 from rig.check.assessment import assess, is_check
@@ -17,7 +20,7 @@ from rig.recording.reader import Recording
 
 __all__ = ["summarise", "summarise_recording"]
 
-BULKY = {"harmonics", "harmonics_std", "residual_rms", "drift"}
+BULKY = {one.name for one in fields(Spectrum)}
 """What a point holds and a summary leaves in the file."""
 
 QUALITY = (
@@ -47,7 +50,7 @@ def summarise(path: Path) -> dict[str, Any]:
 
 
 def summarise_recording(recording: Recording) -> dict[str, Any]:
-    """Points with their quality, statistics of the loop, how each part ended."""
+    """Points with their quality, statistics of the loop, how each part ended; points and parts count from 0, as in the file."""
     bench = recording.configuration["bench"]
     plan = plan_from(recording.configuration["plan"], "plan of the recording")
     changed = _changes(recording)
@@ -66,6 +69,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         }
         for number, part in enumerate(recording.parts)
     ]
+    points = points_of(recording)
     ends = [part.end for part in recording.parts if part.end is not None]
     return {
         "kind": recording.kind,
@@ -77,9 +81,9 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "seed": recording.seed,
         "complete": recording.complete,
         "points_planned": len(plan.targets()),
-        "skipped": what_was_skipped(recording.latest.values(), len(plan.targets())),
+        "skipped": what_was_skipped(points, len(plan.targets())),
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
-        "drift": drift_of(recording.latest.values()),
+        "drift": drift_of(points),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {
@@ -98,7 +102,7 @@ def _changes(recording: Recording) -> dict[int, list[str]]:
 
 
 def _shown(point: dict[str, Any], kind: str) -> dict[str, Any]:
-    """A point without what is bulky; what a failed one does not have is None."""
+    """The stored form of a point without its harmonics; what a failed one does not have is None."""
     expected = dict.fromkeys([*(column.key for column in CAMPAIGNS[kind].columns), *QUALITY])
     return {**expected, **{key: value for key, value in point.items() if key not in BULKY}}
 

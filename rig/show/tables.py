@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from rig.arming.run_facts import user_name
+from rig.campaigns.evaluation.point import point_name
+from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.report import say
 from rig.models.files.files import KINDS
@@ -72,9 +74,9 @@ def print_summary(summary: dict[str, Any]) -> None:
         factor = f"{loop['realtime_factor']:.0f} times real time"
         line += f", {loop['periods']} periods, {loop['overruns']} overruns, {factor}"
     print(line)
-    for index, part in enumerate(summary["parts"]):
+    for number_shown, part in enumerate(summary["parts"], 1):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
-        print(f"part {index}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
+        print(f"part {number_shown}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
         if part["lost"]:
             print(f"  not readable: {part['lost']}")
         _print_advice(part)
@@ -96,7 +98,7 @@ def _print_drift(drift: dict[str, Any] | None) -> None:
         f"{name} {number(drift[name], pattern, 100.0)} %"
         for name, pattern in (("frequency", "+.4f"), ("damping", "+.2f"), ("amplitude", "+.2f"))
     ]
-    print(f"drift from the first point to the same again (point {drift['again']}): {', '.join(told)}")
+    print(f"drift from the first point to the same again ({point_name(drift['again'])}): {', '.join(told)}")
 
 
 def _print_about(about: dict[str, Any]) -> None:
@@ -116,25 +118,32 @@ def _print_about(about: dict[str, Any]) -> None:
         print(f"  {line}")
 
 
-def _print_points(kind: str, points: Sequence[dict[str, Any]]) -> None:
+def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
+    """A table of points, then their warnings; points are counted from 1."""
+    result: type[Any] = CAMPAIGNS[kind].result
+    points = [point_from({key: value for key, value in one.items() if value is not None}, result) for one in tables]
     columns = [
         column
         for column in CAMPAIGNS[kind].columns
-        if not column.optional or any(point[column.key] is not None for point in points)
+        if not column.optional or any(value_of(point, column.key) is not None for point in points)
     ]
-    print_table(
-        ("level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality"),
-        [
-            (
-                f"{p['level']:.4g}",
-                p["level_unit"],
-                *(number(p[column.key], column.pattern, column.scale) for column in columns),
-                {True: "yes", False: "no", None: "-"}[p["settled"]],
-                ("the first again" if p.get("repeats_first") else "ok") if p["accepted"] else p["reason"],
-            )
-            for p in points
-        ],
-    )
-    for p in points:
-        for warning in p["warnings"] or ():
-            print(f"warning: point {p['number']}: {warning}")
+    remarks = [point.reason or ("the first again" if point.repeats_first else "") for point in points]
+    headings = ("point", "level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality")
+    rows = [
+        (
+            str(point.number + 1),
+            f"{point.level:.4g}",
+            point.level_unit,
+            *(number(value_of(point, column.key), column.pattern, column.scale) for column in columns),
+            {True: "yes", False: "no", None: "-"}[point.settled],
+            str(point.quality),
+        )
+        for point in points
+    ]
+    if any(remarks):
+        headings = (*headings, "remark")
+        rows = [(*row, remark) for row, remark in zip(rows, remarks, strict=True)]
+    print_table(headings, rows)
+    for point in points:
+        for warning in point.warnings or ():
+            print(f"warning: {point_name(point.number)}: {warning}")

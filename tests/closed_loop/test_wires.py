@@ -8,7 +8,7 @@ import pytest
 
 import rig
 from rig.bench import Bench, load_bench
-from rig.campaigns.evaluation.gaps import lost_rows
+from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.emulator.emulated import emulated
 from rig.measurements import point_rows
 from rig.wire.can.slcan import SlcanBus

@@ -3,9 +3,9 @@
 from identification import Backbone
 from rig.bench.configuration import validated
 from rig.campaigns.backbone.plan import BackbonePlan
-from rig.campaigns.backbone.points import BACKBONE_COLUMNS, backbone_of, measure_backbone_point
+from rig.campaigns.backbone.points import BACKBONE_COLUMNS, ShortPointResult, backbone_of, measure_backbone_point
 from rig.campaigns.campaign import Campaign
-from rig.campaigns.evaluation.recorded import bench_of_recording
+from rig.campaigns.evaluation.recorded import bench_of_recording, points_of
 from rig.recording.reader import Recording
 
 __all__ = ["BACKBONE", "recorded_backbone"]
@@ -16,7 +16,7 @@ def recorded_backbone(recording: Recording) -> Backbone:
     bench = bench_of_recording(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
     return backbone_of(
-        recording.latest.values(),
+        points_of(recording),
         recording.channels,
         bench.specimen.name,
         bench.specimen.drive_mode_shape,
@@ -26,6 +26,7 @@ def recorded_backbone(recording: Recording) -> Backbone:
 
 BACKBONE = Campaign(
     plan=BackbonePlan,
+    result=ShortPointResult,
     measure=measure_backbone_point,
     columns=BACKBONE_COLUMNS,
     draw="rig.campaigns.backbone.figure:draw",

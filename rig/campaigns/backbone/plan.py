@@ -6,9 +6,8 @@ from typing import Literal
 from pydantic import Field
 
 from rig.bench import Bench
-from rig.campaigns.planning.drift import with_first_repeated
 from rig.campaigns.planning.locked import SettledPlan
-from rig.campaigns.planning.plan import Target
+from rig.campaigns.planning.plan import Target, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 

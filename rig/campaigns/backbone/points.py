@@ -1,7 +1,8 @@
-"""From the recorded rows of a backbone's point to its result, and from the results to a backbone in memory."""
+"""The points of a backbone: what they hold, how they come from recorded rows, and how they make a backbone in memory."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,23 +17,30 @@ from identification import (
 )
 from rig.bench import Bench
 from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.evaluation.acceptance import (
+    alien_objection,
+    first_of,
+    phase_objection,
+    settled_point,
+    std_objection,
+    with_settling,
+)
 from rig.campaigns.evaluation.alien_force import alien_force
-from rig.campaigns.evaluation.objections import alien_objection, first_of, phase_objection, std_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record, of_a_vibration
+from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
-from rig.campaigns.evaluation.settled_quality import settled_objection, settled_quality
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import (
     channels_from,
-    head,
+    modal_part,
     not_evaluated,
     recorded_vibration,
     vibration_from,
     within_periods,
 )
-from rig.campaigns.planning.drift import of_the_result
 from rig.campaigns.planning.plan import Column, Target
 
-__all__ = ["BACKBONE_COLUMNS", "backbone_of", "measure_backbone_point"]
+__all__ = ["BACKBONE_COLUMNS", "ShortPointResult", "backbone_of", "measure_backbone_point"]
 
 NEAR = 0.1  # in the logarithm of the amplitude, of what a point of the slow flow is made
 
@@ -46,13 +54,25 @@ BACKBONE_COLUMNS = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class ShortPointResult:
+    """What a short point has beside the rest. Points that are settled have none."""
+
+    growth_1_s: float
+    """Relative rate at which the amplitude still changed, 1/s."""
+    measured_force_n: float
+    """Fundamental of the force as it was, N."""
+    periods_in_all: float
+    """Periods of the ramp and of what follows."""
+
+
 def measure_backbone_point(
     bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray, settling: np.void
-) -> dict[str, Any]:
-    """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment.
+) -> Point[ShortPointResult]:
+    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment.
 
-    A point whose recorded fundamental is too far from the wanted phase is kept, marked as not accepted. By the slow flow the
-    rows begin with the ramp to the point.
+    A point whose fundamental is too far from the wanted phase is kept and not accepted. The rows of a short point begin with
+    the ramp to it.
     """
     if plan.evaluation == "slow-flow":
         return _short_point(bench, plan, target, rows)
@@ -64,25 +84,11 @@ def measure_backbone_point(
         mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=True)
-    found = settled_quality(vibration, bench, rows)
-    reason = settled_objection(plan, bench, vibration, found)
-    damping = float(mode.damping_ratio[0])
-    return {
-        **head(plan, target),
-        "settled": True,
-        "accepted": not reason,
-        "reason": reason,
-        "force_n": vibration.force_n,
-        "frequency_hz": vibration.frequency_hz,
-        "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
-        "damping_ratio": damping if math.isfinite(damping) else None,
-        "amplitude_m": vibration.amplitude_m,
-        **found,
-        **of_a_record(bench, vibration, rows, settling),
-    }
+    point = settled_point(plan, target, bench, vibration, rows)
+    return with_settling(replace(point, modal=modal_part(mode)), settling)
 
 
-def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> dict[str, Any]:
+def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> Point[ShortPointResult]:
     """A point from the ramp to it and what follows, settled or not."""
     try:
         flow = recorded_flow(bench, rows, plan.harmonics)
@@ -96,25 +102,27 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndar
     reason = reason or next((why for why, at in flagged(bench, rows, flow).items() if at.any()), "")
     turned = np.unwrap(rows["theta_rad"].astype(float))
     grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz
-    return {
-        **head(plan, target),
-        "settled": abs(error_deg) <= plan.settle.phase_deg and abs(grown) <= plan.settle.amplitude,
-        "accepted": not reason,
-        "reason": reason,
-        "force_n": vibration.force_n,
-        "frequency_hz": vibration.frequency_hz,
-        "modal_frequency_hz": found.modal_frequency_hz,
-        "modal_frequency_std_hz": found.modal_frequency_std_hz,
-        "damping_ratio": found.damping_ratio,
-        "damping_ratio_std": found.damping_ratio_std,
-        "amplitude_m": vibration.amplitude_m,
-        "phase_error_deg": error_deg,
-        "growth_1_s": found.growth_1_s,
-        "measured_force_n": found.force_n,
-        "alien_force": alien,
-        "periods_in_all": float(turned[-1] - turned[0]) / (2.0 * math.pi),
-        **of_a_vibration(bench, vibration, rows, held=False),
-    }
+    return replace(
+        planned_point(plan, target),
+        settled=abs(error_deg) <= plan.settle.phase_deg and abs(grown) <= plan.settle.amplitude,
+        reason=reason,
+        quality=Quality.of(reason),
+        warnings=quality_warnings(bench, vibration, rows, held=False),
+        alien_force=alien,
+        vibration=vibration_part(vibration, rows),
+        modal=Modal(
+            modal_frequency_hz=found.modal_frequency_hz,
+            damping_ratio=found.damping_ratio,
+            modal_frequency_std_hz=found.modal_frequency_std_hz,
+            damping_ratio_std=found.damping_ratio_std,
+        ),
+        lock=Lock(phase_error_deg=error_deg),
+        result=ShortPointResult(
+            growth_1_s=found.growth_1_s,
+            measured_force_n=found.force_n,
+            periods_in_all=float(turned[-1] - turned[0]) / (2.0 * math.pi),
+        ),
+    )
 
 
 def _arrival_s(flow: SlowFlow) -> float:
@@ -138,14 +146,14 @@ def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, al
 
 
 def backbone_of(
-    points: Iterable[Mapping[str, Any]],
+    points: Iterable[Point[Any]],
     channels: Sequence[Mapping[str, Any]],
     specimen: str,
     drive_mode_shape: float | None,
     phase_lag_target_deg: float,
 ) -> Backbone:
     """The accepted points of a recording as measurements; raises `IdentificationError` where there is none."""
-    accepted = [point for point in of_the_result(points) if point["accepted"]]
+    accepted = [point for point in of_the_result(points) if point.accepted]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
     kinds = channels_from(channels)
@@ -154,6 +162,6 @@ def backbone_of(
         vibrations,
         specimen,
         drive_mode_shape,
-        tuple(point["direction"] for point in accepted),
-        tuple(point["repeat"] for point in accepted),
+        tuple(point.direction for point in accepted),
+        tuple(point.repeat for point in accepted),
     )

@@ -5,10 +5,11 @@ from rig.campaigns.campaign import Campaign
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
 from rig.campaigns.continuous_backbone.points import (
     CONTINUOUS_BACKBONE_COLUMNS,
+    ContinuousBackboneResult,
     continuous_backbones_of,
     measure_continuous_backbone,
 )
-from rig.campaigns.evaluation.recorded import bench_of_recording
+from rig.campaigns.evaluation.recorded import bench_of_recording, points_of
 from rig.recording.reader import Recording
 
 __all__ = ["CONTINUOUS_BACKBONE", "recorded_continuous_backbones", "recorded_mean_backbone"]
@@ -18,7 +19,7 @@ def recorded_continuous_backbones(recording: Recording) -> tuple[ContinuousBackb
     """The accepted points, one backbone per repeat, with what was found on the way up and on the way down."""
     specimen = bench_of_recording(recording).specimen
     return continuous_backbones_of(
-        recording.latest.values(), recording.channels, specimen.name, specimen.drive_mode_shape
+        points_of(recording, ContinuousBackboneResult), recording.channels, specimen.name, specimen.drive_mode_shape
     )
 
 
@@ -33,6 +34,7 @@ def recorded_mean_backbone(recording: Recording) -> Backbone:
 
 CONTINUOUS_BACKBONE = Campaign(
     plan=ContinuousBackbonePlan,
+    result=ContinuousBackboneResult,
     measure=measure_continuous_backbone,
     in_one_go=True,
     columns=CONTINUOUS_BACKBONE_COLUMNS,

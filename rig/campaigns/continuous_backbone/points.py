@@ -1,7 +1,8 @@
-"""From the rows of ramps up and down to points at levels, and from these to continuous backbones in memory."""
+"""The points of a continuous backbone: what they hold, how they come from rows of ramps, and continuous backbones in memory."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,16 +18,33 @@ from identification import (
 from rig.bench import Bench
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
 from rig.campaigns.continuous_backbone.ways import WAYS, Way, both_ways, rows_near
+from rig.campaigns.evaluation.acceptance import alien_objection, first_of, std_objection
 from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.measured_together import Passage
-from rig.campaigns.evaluation.objections import alien_objection, first_of, std_objection
 from rig.campaigns.evaluation.plausibility import with_plausible_ways
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_vibration
+from rig.campaigns.evaluation.point import (
+    Lock,
+    Modal,
+    Point,
+    Quality,
+    planned_point,
+    point_name,
+    result_of,
+    vibration_of,
+)
 from rig.campaigns.evaluation.recorded_flow import recorded_flow
-from rig.campaigns.evaluation.vibrations import channels_from, head, not_evaluated, vibration_from
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
+from rig.campaigns.evaluation.vibrations import channels_from, not_evaluated, vibration_from
 from rig.campaigns.planning.plan import Column, Target
+from rig.errors import RecordingError
 
-__all__ = ["CONTINUOUS_BACKBONE_COLUMNS", "continuous_backbones_of", "measure_continuous_backbone"]
+__all__ = [
+    "CONTINUOUS_BACKBONE_COLUMNS",
+    "ContinuousBackboneResult",
+    "OneWay",
+    "continuous_backbones_of",
+    "measure_continuous_backbone",
+]
 
 CONTINUOUS_BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),
@@ -40,6 +58,50 @@ CONTINUOUS_BACKBONE_COLUMNS = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class OneWay:
+    """What was found at a level on one way."""
+
+    modal_frequency_hz: float
+    """Modal frequency, Hz."""
+    damping_ratio: float
+    """Damping ratio."""
+    stiffness: float
+    """Modal stiffness, 1/s^2."""
+    damping_1_s: float
+    """Modal damping, 1/s."""
+    stiffness_std: float
+    """Standard error of the stiffness, 1/s^2."""
+    damping_std_1_s: float
+    """Standard error of the damping, 1/s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContinuousBackboneResult:
+    """What a point of a continuous backbone has beside the rest, which is the mean of the ways."""
+
+    periods_of_both_ways: float
+    """Periods of both ways."""
+    up: OneWay | None = None
+    """The way up; None where it did not pass the level."""
+    down: OneWay | None = None
+    """The way down; None where it did not pass the level."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Together:
+    """Levels that were passed on the same ways, evaluated together."""
+
+    covered: tuple[str, ...]
+    """Names of these ways."""
+    found: ContinuousBackbone
+    """What was found; a single way stands in both places."""
+    flow: SlowFlow
+    """The slow flow of both ways."""
+    missing: str
+    """Why a way is missing; empty where none is."""
+
+
 def measure_continuous_backbone(
     bench: Bench,
     plan: ContinuousBackbonePlan,
@@ -47,18 +109,18 @@ def measure_continuous_backbone(
     rows: np.ndarray,
     passages: Sequence[Passage],
     ended: str,
-) -> list[dict[str, Any]]:
-    """The results at all levels of a way up and a way down; ``ended`` says why the output was brought down, if it was.
+) -> list[Point[ContinuousBackboneResult]]:
+    """The points at all levels of a way up and a way down; ``ended`` says why the output was brought down, if it was.
 
-    A level that was passed on one way only is shown with what was found there, marked as not accepted; one that was not
-    passed at all has failed.
+    A level that was passed on one way only has what was found there, and is not accepted; one that was not passed at all has
+    failed.
     """
     try:
         flow = recorded_flow(bench, rows, plan.harmonics, plan.plant)
         ways = both_ways(bench, plan, rows, passages, flow, ended)
         points = _measured(bench, plan, targets, flow, ways, rows)
     except (IdentificationError, ArithmeticError) as error:
-        return [{**not_evaluated(plan, target, error, settled=False), "direction": "both"} for target in targets]
+        return [replace(not_evaluated(plan, target, error, settled=False), direction="both") for target in targets]
     return [points[target.number] for target in targets]
 
 
@@ -69,13 +131,13 @@ def _measured(
     flow: SlowFlow,
     ways: Mapping[str, Way],
     rows: np.ndarray,
-) -> dict[int, dict[str, Any]]:
+) -> dict[int, Point[ContinuousBackboneResult]]:
     """Points by number: from both ways, from one, or failed."""
     groups: dict[tuple[str, ...], list[Target]] = {}
     for target in targets:
         covered = tuple(name for name in WAYS if ways[name].covers(target.level))
         groups.setdefault(covered, []).append(target)
-    out: dict[int, dict[str, Any]] = {}
+    out: dict[int, Point[ContinuousBackboneResult]] = {}
     for covered, some in groups.items():
         missing = _together({name: ways[name].why for name in WAYS if name not in covered})
         if not covered:
@@ -89,9 +151,10 @@ def _measured(
             bandwidth=plan.bandwidth,
             specimen=bench.specimen.name,
         )
+        together = _Together(covered, found, flow, missing)
         for index, target in enumerate(some):
             near = [rows_near(bench, rows, ways[name], target.level) for name in covered]
-            out[target.number] = _point(bench, plan, target, found, index, covered, flow, near, missing)
+            out[target.number] = _point(bench, plan, target, together, index, near)
     return out
 
 
@@ -102,105 +165,114 @@ def _together(reasons: Mapping[str, str]) -> str:
     return "; ".join(f"way {name}: {why}" for name, why in reasons.items())
 
 
-def _failed(plan: ContinuousBackbonePlan, target: Target, reason: str) -> dict[str, Any]:
-    return {**head(plan, target), "direction": "both", "settled": False, "accepted": False, "reason": reason}
+def _failed(plan: ContinuousBackbonePlan, target: Target, reason: str) -> Point[ContinuousBackboneResult]:
+    return replace(planned_point(plan, target), direction="both", settled=False).refused(reason)
 
 
 def _point(
     bench: Bench,
     plan: ContinuousBackbonePlan,
     target: Target,
-    found: ContinuousBackbone,
+    together: _Together,
     index: int,
-    covered: Sequence[str],
-    flow: SlowFlow,
     pieces: Sequence[np.ndarray],
-    missing: str,
-) -> dict[str, Any]:
-    """One level: the mean of both ways, what each gave, and how well it is known."""
-    mode = found.nonlinear_mode()
-    vibration = found.backbone.points[index]
+) -> Point[ContinuousBackboneResult]:
+    """One level, the ``index``-th of those evaluated together: the mean of the ways, and how well it is known.
+
+    ``pieces`` are the rows near the level, way by way.
+    """
+    covered, found = together.covered, together.found
+    mode, vibration = found.nonlinear_mode(), found.backbone.points[index]
     frequency, damping = float(mode.modal_frequency_hz[index]), float(mode.damping_ratio[index])
-    # One way alone stands in both places: its noise does not average out.
-    alone = math.sqrt(2.0) if len(covered) == 1 else 1.0
-    std = {"modal_frequency_hz": alone * float(mode.modal_frequency_std_hz[index])}
-    std["damping_ratio"] = alone * float(mode.damping_ratio_std[index])
-    stds = (std["modal_frequency_hz"] / frequency, std["damping_ratio"] / abs(damping))
+    # A single way stands in both places: its noise does not average out.
+    single = math.sqrt(2.0) if len(covered) == 1 else 1.0
+    frequency_std = single * float(mode.modal_frequency_std_hz[index])
+    damping_std = single * float(mode.damping_ratio_std[index])
+    stds = (frequency_std / frequency, damping_std / abs(damping))
     alien = alien_force(bench, pieces)
     reason = first_of(
         (
-            f"passed on the way {covered[0]} only ({missing})" if missing else "",
+            f"passed on the way {covered[0]} only ({together.missing})" if together.missing else "",
             std_objection(stds[0], plan.accepted_frequency_std, stds[1], plan.accepted_damping_std),
             alien_objection(alien, plan.accepted_alien_force),
         )
     )
-    near = np.abs(np.log(flow.amplitude_m / target.level)) < plan.bandwidth
+    near = np.abs(np.log(together.flow.amplitude_m / target.level)) < plan.bandwidth
     # The lag itself swings while the level is ramped; this is the one that a settled vibration so far off would have.
-    lags = np.degrees(np.arctan((flow.frequency_hz[near] / frequency - 1.0) / abs(damping)))
-    point = {
-        **head(plan, target),
-        "direction": "both" if len(covered) == 2 else covered[0],
-        "settled": None,
-        "accepted": not reason,
-        "reason": reason,
-        "force_n": vibration.force_n,
-        "frequency_hz": vibration.frequency_hz,
-        "modal_frequency_hz": frequency,
-        "modal_frequency_std_hz": std["modal_frequency_hz"],
-        "damping_ratio": damping,
-        "damping_ratio_std": std["damping_ratio"],
-        "amplitude_m": vibration.amplitude_m,
-        "phase_error_deg": float(lags[np.argmax(np.abs(lags))]) if lags.size else None,
-        **{name: _one_way(found, WAYS.index(name) if len(covered) == 2 else 0, index) for name in covered},
-        "alien_force": alien,
-        "periods_of_both_ways": found.periods,
-        **of_a_vibration(bench, vibration, np.concatenate(pieces), held=False),
-    }
+    lags = np.degrees(np.arctan((together.flow.frequency_hz[near] / frequency - 1.0) / abs(damping)))
+    ways = {name: _one_way(found, WAYS.index(name) if len(covered) == 2 else 0, index) for name in covered}
+    rows = np.concatenate(pieces)
+    point = replace(
+        planned_point(plan, target),
+        direction="both" if len(covered) == 2 else "up" if "up" in covered else "down",
+        reason=reason,
+        quality=Quality.of(reason),
+        warnings=quality_warnings(bench, vibration, rows, held=False),
+        alien_force=alien,
+        vibration=vibration_part(vibration, rows),
+        modal=Modal(
+            modal_frequency_hz=frequency,
+            damping_ratio=damping,
+            modal_frequency_std_hz=frequency_std,
+            damping_ratio_std=damping_std,
+        ),
+        lock=Lock(phase_error_deg=float(lags[np.argmax(np.abs(lags))]) if lags.size else None),
+        result=ContinuousBackboneResult(periods_of_both_ways=found.periods, up=ways.get("up"), down=ways.get("down")),
+    )
     return with_plausible_ways(bench, point, pieces)
 
 
-def _one_way(found: ContinuousBackbone, way: int, index: int) -> dict[str, float]:
+def _one_way(found: ContinuousBackbone, way: int, index: int) -> OneWay:
     """What one way gave at a level."""
-    return {
-        "modal_frequency_hz": float(found.modal_frequency_hz[way, index]),
-        "damping_ratio": float(found.damping_ratio[way, index]),
-        "stiffness": float(found.stiffness[way, index]),
-        "damping_1_s": float(found.damping_1_s[way, index]),
-        "stiffness_std": float(found.stiffness_std[way, index]),
-        "damping_std_1_s": float(found.damping_std_1_s[way, index]),
-    }
+    return OneWay(
+        modal_frequency_hz=float(found.modal_frequency_hz[way, index]),
+        damping_ratio=float(found.damping_ratio[way, index]),
+        stiffness=float(found.stiffness[way, index]),
+        damping_1_s=float(found.damping_1_s[way, index]),
+        stiffness_std=float(found.stiffness_std[way, index]),
+        damping_std_1_s=float(found.damping_std_1_s[way, index]),
+    )
 
 
 def continuous_backbones_of(
-    points: Iterable[Mapping[str, Any]],
+    points: Iterable[Point[ContinuousBackboneResult]],
     channels: Sequence[Mapping[str, Any]],
     specimen: str,
     drive_mode_shape: float | None,
 ) -> tuple[ContinuousBackbone, ...]:
     """The accepted points of a recording, one continuous backbone per repeat; raises `IdentificationError` without any."""
     kinds = channels_from(channels)
-    repeats: dict[int, list[Mapping[str, Any]]] = {}
+    repeats: dict[int, list[Point[ContinuousBackboneResult]]] = {}
     for point in points:
-        if point["accepted"]:
-            repeats.setdefault(point["repeat"], []).append(point)
+        if point.accepted:
+            repeats.setdefault(point.repeat, []).append(point)
     if not repeats:
         raise IdentificationError("points: none of the recording was accepted")
     return tuple(_from_points(accepted, kinds, specimen, drive_mode_shape) for accepted in repeats.values())
 
 
 def _from_points(
-    points: Sequence[Mapping[str, Any]], channels: tuple[Channel, ...], specimen: str, drive_mode_shape: float | None
+    points: Sequence[Point[ContinuousBackboneResult]],
+    channels: tuple[Channel, ...],
+    specimen: str,
+    drive_mode_shape: float | None,
 ) -> ContinuousBackbone:
-    def both(name: str) -> np.ndarray:
-        return np.array([[point[way][name] for point in points] for way in WAYS])
-
+    ways = [_both_ways(point) for point in points]
     vibrations = tuple(vibration_from(point, channels) for point in points)
     return ContinuousBackbone(
         backbone=Backbone(vibrations, specimen, drive_mode_shape),
-        amplitude_m=np.array([point["amplitude_m"] for point in points]),
-        stiffness=both("stiffness"),
-        damping_1_s=both("damping_1_s"),
-        stiffness_std=both("stiffness_std"),
-        damping_std_1_s=both("damping_std_1_s"),
-        periods=points[0]["periods_of_both_ways"],
+        amplitude_m=np.array([vibration_of(point).amplitude_m for point in points]),
+        stiffness=np.array([[way.stiffness for way in both] for both in ways]).T,
+        damping_1_s=np.array([[way.damping_1_s for way in both] for both in ways]).T,
+        stiffness_std=np.array([[way.stiffness_std for way in both] for both in ways]).T,
+        damping_std_1_s=np.array([[way.damping_std_1_s for way in both] for both in ways]).T,
+        periods=result_of(points[0]).periods_of_both_ways,
     )
+
+
+def _both_ways(point: Point[ContinuousBackboneResult]) -> tuple[OneWay, OneWay]:
+    """What was found on the ways up and down past an accepted level."""
+    result = result_of(point)
+    if result.up is None or result.down is None:
+        raise RecordingError(f"{point_name(point.number)}: is accepted, but holds one way only")
+    return result.up, result.down

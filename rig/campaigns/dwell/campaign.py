@@ -1,5 +1,6 @@
 """The dwell campaign: its declaration, and the course of a dwell in a recording."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,8 @@ from numpy.typing import NDArray
 
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.dwell.plan import DwellPlan
-from rig.campaigns.dwell.points import DWELL_COLUMNS, measure_mean, watch_drift
+from rig.campaigns.dwell.points import DWELL_COLUMNS, DwellResult, measure_mean, watch_drift
+from rig.campaigns.evaluation.point import vibration_of
 from rig.campaigns.evaluation.recorded import accepted_points, specimen_of
 from rig.recording.reader import Recording
 from rig.text.contents import Contents
@@ -39,19 +41,17 @@ class DwellCourse:
 
 def recorded_course(recording: Recording) -> DwellCourse:
     """The accepted means of a recording; raises `identification.IdentificationError` without any."""
-    points = list(accepted_points(recording).values())
-
-    def over(key: str) -> NDArray[np.float64]:
-        return np.array([np.nan if point.get(key) is None else point[key] for point in points], float)
-
+    points = accepted_points(recording, DwellResult)
+    vibrations = [vibration_of(point) for point in points]
+    results, modal = [point.result for point in points], [point.modal for point in points]
     return DwellCourse(
-        cycles=over("cycles"),
-        time_s=over("time_s"),
-        frequency_hz=over("frequency_hz"),
-        modal_frequency_hz=over("modal_frequency_hz"),
-        damping_ratio=over("damping_ratio"),
-        amplitude_m=over("amplitude_m"),
-        force_n=over("force_n"),
+        cycles=_column(None if result is None else result.cycles for result in results),
+        time_s=_column(None if result is None else result.time_s for result in results),
+        frequency_hz=_column(vibration.frequency_hz for vibration in vibrations),
+        modal_frequency_hz=_column(None if one is None else one.modal_frequency_hz for one in modal),
+        damping_ratio=_column(None if one is None else one.damping_ratio for one in modal),
+        amplitude_m=_column(vibration.amplitude_m for vibration in vibrations),
+        force_n=_column(vibration.force_n for vibration in vibrations),
         specimen=specimen_of(recording),
     )
 
@@ -62,8 +62,14 @@ def _table(recording: Recording) -> Contents:
     return Contents("dwell", course["specimen"], arrays, {"specimen": course["specimen"]}, dict.fromkeys(arrays, 0))
 
 
+def _column(values: Iterable[float | None]) -> NDArray[np.float64]:
+    """NaN where there is no value."""
+    return np.array([np.nan if value is None else value for value in values], float)
+
+
 DWELL = Campaign(
     plan=DwellPlan,
+    result=DwellResult,
     measure=measure_mean,
     watch=watch_drift,
     columns=DWELL_COLUMNS,

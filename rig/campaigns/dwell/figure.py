@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.campaigns.dwell.campaign import recorded_course
+from rig.campaigns.dwell.points import DwellResult
 from rig.campaigns.evaluation.figure import heading
+from rig.campaigns.evaluation.recorded import points_of
 from rig.figures.style import MAIN, REJECTED, SECOND, engineering
 from rig.recording.reader import Recording
 
@@ -30,7 +32,8 @@ def draw(page: "Figure", recording: Recording) -> None:
         (axes[1, 0], amplitude, f"displacement amplitude, {unit}", "" if held else "amplitude"),
         (axes[1, 1], course.force_n, "fundamental force, N", "amplitude" if held else ""),
     )
-    left_out = [point["cycles"] for point in recording.latest.values() if not point["accepted"] and "cycles" in point]
+    results = [point.result for point in points_of(recording, DwellResult) if not point.accepted]
+    left_out = [result.cycles for result in results if result is not None and result.cycles is not None]
     for axis, values, label, watched in panels:
         axis.plot(course.cycles, values, "o-", ms=2.5, lw=0.9, color=MAIN)
         axis.set_ylabel(label)

@@ -1,22 +1,22 @@
-"""From the rows of a mean to its result, and from the means so far to changes, alarms and the end of a dwell."""
+"""The means of a dwell: what they hold, how they come from recorded rows, and which changes raise an alarm or end the test."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from identification import Backbone, IdentificationError, nonlinear_mode
 from rig.bench import Bench
 from rig.campaigns.dwell.plan import DwellPlan
-from rig.campaigns.evaluation.gaps import bridged
-from rig.campaigns.evaluation.objections import level_error, level_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_vibration
-from rig.campaigns.evaluation.settled_quality import settled_objection, settled_quality
-from rig.campaigns.evaluation.vibrations import head, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point
+from rig.campaigns.evaluation.lost_samples import bridged
+from rig.campaigns.evaluation.point import PART, Point
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
+from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 
-__all__ = ["DWELL_COLUMNS", "measure_mean", "watch_drift"]
+__all__ = ["DWELL_COLUMNS", "Changes", "DwellResult", "HeldLevel", "Length", "measure_mean", "watch_drift"]
 
 DWELL_COLUMNS = (
     Column("cycles", "cycles", "", ".0f"),
@@ -29,96 +29,144 @@ DWELL_COLUMNS = (
     *PURITY_COLUMNS,
 )
 
-WATCHED = {"frequency": "frequency_change", "damping": "damping_change", "amplitude": "amplitude_change"}
-"""Key of the change that each limit of a plan is about."""
+
+@dataclass(frozen=True, kw_only=True)
+class Length:
+    """Length of a mean."""
+
+    cycles_in_mean: float
+    """Cycles."""
+    seconds_in_mean: float
+    """Seconds."""
 
 
-def measure_mean(bench: Bench, plan: DwellPlan, target: Target, rows: np.ndarray, settling: np.void) -> dict[str, Any]:
-    """Frequency, damping and amplitude of one mean, with its own quality; its whole periods are evaluated."""
+@dataclass(frozen=True, kw_only=True)
+class HeldLevel:
+    """What was held over a mean."""
+
+    force_rms_n: float
+    """RMS of the force's samples without their mean, with all their harmonics, N."""
+    level_error: float | None
+    """Relative deviation of what a loop held from its level; None with levels in volts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changes:
+    """Relative changes from the first accepted mean; None where one of the two means has no such quantity."""
+
+    frequency_change: float | None
+    """Of the modal frequency."""
+    damping_change: float | None
+    """Of the damping ratio."""
+    amplitude_change: float | None
+    """Of the displacement amplitude of the drive point; of the force, where the displacement is held."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DwellResult:
+    """What a mean has beside what all points have."""
+
+    cycles: float | None = None
+    """Cycles since the first mean began, at the middle of this one."""
+    time_s: float | None = None
+    """Seconds since the first mean began, at the middle of this one."""
+    length: Length | None = field(default=None, metadata=PART)
+    """Its length; None where nothing was recorded."""
+    held: HeldLevel | None = field(default=None, metadata=PART)
+    """What was held; None where nothing was evaluated."""
+    changes: Changes | None = field(default=None, metadata=PART)
+    """Changes from the first accepted mean; None where it was not accepted."""
+
+
+def measure_mean(
+    bench: Bench, plan: DwellPlan, target: Target, rows: np.ndarray, settling: np.void
+) -> Point[DwellResult]:
+    """Frequency, damping and amplitude of one mean, with its quality; its whole periods are evaluated."""
     turned = np.unwrap(rows["theta_rad"].astype(float))
     cycles = float(turned[-1] - turned[0]) / (2.0 * math.pi) * rows.size / max(1, rows.size - 1)
-    length = {"cycles_in_mean": cycles, "seconds_in_mean": rows.size / bench.sample_rate_hz}
+    length = Length(cycles_in_mean=cycles, seconds_in_mean=rows.size / bench.sample_rate_hz)
     rows = rows[within_periods(rows["theta_rad"], int(cycles))]
     try:
         lag_deg = plan.controller.phase_lag_deg + 180.0
         vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=lag_deg)
         mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
     except (IdentificationError, ArithmeticError) as error:
-        return {**not_evaluated(plan, target, error, settled=True), **length}
+        return replace(not_evaluated(plan, target, error, settled=True), result=DwellResult(length=length))
     force_rms_n = float(bridged(rows)[:-1, bench.index_of("force")].std())
     missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
-    found = settled_quality(vibration, bench, rows)
     off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
-    reason = settled_objection(plan, bench, vibration, found, off_level)
-    damping = float(mode.damping_ratio[0])
-    return {
-        **head(plan, target),
-        "settled": True,
-        "accepted": not reason,
-        "reason": reason,
-        "frequency_hz": vibration.frequency_hz,
-        "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
-        "damping_ratio": damping if math.isfinite(damping) else None,
-        "amplitude_m": vibration.amplitude_m,
-        "force_n": vibration.force_n,
-        "force_rms_n": force_rms_n,
-        "level_error": missed,
-        **length,
-        **found,
-        **of_a_vibration(bench, vibration, rows),
-    }
+    point = settled_point(plan, target, bench, vibration, rows, off_level)
+    held = HeldLevel(force_rms_n=force_rms_n, level_error=missed)
+    return replace(point, modal=modal_part(mode), result=DwellResult(length=length, held=held))
 
 
 def watch_drift(
-    plan: DwellPlan, known: Sequence[Mapping[str, Any]], point: dict[str, Any]
-) -> tuple[dict[str, Any], str]:
+    plan: DwellPlan, known: Sequence[Point[DwellResult]], point: Point[DwellResult]
+) -> tuple[Point[DwellResult], str]:
     """The point with cycles and time at its middle and its changes from the first accepted mean; and why the test ends, if so.
 
-    Cycles and seconds count from the first mean, over all parts of a recording; those of a mean that failed count too, but the
+    Cycles and seconds count from the first mean, over all parts of a recording. Those of a mean that failed count too; the
     ramp and the settling at the beginning of a part do not.
     """
-    cycles = sum(float(one.get("cycles_in_mean", one.get("settle_periods", 0.0))) for one in known)
-    seconds = sum(_seconds(one) for one in known)
-    point = {
-        **point,
-        "cycles": cycles + 0.5 * float(point.get("cycles_in_mean", 0.0)),
-        "time_s": seconds + 0.5 * _seconds(point),
+    cycles = sum(map(_cycles, known)) + 0.5 * _cycles_in_mean(point)
+    seconds = sum(map(_seconds, known)) + 0.5 * _seconds(point)
+    result = replace(point.result or DwellResult(), cycles=cycles, time_s=seconds)
+    if not point.accepted:
+        return replace(point, result=result), ""
+    first = next((one for one in known if one.accepted), point)
+    before, now = _watched(plan, first), _watched(plan, point)
+    changes = {name: _change(before[name], now[name]) for name in now}
+    result = replace(
+        result,
+        changes=Changes(
+            frequency_change=changes["frequency"],
+            damping_change=changes["damping"],
+            amplitude_change=changes["amplitude"],
+        ),
+    )
+    point = replace(point, result=result)
+    alarms = [f"alarm: {text}" for text in _beyond(plan, "alarm", changes)]
+    abort = next(_beyond(plan, "abort", changes), "")
+    return point.warned(*alarms) if alarms else point, f"{abort}, after {cycles:.0f} cycles" if abort else ""
+
+
+def _watched(plan: DwellPlan, point: Point[DwellResult]) -> dict[str, float | None]:
+    """Quantities of a mean, by the name of their limits in the plan; of force and displacement the one that is not held."""
+    modal, vibration = point.modal, point.vibration
+    amplitude = None if vibration is None else vibration.force_n if plan.level_unit == "m" else vibration.amplitude_m
+    return {
+        "frequency": None if modal is None else modal.modal_frequency_hz,
+        "damping": None if modal is None else modal.damping_ratio,
+        "amplitude": amplitude,
     }
-    if not point["accepted"]:
-        return point, ""
-    first = next((one for one in known if one["accepted"]), point)
-    amplitude = "force_n" if plan.level_unit == "m" else "amplitude_m"  # what is held does not change
-    keys = {"frequency": "modal_frequency_hz", "damping": "damping_ratio", "amplitude": amplitude}
-    changes = {name: _change(first.get(key), point.get(key)) for name, key in keys.items()}
-    point |= {WATCHED[name]: change for name, change in changes.items()}
-    alarms = _beyond(plan, "alarm", changes)
-    if alarms:
-        point["warnings"] = [*point.get("warnings", []), *(f"alarm: {text}" for text in alarms)]
-    aborts = _beyond(plan, "abort", changes)
-    return point, f"{aborts[0]}, after {point['cycles']:.0f} cycles" if aborts else ""
 
 
-def _seconds(point: Mapping[str, Any]) -> float:
-    if "seconds_in_mean" in point:
-        return float(point["seconds_in_mean"])
-    return 0.0
+def _cycles(point: Point[DwellResult]) -> float:
+    """Cycles that a mean has added: those of its record, or those until it failed."""
+    length = None if point.result is None else point.result.length
+    return (point.settle_periods or 0.0) if length is None else length.cycles_in_mean
+
+
+def _cycles_in_mean(point: Point[DwellResult]) -> float:
+    return 0.0 if point.result is None or point.result.length is None else point.result.length.cycles_in_mean
+
+
+def _seconds(point: Point[DwellResult]) -> float:
+    return 0.0 if point.result is None or point.result.length is None else point.result.length.seconds_in_mean
 
 
 def _change(first: float | None, now: float | None) -> float | None:
     return None if not first or now is None else now / first - 1.0
 
 
-def _beyond(plan: DwellPlan, name: str, changes: Mapping[str, float | None]) -> list[str]:
-    """A sentence for each change beyond its limit."""
+def _beyond(plan: DwellPlan, name: str, changes: Mapping[str, float | None]) -> Iterator[str]:
+    """A sentence for each change beyond its limit in the table ``name`` of the plan."""
     limits = getattr(plan, name)
-    held = plan.level_unit == "m"
-    out = []
     for quantity, change in changes.items():
         limit = getattr(limits, quantity)
         if limit is not None and change is not None and abs(change) > limit:
-            said = "force" if quantity == "amplitude" and held else quantity
-            out.append(
+            said = "force" if quantity == "amplitude" and plan.level_unit == "m" else quantity
+            yield (
                 f"the {said} has changed by {100.0 * change:+.3g} % since the first mean, "
                 f"{name}.{quantity} is {100.0 * limit:g} %"
             )
-    return out

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged
+from rig.campaigns.evaluation.lost_samples import bridged
 
 __all__ = ["FEWEST_PERIODS", "alien_force"]
 

@@ -1,40 +1,38 @@
 """What the channels of a point are to each other: ratios of fundamentals and of RMS values, and how well they are known."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.evaluation.vibrations import as_complex
+from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 
 __all__ = ["motions_of", "ratios_of", "resistance_of", "rms_ratios_of", "shapes_of", "softened", "spread_of"]
 
 DETUNED = 20.0  # times what is allowed at resonance, for a square of the frequency that is off by all of itself
 
-Point = Mapping[str, Any]
 
-
-def ratios_of(point: Point, drive: int) -> np.ndarray:
+def ratios_of(point: Point[Any], drive: int) -> np.ndarray:
     """complex[n_channels]: fundamentals over that of the channel ``drive``, in the units of both."""
-    fundamentals = as_complex(point["harmonics"])[:, 1]
+    fundamentals = spectrum_of(point).harmonics[:, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(fundamentals / fundamentals[drive])
 
 
-def rms_ratios_of(point: Point, drive: int) -> np.ndarray:
+def rms_ratios_of(channel_rms: Sequence[float], drive: int) -> np.ndarray:
     """float64[n_channels]: RMS of the channels over that of the channel ``drive``, in the units of both."""
-    sizes = np.asarray(point["channel_rms"], float)
+    sizes = np.asarray(channel_rms, float)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(sizes / sizes[drive])
 
 
-def spread_of(bench: Bench, point: Point, drive: int) -> np.ndarray | None:
+def spread_of(bench: Bench, point: Point[Any], drive: int) -> np.ndarray | None:
     """Standard errors of the ratios from noise and the converter's steps; None where there is no drive to compare with."""
-    size = np.abs(as_complex(point["harmonics"])[:, 1])
-    known = point["harmonics_std"]
-    std = np.zeros(size.size) if known is None else np.asarray(known, float)[:, 1]
+    size = np.abs(spectrum_of(point).harmonics[:, 1])
+    known = spectrum_of(point).harmonics_std
+    std = np.zeros(size.size) if known is None else known[:, 1]
     steps = np.array([channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels])
     return None if not size[drive] > 0.0 else np.hypot(std, steps / math.sqrt(12.0)) / size[drive]
 
@@ -54,19 +52,19 @@ def motions_of(bench: Bench) -> list[int]:
     return [index for index, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
 
 
-def softened(bench: Bench, point: Point, drive: int) -> float:
+def softened(bench: Bench, point: Point[Any], drive: int) -> float:
     """How many times the allowance at resonance is allowed, 1 or more."""
-    fundamentals = as_complex(point["harmonics"])[:, 1]
+    fundamentals = spectrum_of(point).harmonics[:, 1]
     force, velocity = fundamentals[bench.index_of("force")], -1j * fundamentals[drive]
     active = abs((force * velocity.conjugate()).real)
     by_phase = math.inf if active == 0.0 else abs(force) * abs(velocity) / active - 1.0
-    detuned = abs((float(point["frequency_hz"]) / bench.specimen.linear_frequency_hz) ** 2 - 1.0)
+    detuned = abs((vibration_of(point).frequency_hz / bench.specimen.linear_frequency_hz) ** 2 - 1.0)
     return 1.0 + min(by_phase, DETUNED * detuned)
 
 
-def resistance_of(bench: Bench, point: Point) -> float:
+def resistance_of(bench: Bench, point: Point[Any]) -> float:
     """Part of the force in phase with the drive point's velocity, over that velocity, N s/m."""
-    fundamentals = as_complex(point["harmonics"])[:, 1]
-    velocity = fundamentals[bench.index_of("drive")] / (2j * math.pi * point["frequency_hz"])
+    fundamentals = spectrum_of(point).harmonics[:, 1]
+    velocity = fundamentals[bench.index_of("drive")] / (2j * math.pi * vibration_of(point).frequency_hz)
     force = fundamentals[bench.index_of("force")]
     return float((force * velocity.conjugate()).real / abs(velocity) ** 2) if velocity else math.nan

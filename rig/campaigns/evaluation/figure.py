@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.campaigns.evaluation.recorded import specimen_of
+from rig.campaigns.evaluation.recorded import points_of, specimen_of
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.figures.style import MAIN, SECOND, TRACE_BINS, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -18,8 +19,8 @@ __all__ = ["draw_history", "heading", "said"]
 
 def said(recording: Recording, test: str) -> str:
     """Specimen, kind of test, number of points and how many of them were not accepted."""
-    points = recording.latest.values()
-    left_out = sum(not point["accepted"] for point in points)
+    points = points_of(recording)
+    left_out = sum(not point.accepted for point in points)
     text = f"{specimen_of(recording)}: {test}, {len(points)} point{'' if len(points) == 1 else 's'}"
     return text + (f", {left_out} not accepted" if left_out else "")
 
@@ -60,11 +61,15 @@ def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None
 
 def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
     """Mark the phase error of every recorded fundamental of a part; returns the largest, deg."""
-    points = [point for point in part.points if "phase_error_deg" in point and point["settled"] is not None]
-    if not points:
+    marks = [
+        (0.5 * (point.rows.first_sample + point.rows.end_sample), point.lock.phase_error_deg)
+        for point in map(point_from, part.points)
+        if point.settled is not None and point.rows is not None and point.lock is not None
+    ]
+    if not marks:
         return 0.0
-    seconds = [(start + 0.5 * (point["first_sample"] + point["end_sample"])) / rate for point in points]
-    degrees = [point["phase_error_deg"] for point in points]
+    seconds = [(start + middle) / rate for middle, _ in marks]
+    degrees = np.array([degrees for _, degrees in marks], float)
     axis.plot(seconds, degrees, "D", ms=4, color=SECOND, label="recorded fundamental" if start == 0 else None)
     return float(np.max(np.abs(degrees)))
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from identification import FrequencyResponse, IdentificationError
 from identification.frequency_responses import Controlled
-from rig.campaigns.evaluation.recorded import specimen_of
-from rig.campaigns.evaluation.vibrations import as_complex
-from rig.campaigns.planning.drift import of_the_result
+from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
+from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.recording.reader import Recording
 
 __all__ = ["frequency_responses_of", "recorded_frequency_responses"]
@@ -20,11 +20,11 @@ CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "non
 
 def recorded_frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
     """The accepted points of a recording, one response per level and pass, in the order of measurement."""
-    return frequency_responses_of(recording.latest.values(), recording.channels, specimen_of(recording))
+    return frequency_responses_of(points_of(recording), recording.channels, specimen_of(recording))
 
 
 def frequency_responses_of(
-    points: Iterable[Mapping[str, Any]], channels: Sequence[Mapping[str, Any]], specimen: str
+    points: Iterable[Point[Any]], channels: Sequence[Mapping[str, Any]], specimen: str
 ) -> tuple[FrequencyResponse, ...]:
     """The accepted points of a recording, one frequency response per level and pass.
 
@@ -33,18 +33,16 @@ def frequency_responses_of(
     """
     roles = [channel["role"] for channel in channels]
     force, drive = roles.index("force"), roles.index("drive")
-    passes: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
+    passes: dict[tuple[float, str, int, str], list[Point[Any]]] = {}
     for point in of_the_result(points):
-        if point["accepted"]:
-            passes.setdefault(tuple(point[key] for key in ("level", "direction", "repeat", "level_unit")), []).append(
-                point
-            )
+        if point.accepted:
+            passes.setdefault((point.level, point.direction, point.repeat, point.level_unit), []).append(point)
     if not passes:
         raise IdentificationError("points: none of the recording was accepted")
     out = []
     for (level, direction, repeat, unit), accepted in passes.items():
-        frequency_hz = np.array([point["frequency_hz"] for point in accepted])
-        fundamentals = np.array([as_complex(point["harmonics"])[:, 1] for point in accepted])
+        frequency_hz = np.array([vibration_of(point).frequency_hz for point in accepted])
+        fundamentals = np.array([spectrum_of(point).harmonics[:, 1] for point in accepted])
         to_displacement = -1.0 / (2.0 * np.pi * frequency_hz) ** 2
         out.append(
             FrequencyResponse(

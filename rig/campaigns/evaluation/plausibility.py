@@ -11,12 +11,14 @@ from resonance, with 1 over the cosine of the phase or with the detuning, whiche
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rig.bench import Bench
+from rig.campaigns.evaluation.channel_misfit import Misfit, Seen, told
 from rig.campaigns.evaluation.channel_ratios import (
     motions_of,
     ratios_of,
@@ -26,8 +28,8 @@ from rig.campaigns.evaluation.channel_ratios import (
     softened,
     spread_of,
 )
-from rig.campaigns.evaluation.gaps import rms_of
-from rig.campaigns.evaluation.misfits import Misfit, Seen, told
+from rig.campaigns.evaluation.lost_samples import rms_of
+from rig.campaigns.evaluation.point import Point, Quality, vibration_of
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 
@@ -42,24 +44,22 @@ NEAR = 0.1  # in frequency, relative: in open loop only points so near are compa
 FEW = 5  # of them
 MANY = 100  # under a lock: more would tell no more
 
-Point = Mapping[str, Any]
 
+def with_plausibility(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> Point[Any]:
+    """The point with its ``misfit``, the largest factor; with a warning or refused where that is too large.
 
-def with_plausibility(bench: Bench, plan: Plan, point: dict[str, Any], before: Sequence[Point]) -> dict[str, Any]:
-    """The point with its ``misfit``, the largest factor; warned of or refused where that is too large.
-
-    ``before``: the points before. Those that did not fit or were not accepted are no measure of others: a fault would become
-    the usual. With a point that did not fit, others that are like it do not fit either.
+    ``before``: the points before. Those that did not fit or were not accepted are not compared with: a fault would become
+    the usual. A point that is like one that did not fit does not fit either.
     """
     return _judged(bench, point, misfits_of(bench, plan, point, before))
 
 
-def with_plausible_ways(bench: Bench, point: dict[str, Any], pieces: Sequence[np.ndarray]) -> dict[str, Any]:
-    """The same by the rows of two ways past one level, of which a point holds the mean; nothing is said of a single way."""
+def with_plausible_ways(bench: Bench, point: Point[Any], pieces: Sequence[np.ndarray]) -> Point[Any]:
+    """The same from the rows of two ways past one level, of which a point holds the mean; a single way is not judged."""
     if len(pieces) < 2:
         return point
     drive = bench.index_of("drive")
-    up, down = (rms_ratios_of({"channel_rms": rms_of(rows)}, drive) for rows in pieces)
+    up, down = (rms_ratios_of(rms_of(rows), drive) for rows in pieces)
     responses = [index for index, channel in enumerate(bench.channels) if channel.role == "response"]
     allowed = ALLOWANCE * float(np.max(up[motions_of(bench)]))
     misfits = [
@@ -69,39 +69,44 @@ def with_plausible_ways(bench: Bench, point: dict[str, Any], pieces: Sequence[np
     return _judged(bench, point, misfits)
 
 
-def _judged(bench: Bench, point: dict[str, Any], misfits: Sequence[Misfit]) -> dict[str, Any]:
+def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point[Any]:
     if not misfits:
         return point
     worst = max(misfit.factor for misfit in misfits)
-    point = {**point, "misfit": max(worst, point.get("misfit", 1.0))}
+    point = replace(point, misfit=max(worst, _misfit_of(point)))
     if worst < WARNED:
         return point
-    point["misfit_channels"] = sorted({misfit.channel for misfit in misfits if misfit.factor >= WARNED})
+    names = {misfit.channel for misfit in misfits if misfit.factor >= WARNED}
+    point = replace(point, misfit_channels=tuple(sorted(names)))
     text = told(misfits, bench.channels[bench.index_of("drive")].name, WARNED, REFUSED)
-    if worst < REFUSED or not point["accepted"]:
-        return {**point, "warnings": [*(point.get("warnings") or ()), text]}
-    return {**point, "accepted": False, "quality": "implausible", "reason": text}
+    if worst < REFUSED or not point.accepted:
+        return point.warned(text)
+    return point.refused(text, Quality.IMPLAUSIBLE)
 
 
-def misfits_of(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) -> list[Misfit]:
+def _misfit_of(point: Point[Any]) -> float:
+    """Its misfit; 1 where there was nothing to compare with."""
+    return 1.0 if point.misfit is None else point.misfit
+
+
+def misfits_of(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
     """By how much each channel differs from what is expected of it; none where nothing is known to compare with."""
-    usual = [one for one in before if one["accepted"] and one.get("misfit", 1.0) < WARNED]
-    if "harmonics" in point:
-        tones = [one for one in usual if "harmonics" in one]
+    usual = [one for one in before if one.accepted and _misfit_of(one) < WARNED]
+    if point.spectrum is not None:
+        tones = [one for one in usual if one.spectrum is not None]
         force = _of_the_force(bench, point, tones, before) if isinstance(plan, LockedPlan) else []
         return [*_of_a_tone(bench, plan, point, tones), *force]
-    if "channel_rms" in point:
-        return _of_a_band(bench, point, [one for one in usual if "channel_rms" in one])
-    return []
+    return _of_a_band(bench, point, usual)
 
 
-def _of_a_tone(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) -> list[Misfit]:
+def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
     """Fundamentals of the responses over that of the drive."""
     drive, locked = bench.index_of("drive"), isinstance(plan, LockedPlan)
     ratios, spread = ratios_of(point, drive), spread_of(bench, point, drive)
     times = 1.0 if spread is None else softened(bench, point, drive)
     if not locked:
-        off = [abs(math.log(one["frequency_hz"] / point["frequency_hz"])) for one in before]
+        frequency_hz = vibration_of(point).frequency_hz
+        off = [abs(math.log(vibration_of(one).frequency_hz / frequency_hz)) for one in before]
         before = [before[i] for i in np.argsort(off, kind="stable")[:FEW] if off[i] < NEAR]
     usual = np.median([ratios_of(one, drive) for one in before[-MANY:]], axis=0) if before else None
     shapes = shapes_of(bench) if locked or _near_the_mode(bench, point) else None
@@ -117,7 +122,9 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point, before: Sequence[Point]) 
     return out
 
 
-def _of_the_force(bench: Bench, point: Point, usual: Sequence[Point], before: Sequence[Point]) -> list[Misfit]:
+def _of_the_force(
+    bench: Bench, point: Point[Any], usual: Sequence[Point[Any]], before: Sequence[Point[Any]]
+) -> list[Misfit]:
     """In-phase force over velocity, against the nearest of the points before: a damping may change with the level's root.
 
     Over some levels a damping may change so much that a fault is hidden. So a point that is like a nearer one of which the
@@ -126,46 +133,45 @@ def _of_the_force(bench: Bench, point: Point, usual: Sequence[Point], before: Se
     force = bench.channels[bench.index_of("force")].name
     nearest, misfitting = (
         min(
-            (one for one in some if one["level_unit"] == point["level_unit"]),
-            key=lambda one: (_apart(point, one, "level"), _lags_apart(point, one)),
+            (one for one in some if one.level_unit == point.level_unit),
+            key=lambda one: (_apart(point, one), _lags_apart(point, one)),
             default=None,
         )
-        for some in (usual, [one for one in before if force in one.get("misfit_channels", ())])
+        for some in (usual, [one for one in before if force in one.misfit_channels])
     )
     if nearest is None:
         return []
     times, factor = _against(bench, point, nearest)
     found = Misfit(force, times, 1.0, factor, Seen.BEFORE, _level_of(nearest))
-    if misfitting is not None and _apart(point, misfitting, "level") < _apart(point, nearest, "level"):
+    if misfitting is not None and _apart(point, misfitting) < _apart(point, nearest):
         times, factor = _against(bench, point, misfitting)
-        if factor < WARNED <= misfitting["misfit"] and found.factor < misfitting["misfit"]:
-            return [Misfit(force, times, 1.0, misfitting["misfit"], Seen.NOT_TRUSTED, _level_of(misfitting))]
+        theirs = _misfit_of(misfitting)
+        if factor < WARNED <= theirs and found.factor < theirs:
+            return [Misfit(force, times, 1.0, theirs, Seen.NOT_TRUSTED, _level_of(misfitting))]
     return [found]
 
 
-def _against(bench: Bench, point: Point, other: Point) -> tuple[float, float]:
+def _against(bench: Bench, point: Point[Any], other: Point[Any]) -> tuple[float, float]:
     """Force over velocity over that of another point, and by how much that is more than the levels tell of."""
     here, there = resistance_of(bench, point), resistance_of(bench, other)
     if not (here > 0.0 and there > 0.0):
         return 1.0, 1.0
-    allowed = min(math.exp(0.5 * _apart(point, other, "level")), FASTEST)
+    allowed = min(math.exp(0.5 * _apart(point, other)), FASTEST)
     return here / there, max(here / there / allowed, there / here / allowed, 1.0)
 
 
-def _level_of(point: Point) -> str:
-    return f"{point['level']:.4g} {point['level_unit']}"
+def _level_of(point: Point[Any]) -> str:
+    return f"{point.level:.4g} {point.level_unit}"
 
 
-def _of_a_band(bench: Bench, point: Point, before: Sequence[Point]) -> list[Misfit]:
+def _of_a_band(bench: Bench, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
     """RMS of force and responses over that of the drive, against the points before at the same level."""
-    alike = [one for one in before if one["level"] == point["level"]]
-    drive = bench.index_of("drive")
-    here, usual = (
-        rms_ratios_of(point, drive),
-        np.median([rms_ratios_of(one, drive) for one in alike], axis=0) if alike else None,
-    )
-    if usual is None:
+    alike = [one.channel_rms for one in before if one.channel_rms is not None and one.level == point.level]
+    if point.channel_rms is None or not alike:
         return []
+    drive = bench.index_of("drive")
+    here = rms_ratios_of(point.channel_rms, drive)
+    usual = np.median([rms_ratios_of(sizes, drive) for sizes in alike], axis=0)
     return [
         _misfit(channel.name, complex(here[index]), complex(usual[index]), 1e-12, Seen.BEFORE)
         for index, channel in enumerate(bench.channels)
@@ -183,13 +189,15 @@ def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: See
     return Misfit(name, size, wanted, float(factor), by)
 
 
-def _near_the_mode(bench: Bench, point: Point) -> bool:
-    return abs(math.log(point["frequency_hz"] / bench.specimen.linear_frequency_hz)) < NEAR
+def _near_the_mode(bench: Bench, point: Point[Any]) -> bool:
+    return abs(math.log(vibration_of(point).frequency_hz / bench.specimen.linear_frequency_hz)) < NEAR
 
 
-def _apart(one: Point, other: Point, key: str) -> float:
-    return abs(math.log(float(one[key]) / float(other[key])))
+def _apart(one: Point[Any], other: Point[Any]) -> float:
+    """Between the levels of two points, as a logarithm."""
+    return abs(math.log(one.level / other.level))
 
 
-def _lags_apart(one: Point, other: Point) -> float:
-    return abs(float(one.get("asked_phase_lag_deg", 0.0)) - float(other.get("asked_phase_lag_deg", 0.0)))
+def _lags_apart(one: Point[Any], other: Point[Any]) -> float:
+    """Between the lags that were asked for, deg."""
+    return abs((one.asked_phase_lag_deg or 0.0) - (other.asked_phase_lag_deg or 0.0))

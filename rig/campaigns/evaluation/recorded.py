@@ -1,16 +1,20 @@
-"""What a recording holds, as the program knows it: its bench, its plan, the rows of a point, the accepted points."""
+"""What a recording holds, as objects: its bench, its points, the rows of a point."""
 
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
 from identification import IdentificationError
 from rig.bench import Bench
 from rig.bench.configuration import validated
+from rig.campaigns.evaluation.point import Point, point_name
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
-__all__ = ["accepted_points", "bench_of_recording", "point_rows", "specimen_of"]
+__all__ = ["accepted_points", "bench_of_recording", "point_rows", "points_of", "specimen_of"]
+
+Result = TypeVar("Result")
 
 
 def bench_of_recording(recording: Recording) -> Bench:
@@ -23,22 +27,37 @@ def specimen_of(recording: Recording) -> str:
     return str(recording.configuration["bench"]["specimen"]["name"])
 
 
-def point_rows(recording: Recording, number: int) -> np.ndarray:
-    """All recorded rows of a point: structured array, inputs in SI units (`rig.tick.layout.recorded_row`).
+@overload
+def points_of(recording: Recording) -> list[Point[Any]]: ...
+@overload
+def points_of(recording: Recording, result: type[Result]) -> list[Point[Result]]: ...
 
-    Raises `RecordingError` where there is no such point or nothing was recorded of it.
+
+def points_of(recording: Recording, result: type[Any] | None = None) -> list[Point[Any]]:
+    """The last result of each point that the plan in force asks for, in the order of the plan.
+
+    ``result`` is the class of what the kind of campaign measures; without it the points hold what all kinds have.
     """
-    for part in reversed(recording.parts):
-        for point in part.points:
-            if point["number"] == number and "end_sample" in point:
-                return part.read(point["first_sample"], point["end_sample"])
-    known = {**recording.latest, **recording.former}
-    raise RecordingError(f"point {number}: nothing was recorded of it; points {sorted(known)} are known")
+    return [point_from(table) if result is None else point_from(table, result) for table in recording.latest.values()]
 
 
-def accepted_points(recording: Recording) -> dict[int, dict[str, Any]]:
-    """The accepted points that the plan in force asks for, by number, in its order; `IdentificationError` without any."""
-    accepted = {number: point for number, point in recording.latest.items() if point["accepted"]}
+def accepted_points(recording: Recording, result: type[Result]) -> list[Point[Result]]:
+    """The accepted ones of `points_of`; `IdentificationError` where there is none."""
+    accepted = [point for point in points_of(recording, result) if point.accepted]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
     return accepted
+
+
+def point_rows(recording: Recording, number: int) -> np.ndarray:
+    """All recorded rows of a point by its stored ``number``, which counts from 0.
+
+    A structured array with the inputs in SI units (`rig.tick.layout.recorded_row`). Raises `RecordingError` where there is no
+    such point or nothing was recorded of it; the message counts points from 1.
+    """
+    for part in reversed(recording.parts):
+        for table in part.points:
+            if table["number"] == number and "end_sample" in table:
+                return part.read(table["first_sample"], table["end_sample"])
+    known = ", ".join(str(n + 1) for n in sorted({**recording.latest, **recording.former}))
+    raise RecordingError(f"{point_name(number)}: nothing was recorded of it; points {known} are known")

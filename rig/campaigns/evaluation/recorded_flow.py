@@ -4,7 +4,7 @@ import numpy as np
 
 from identification import SlowFlow, slow_flow
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged
+from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.vibrations import channels_of
 from rig.campaigns.planning.plant import PlantFacts
 from rig.tick.layout import FREQUENCY_CLAMPED, SAMPLE_LOST, SATURATED, SENSOR_AT_RANGE

@@ -1,4 +1,4 @@
-"""What the evaluation of all campaigns shares: head of a point, mark of a failed one, periodic vibrations, quality."""
+"""What the evaluation of all campaigns shares: points that failed, channels, periodic vibrations."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,22 +7,21 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from identification import Channel, PeriodicVibration, periodic_vibration
+from identification import Channel, NonlinearMode, PeriodicVibration, periodic_vibration
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import lost_rows
+from rig.campaigns.evaluation.lost_samples import lost_rows
+from rig.campaigns.evaluation.point import Modal, Point, Quality, planned_point, spectrum_of, vibration_of
 from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
 from rig.tick.safety.layout import POLARITY_HINT
 from rig.tick.sequencer.layout import Outcome
 
 __all__ = [
     "VOLTAGE",
-    "as_complex",
-    "as_pairs",
     "channels_from",
     "channels_of",
     "failed_point",
     "frequency_scatter",
-    "head",
+    "modal_part",
     "not_evaluated",
     "quantisation_warnings",
     "recorded_vibration",
@@ -48,37 +47,17 @@ POLARITY_DEG = 60.0  # a phase error that large is no matter of patience
 FEW_BITS = 20.0  # below, quantisation may move the damping by a percent, without noise to dither it
 
 
-def head(plan: Plan, target: Target) -> dict[str, Any]:
-    """What every point begins with: where it is in the plan."""
-    point: dict[str, Any] = {
-        "number": target.number,
-        "level": target.level,
-        "level_unit": plan.level_unit,
-        "direction": target.direction,
-        "repeat": target.repeat,
-    }
-    if target.frequency_hz is not None:
-        point["asked_frequency_hz"] = target.frequency_hz
-    if target.phase_lag_deg is not None:
-        point["asked_phase_lag_deg"] = target.phase_lag_deg
-    if target.realisation is not None:
-        point["realisation"] = target.realisation
-    if target.repeats_first:
-        point["repeats_first"] = True
-    return point
-
-
-def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> dict[str, Any]:
-    """The mark of a point whose rows tell of no vibration."""
-    return {**head(plan, target), "settled": settled, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> Point[Any]:
+    """A point whose rows tell of no vibration."""
+    return replace(planned_point(plan, target), settled=settled).refused(f"cannot be evaluated: {error}")
 
 
 def failed_point(
     plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False, locked: bool = False
-) -> dict[str, Any]:
-    """The mark of a point that was not measured, with the reason; it holds no data.
+) -> Point[Any]:
+    """A point that was not measured, with the reason.
 
-    ``at_start``: for want of a lock there. ``locked``: a lock had been gained before, so no polarity is wrong.
+    ``at_start``: no lock was gained at the start voltage. ``locked``: a lock had been gained before, so no polarity is wrong.
     """
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
@@ -94,14 +73,8 @@ def failed_point(
         why += f" ({phase}amplitude drift {100.0 * drift:.2g} %)"
     if not locked and (code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG):
         why += f"; {POLARITY_HINT}"
-    return {
-        **head(plan, target),
-        "settled": False,
-        "accepted": False,
-        "quality": code.name.lower().replace("_", "-"),
-        "reason": why,
-        "settle_periods": float(outcome["periods"]),
-    }
+    failed = replace(planned_point(plan, target), settled=False, settle_periods=float(outcome["periods"]))
+    return failed.refused(why, Quality(code.name.lower().replace("_", "-")))
 
 
 def recorded_vibration(
@@ -124,25 +97,35 @@ def recorded_vibration(
     return _without_skew(vibration, bench)
 
 
+def modal_part(mode: NonlinearMode) -> Modal:
+    """What a point holds of the nonlinear mode that was identified from it alone."""
+    damping = float(mode.damping_ratio[0])
+    return Modal(
+        modal_frequency_hz=float(mode.modal_frequency_hz[0]),
+        damping_ratio=damping if math.isfinite(damping) else None,
+    )
+
+
 def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:
     """A recording's table of channels as measurements know them."""
     return tuple(Channel(row["name"], row["role"], row["unit"]) for row in rows)
 
 
 def vibration_from(
-    point: Mapping[str, Any], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
+    point: Point[Any], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
 ) -> PeriodicVibration:
     """The vibration that a recorded point holds."""
+    vibration, spectrum = vibration_of(point), spectrum_of(point)
     return PeriodicVibration(
         channels,
-        point["frequency_hz"],
-        as_complex(point["harmonics"]),
-        point["periods"],
-        np.asarray(point["residual_rms"], float),
-        None if point["harmonics_std"] is None else np.asarray(point["harmonics_std"], float),
-        None if point.get("drift") is None else as_complex(point["drift"]),
+        vibration.frequency_hz,
+        spectrum.harmonics,
+        vibration.periods,
+        spectrum.residual_rms,
+        spectrum.harmonics_std,
+        spectrum.drift,
         phase_lag_target_deg=phase_lag_target_deg,
-        warnings=tuple(point["warnings"]),
+        warnings=point.warnings or (),
     )
 
 
@@ -162,7 +145,7 @@ def frequency_scatter(theta_rad: np.ndarray) -> float:
 
 
 def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[str]:
-    """A remark for each of force and drive whose fundamental is only some bits of its converter high."""
+    """Warn where the fundamental of force or drive uses only a few bits of its converter."""
     out = []
     for channel, harmonics in zip(bench.channels, vibration.harmonics, strict=True):
         bits = abs(harmonics[1] * channel.sensitivity_v_per_unit) / channel.resolution_v
@@ -190,14 +173,3 @@ def channels_of(bench: Bench) -> tuple[Channel, ...]:
     return tuple(
         Channel(c.name, cast(Literal["force", "drive", "response", "monitor"], c.role), c.unit) for c in bench.channels
     )
-
-
-def as_pairs(values: np.ndarray) -> Any:
-    """Complex numbers as [real, imaginary]."""
-    return np.stack([values.real, values.imag], axis=-1).tolist()
-
-
-def as_complex(pairs: Any) -> np.ndarray:
-    """The inverse of `as_pairs`."""
-    array = np.asarray(pairs, float)
-    return np.asarray(array[..., 0] + 1j * array[..., 1])

@@ -6,9 +6,10 @@ from identification import FrequencyResponseMatrix, PeriodicSpectra, best_linear
 from identification.multisine.best_linear_approximation import Estimator
 from rig.bench.configuration import validated
 from rig.campaigns.campaign import Campaign
+from rig.campaigns.evaluation.point import result_of
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.multisine.points import MULTISINE_COLUMNS, measure_multisine_point, spectra_of
+from rig.campaigns.multisine.points import MULTISINE_COLUMNS, MultisineResult, measure_multisine_point, spectra_of
 from rig.recording.reader import Recording
 
 __all__ = ["MULTISINE", "recorded_response_matrices", "recorded_spectra"]
@@ -20,10 +21,10 @@ def recorded_spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
     plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
     levels: dict[float, dict[int, np.ndarray]] = {}
     periods: dict[float, int] = {}
-    for number, point in accepted_points(recording).items():
-        level = point["level"]
-        levels.setdefault(level, {})[point["realisation"]] = point_rows(recording, number)
-        periods[level] = min(periods.get(level, point["periods"]), point["periods"])  # a change of plan may change them
+    for point in accepted_points(recording, MultisineResult):
+        level, recorded = point.level, result_of(point).periods
+        levels.setdefault(level, {})[point.realisation or 0] = point_rows(recording, point.number)
+        periods[level] = min(periods.get(level, recorded), recorded)  # a change of plan may change them
     return {
         level: spectra_of(bench, plan.model_copy(update={"periods": periods[level]}), records)
         for level, records in levels.items()
@@ -43,6 +44,7 @@ def recorded_response_matrices(
 
 MULTISINE = Campaign(
     plan=MultisinePlan,
+    result=MultisineResult,
     measure=measure_multisine_point,
     columns=MULTISINE_COLUMNS,
     draw="rig.campaigns.multisine.figure:draw",

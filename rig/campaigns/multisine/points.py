@@ -1,21 +1,21 @@
-"""From the recorded rows of a multisine's realisation to its result, and from recordings to spectra in memory."""
+"""The realisations of a multisine: what their points hold, how they come from recorded rows, and spectra in memory."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification import IdentificationError, PeriodicSpectra, periodic_spectra
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import lost_rows, rms_of
-from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, head, skew_turn
+from rig.campaigns.evaluation.lost_samples import lost_rows, rms_of
+from rig.campaigns.evaluation.point import Point, Quality, planned_point
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, not_evaluated, skew_turn
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Column, Target
 from rig.daq import Channel
 
-__all__ = ["MULTISINE_COLUMNS", "measure_multisine_point", "spectra_of", "turned_periods"]
+__all__ = ["MULTISINE_COLUMNS", "MultisineResult", "measure_multisine_point", "spectra_of", "turned_periods"]
 
 MULTISINE_COLUMNS = (
     Column("realisation", "realisation", "", ".0f"),
@@ -29,15 +29,32 @@ _LINES = 50
 """Lines over which noise is taken to be even."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class MultisineResult:
+    """What was measured of a realisation."""
+
+    force_rms_n: float
+    """RMS of the force over the band, N."""
+    drive_rms_m_s2: float
+    """RMS of the drive point's acceleration over the band, m/s^2."""
+    voltage_rms_v: float
+    """RMS of the output over the band, V."""
+    voltage_peak_v: float
+    """Peak of the output, V."""
+    change: float | None
+    """Difference of force or drive between the first period and the others, relative; None with one period only."""
+    periods: int
+    """Periods that were recorded."""
+
+
 def measure_multisine_point(
     bench: Bench, plan: MultisinePlan, target: Target, rows: np.ndarray, settling: np.void
-) -> dict[str, Any]:
-    """The result of a recorded realisation, with its own quality."""
-    point = head(plan, target)
+) -> Point[MultisineResult]:
+    """A recorded realisation, with its quality."""
     try:
         spectra = spectra_of(bench, plan, {target.realisation or 0: rows})
     except (IdentificationError, ArithmeticError) as error:
-        return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
+        return not_evaluated(plan, target, error, settled=False)
     roles = {channel.role: channel.name for channel in bench.channels}
     periods = spectra.spectra.shape[1]
     still = next((c.name for c, column in _watched(bench, rows) if not np.ptp(column)), "")
@@ -48,20 +65,22 @@ def measure_multisine_point(
             f"force or drive of the first period differs by {100.0 * change:.1f} % from the others beyond noise, accepted "
             f"up to {100.0 * plan.accepted_change:g} %: more transient_periods, or less disturbance"
         )
-    return {
-        **point,
-        "settled": not reason if periods > 1 else None,
-        "accepted": not reason,
-        "reason": reason,
-        "force_rms_n": spectra.rms(roles["force"]),
-        "drive_rms_m_s2": spectra.rms(roles["drive"]),
-        "channel_rms": rms_of(rows),
-        "voltage_rms_v": spectra.rms(VOLTAGE.name),
-        "voltage_peak_v": float(np.abs(rows["output_v"]).max()),
-        "change": None if math.isnan(change) else change,
-        "periods": plan.periods,
-        "warnings": _warnings(plan.periods, periods),
-    }
+    return replace(
+        planned_point(plan, target),
+        settled=not reason if periods > 1 else None,
+        reason=reason,
+        quality=Quality.of(reason),
+        warnings=_warnings(plan.periods, periods),
+        channel_rms=tuple(rms_of(rows)),
+        result=MultisineResult(
+            force_rms_n=spectra.rms(roles["force"]),
+            drive_rms_m_s2=spectra.rms(roles["drive"]),
+            voltage_rms_v=spectra.rms(VOLTAGE.name),
+            voltage_peak_v=float(np.abs(rows["output_v"]).max()),
+            change=None if math.isnan(change) else change,
+            periods=plan.periods,
+        ),
+    )
 
 
 def _watched(bench: Bench, rows: np.ndarray) -> list[tuple[Channel, np.ndarray]]:
@@ -70,10 +89,10 @@ def _watched(bench: Bench, rows: np.ndarray) -> list[tuple[Channel, np.ndarray]]
     return [(c, readings[:, i]) for i, c in enumerate(bench.channels) if c.role in ("force", "drive")]
 
 
-def _warnings(planned: int, periods: int) -> list[str]:
-    """What is to be said of the periods that were used, of those planned."""
-    left_out = [f"{planned - periods} of {planned} periods are left out"] if periods < planned else []
-    return [*left_out, *(["one period only: neither noise nor a transient can be told"] if periods == 1 else [])]
+def _warnings(planned: int, periods: int) -> tuple[str, ...]:
+    """Warnings about the number of periods that were used, of those planned."""
+    left_out = (f"{planned - periods} of {planned} periods are left out",) if periods < planned else ()
+    return (*left_out, *(("one period only: neither noise nor a transient can be told",) if periods == 1 else ()))
 
 
 def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:

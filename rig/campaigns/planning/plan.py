@@ -15,7 +15,7 @@ from rig.campaigns.planning.levels import Levels
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import Segment, SettleRule
 
-__all__ = ["MOST_POINTS", "Column", "OpenLoopPlan", "Plan", "Target", "TonePlan"]
+__all__ = ["MOST_POINTS", "Column", "OpenLoopPlan", "Plan", "Target", "TonePlan", "with_first_repeated"]
 
 MOST_POINTS = 10_000
 """Of a plan, repeats and both directions counted: at ten seconds a point more than a day.
@@ -41,6 +41,11 @@ class Target(Configured):
     """Number of a multisine's realisation, from 0."""
     repeats_first: bool = False
     """Whether it is the plan's first point measured again at its end, to see a drift; it is part of no result."""
+
+
+def with_first_repeated(targets: tuple[Target, ...]) -> tuple[Target, ...]:
+    """The targets and the first of them once more, numbered behind the last, so that all others keep their numbers."""
+    return (*targets, targets[0].model_copy(update={"number": len(targets), "repeats_first": True}))
 
 
 class Column(NamedTuple):

@@ -1,19 +1,19 @@
-"""From the recorded rows of a response-controlled point to its result."""
+"""The points of a response-controlled test: what they hold, and how they come from recorded rows."""
 
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification import IdentificationError
 from rig.bench import Bench
-from rig.campaigns.evaluation.objections import level_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record
-from rig.campaigns.evaluation.settled_quality import settled_objection, settled_quality
-from rig.campaigns.evaluation.vibrations import head, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.evaluation.acceptance import level_objection, settled_point, with_settling
+from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
+from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.response_controlled.plan import ResponseControlledPlan
 
-__all__ = ["RESPONSE_CONTROLLED_COLUMNS", "measure_response_controlled_point"]
+__all__ = ["RESPONSE_CONTROLLED_COLUMNS", "ResponseControlledResult", "measure_response_controlled_point"]
 
 RESPONSE_CONTROLLED_COLUMNS = (
     Column("asked_phase_lag_deg", "lag asked for", "deg", ".0f"),
@@ -26,10 +26,20 @@ RESPONSE_CONTROLLED_COLUMNS = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class ResponseControlledResult:
+    """What a point of a response-controlled test has beside the rest."""
+
+    phase_lag_deg: float
+    """Lag of the displacement behind the force, deg."""
+    level_error: float
+    """Relative deviation of the displacement from its level."""
+
+
 def measure_response_controlled_point(
     bench: Bench, plan: ResponseControlledPlan, target: Target, rows: np.ndarray, settling: np.void
-) -> dict[str, Any]:
-    """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment."""
+) -> Point[ResponseControlledResult]:
+    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment."""
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
         wanted = (target.phase_lag_deg or 0.0) + 180.0
@@ -37,19 +47,7 @@ def measure_response_controlled_point(
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=True)
     missed = vibration.amplitude_m / target.level - 1.0
-    found = settled_quality(vibration, bench, rows)
     off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
-    reason = settled_objection(plan, bench, vibration, found, off_level)
-    return {
-        **head(plan, target),
-        "settled": True,
-        "accepted": not reason,
-        "reason": reason,
-        "frequency_hz": vibration.frequency_hz,
-        "force_n": vibration.force_n,
-        "amplitude_m": vibration.amplitude_m,
-        "level_error": missed,
-        "phase_lag_deg": vibration.phase_lag_deg,
-        **found,
-        **of_a_record(bench, vibration, rows, settling),
-    }
+    point = settled_point(plan, target, bench, vibration, rows, off_level)
+    result = ResponseControlledResult(phase_lag_deg=vibration.phase_lag_deg, level_error=missed)
+    return with_settling(replace(point, result=result), settling)

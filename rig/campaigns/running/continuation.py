@@ -13,6 +13,7 @@ from typing import Any
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import Plan, Target
@@ -64,7 +65,7 @@ def what_is_left(recording: Recording, change: Plan | None = None, source: str |
         _check(change, source, plan, bench, name)
         plan, numbers = change, numbered(plans, change)
     numbers = tuple(range(len(plan.targets())) if numbers is None else numbers)
-    accepted = {point["number"] for point in recording.points if point["accepted"]}
+    accepted = {point.number for point in map(point_from, recording.points) if point.accepted}
     done = frozenset(place for place, number in enumerate(numbers) if number in accepted)
     return Continuation(plan, bench, numbers, done, changed)
 

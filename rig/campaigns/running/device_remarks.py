@@ -1,11 +1,13 @@
 """What the device says of the samples of a point: its flags, samples that were lost, and outputs that came too late."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from rig.campaigns.evaluation.gaps import lost_rows, lost_warnings
+from rig.campaigns.evaluation.lost_samples import lost_rows, lost_warnings
+from rig.campaigns.evaluation.point import Point
 from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT
 
@@ -20,19 +22,19 @@ def flag_names(counters: Iterable[str]) -> list[str]:
     return [*counters][: LOST.bit_length() - 1]
 
 
-def with_device_remarks(point: Mapping[str, Any], rows: np.ndarray, counters: Iterable[str]) -> dict[str, Any]:
+def with_device_remarks(point: Point[Any], rows: np.ndarray, counters: Iterable[str]) -> Point[Any]:
     """A point with the number of its samples that were lost, and a warning for each flag that was up while it was recorded.
 
-    ``counters`` are the driver's. A point with more than 5 % of its outputs held by the device, because they
-    came too late, is not accepted.
+    ``counters`` are the driver's. A point with more than 5 % of its outputs held by the device, because they came too late,
+    is not accepted.
     """
     flags = rows["flags"] >> DEVICE_SHIFT
     counts = {name: int(np.count_nonzero(flags & (1 << bit))) for bit, name in enumerate(flag_names(counters))}
     said = {
         name: f"{name.replace('_', ' ')} in {count} of {rows.size} samples" for name, count in counts.items() if count
     }
-    warnings = [*point.get("warnings", []), *lost_warnings(rows), *said.values()]
-    out = {**point, "lost_samples": int(np.count_nonzero(lost_rows(rows))), "warnings": warnings}
-    if counts.get(HELD, 0) > LARGEST_HELD * rows.size and point["accepted"]:
-        out |= {"accepted": False, "reason": f"outputs came too late: {said[HELD]}, allowed is {LARGEST_HELD:.0%}"}
+    out = replace(point, lost_samples=int(np.count_nonzero(lost_rows(rows))))
+    out = out.warned(*lost_warnings(rows), *said.values())
+    if counts.get(HELD, 0) > LARGEST_HELD * rows.size and point.accepted:
+        return out.refused(f"outputs came too late: {said[HELD]}, allowed is {LARGEST_HELD:.0%}")
     return out

@@ -1,7 +1,7 @@
 """Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,16 +11,18 @@ from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
-from rig.campaigns.evaluation.quality import what_was_skipped
+from rig.campaigns.evaluation.point import Point, Quality, RowRange
+from rig.campaigns.evaluation.skipped import what_was_skipped
+from rig.campaigns.evaluation.stored_point import stored
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.advice import Before, Trip, advice_on
 from rig.campaigns.running.device_remarks import flag_names, with_device_remarks
-from rig.campaigns.running.evaluations import Evaluations
-from rig.campaigns.running.kept_rows import KeptRows
+from rig.campaigns.running.evaluation_thread import EvaluationThread
+from rig.campaigns.running.row_buffer import RowBuffer
 from rig.campaigns.running.stored_rows import StoredRows
-from rig.campaigns.running.trips import tripped_at
+from rig.campaigns.running.trip_advice import Before, Trip, advice_on
+from rig.campaigns.running.tripped_level import tripped_at
 from rig.errors import RecordingError
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.recording.journal import JournalWriter
@@ -53,7 +55,7 @@ class MeasuredBefore:
     """Numbers, in the plan, of points that were accepted."""
     numbers: Sequence[int] | None = None
     """Number in the recording of every point of the plan; None where the two are the same."""
-    points: tuple[Mapping[str, Any], ...] = ()
+    points: tuple[Point[Any], ...] = ()
     """Points of the recording."""
 
 
@@ -82,13 +84,13 @@ class Execution:
         self.done = len(before.done)
         self.finished = self.done
         self.accepted = self.done
-        self.reported: dict[int, dict[str, Any]] = {}
+        self.reported: dict[int, Point[Any]] = {}
         self.next_segment = 0
-        self.locked = any(point["accepted"] for point in before.points)
+        self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
-        self.kept = KeptRows(loop.tick.row_dtype)
+        self.kept = RowBuffer(loop.tick.row_dtype)
         self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)
-        self.evaluations = Evaluations()
+        self.evaluations = EvaluationThread()
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
@@ -198,15 +200,15 @@ class Execution:
             for point in self.evaluations.take():
                 self._report(point)
 
-    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[dict[str, Any]]:
+    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[Point[Any]]:
         """The points that come out of rows which begin with sample ``first``."""
         found = self.measure(self.bench, self.plan, target, rows, *told)
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
-        stored = self.stored.row_range(first, first + rows.size)
-        where = {} if stored is None else {"first_sample": stored[0], "end_sample": stored[1]}
-        return [{**point, **where} for point in points]
+        kept = self.stored.row_range(first, first + rows.size)
+        where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
+        return [replace(point, rows=where) for point in points]
 
     def _report_rest(self) -> None:
         """Wait for the points that are still being worked out, also after a failure elsewhere or in one of them."""
@@ -251,20 +253,21 @@ class Execution:
         self.next_segment = found.end_segment
         return True
 
-    def _report(self, point: dict[str, Any]) -> None:
+    def _report(self, point: Point[Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
         point = with_plausibility(self.bench, self.plan, point, self.known)
         if self.watch is not None:
             point, stop = self.watch(self.plan, self.known, point)
             if stop:
                 self.loop.request_stop(stop)
-        quality = "rejected" if not point["accepted"] else "warned" if point.get("warnings") else "good"
-        point = {"quality": quality, **point, "number": self.numbers[point["number"]]}
+        if point.quality is Quality.GOOD and point.warnings:
+            point = replace(point, quality=Quality.WARNED)
+        point = replace(point, number=self.numbers[point.number])
         self.known.append(point)
-        self._write(self.journal.point, point)
-        self.reported[point["number"]] = point
+        self._write(self.journal.point, stored(point))
+        self.reported[point.number] = point
         self.finished += 1
-        self.accepted += 1 if point["accepted"] else 0
+        self.accepted += 1 if point.accepted else 0
         self.progress.point(point, self.finished, len(self.targets))
 
     def _mark_unlocked(self) -> None:
@@ -308,8 +311,8 @@ class Execution:
         at = tripped_at(self.tick, self.plan, self.targets)
         frequency_hz = self.tick.frequency_hz
         trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
-        recorded = [point for point in self.known if "harmonics" in point or point["accepted"]]
-        points = [point for point in recorded if point.get("quality") != "implausible"]
+        recorded = [point for point in self.known if point.spectrum is not None or point.accepted]
+        points = [point for point in recorded if point.quality is not Quality.IMPLAUSIBLE]
         first = not points and (self.in_one_go or len(self.reported) <= 1)
         advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
         return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}

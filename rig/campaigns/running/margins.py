@@ -1,13 +1,13 @@
 """How near recorded points have come to the limits of the bench, and to the ends of its sensors' ranges."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.evaluation.vibrations import as_complex
+from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.tick.safety.layout import EndReason
 
 __all__ = ["Margin", "margin_before"]
@@ -35,17 +35,17 @@ class Margin(NamedTuple):
 
 
 def margin_before(
-    bench: Bench, reason: EndReason, channel: int, unit: str, points: Iterable[Mapping[str, Any]]
+    bench: Bench, reason: EndReason, channel: int, unit: str, points: Iterable[Point[Any]]
 ) -> Margin | None:
     """The highest share that points with levels in ``unit`` had reached of what a trip is about.
 
     None where the reason is about no amplitude of a channel, or no point holds harmonics.
     """
     key, allowed = _allowed(bench, reason, channel)
-    known = [point for point in points if "harmonics" in point and point["level_unit"] == unit]
+    known = [point for point in points if point.spectrum is not None and point.level_unit == unit]
     if not key or not known:
         return None
-    shares = [(_peak(point, channel, reason) / allowed, float(point["level"])) for point in known]
+    shares = [(_peak(point, channel, reason) / allowed, point.level) for point in known]
     share, level = max(shares)
     return Margin(level, share, key)
 
@@ -61,11 +61,11 @@ def _allowed(bench: Bench, reason: EndReason, channel: int) -> tuple[str, float]
     return "", math.inf
 
 
-def _peak(point: Mapping[str, Any], channel: int, reason: EndReason) -> float:
+def _peak(point: Point[Any], channel: int, reason: EndReason) -> float:
     """Largest instantaneous value of a channel over a period, without its mean; of an acceleration or its displacement."""
-    harmonics = as_complex(point["harmonics"])[channel, 1:]
+    harmonics = spectrum_of(point).harmonics[channel, 1:]
     orders = np.arange(1, harmonics.size + 1)
     if LIMITS.get(reason) == "displacement_m":
-        harmonics = -harmonics / (2.0 * math.pi * float(point["frequency_hz"]) * orders) ** 2
+        harmonics = -harmonics / (2.0 * math.pi * vibration_of(point).frequency_hz * orders) ** 2
     turns = 2j * math.pi * np.outer(np.arange(SAMPLES) / SAMPLES, orders)
     return float(np.abs((np.exp(turns) @ harmonics).real).max())

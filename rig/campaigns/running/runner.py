@@ -13,12 +13,14 @@ from rig.arming.run_facts import calibration_remarks
 from rig.arming.run_options import Progress, RunOptions
 from rig.bench import Bench
 from rig.bench.user_code import imported_code, refuse_code
+from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.continuation import what_is_left
 from rig.campaigns.running.execution import Execution, MeasuredBefore, nothing_left
 from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
-from rig.campaigns.running.trips import refuse_tripped
+from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.errors import RigError
 from rig.loop.loop import RunningLoop
 from rig.loop.session import Session, open_session
@@ -98,7 +100,7 @@ def take_up(
     progress = options.progress
     _put_back(output, progress)
     with Recording(output) as recording:
-        for number, part in enumerate(recording.parts):
+        for number, part in enumerate(recording.parts, 1):
             if part.dropped_reason:
                 progress.remark(
                     f"part {number}: {part.dropped_reason}; points whose results are missing are measured again"
@@ -108,7 +110,9 @@ def take_up(
         drawn = (recording.seed or 0) + len(recording.parts) if options.seed is None else options.seed
         information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
         finished = recording.complete and not left.changed
-        before = MeasuredBefore(left.done, left.numbers, tuple(recording.points))
+        result: type[Any] = KINDS[left.plan.kind].result
+        points = tuple(point_from(table, result) for table in recording.points)
+        before = MeasuredBefore(left.done, left.numbers, points)
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench

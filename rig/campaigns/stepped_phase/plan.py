@@ -7,9 +7,8 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from rig.campaigns.planning.drift import with_first_repeated
 from rig.campaigns.planning.locked import SettledPlan
-from rig.campaigns.planning.plan import Target
+from rig.campaigns.planning.plan import Target, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 

@@ -1,21 +1,20 @@
-"""From the recorded rows of a stepped-phase point to its result."""
+"""The points of stepped phase: what they hold, and how they come from recorded rows."""
 
-import math
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification import Backbone, IdentificationError, nonlinear_mode
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged
-from rig.campaigns.evaluation.objections import level_error, level_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record
-from rig.campaigns.evaluation.settled_quality import settled_objection, settled_quality
-from rig.campaigns.evaluation.vibrations import head, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point, with_settling
+from rig.campaigns.evaluation.lost_samples import bridged
+from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
+from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
 
-__all__ = ["STEPPED_PHASE_COLUMNS", "measure_stepped_phase_point"]
+__all__ = ["STEPPED_PHASE_COLUMNS", "SteppedPhaseResult", "measure_stepped_phase_point"]
 
 STEPPED_PHASE_COLUMNS = (
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),
@@ -29,13 +28,22 @@ STEPPED_PHASE_COLUMNS = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class SteppedPhaseResult:
+    """What a point of stepped phase has beside the rest."""
+
+    force_rms_n: float
+    """RMS of the force's samples without their mean, with all their harmonics, N."""
+    phase_lag_deg: float
+    """Lag of the drive-point acceleration behind the force, deg."""
+    level_error: float | None
+    """Relative deviation of what a loop held from its level; None with levels in volts."""
+
+
 def measure_stepped_phase_point(
     bench: Bench, plan: SteppedPhasePlan, target: Target, rows: np.ndarray, settling: np.void
-) -> dict[str, Any]:
-    """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment.
-
-    The RMS of the force is that of its samples without their mean, whatever harmonics they hold.
-    """
+) -> Point[SteppedPhaseResult]:
+    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment."""
     lag_deg = target.phase_lag_deg or 0.0
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
@@ -45,23 +53,9 @@ def measure_stepped_phase_point(
         return not_evaluated(plan, target, error, settled=True)
     force_rms_n = float(bridged(rows)[:-1, bench.index_of("force")].std())
     missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
-    found = settled_quality(vibration, bench, rows)
     off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
-    reason = settled_objection(plan, bench, vibration, found, off_level)
-    damping = float(mode.damping_ratio[0])
-    return {
-        **head(plan, target),
-        "settled": True,
-        "accepted": not reason,
-        "reason": reason,
-        "frequency_hz": vibration.frequency_hz,
-        "force_n": vibration.force_n,
-        "force_rms_n": force_rms_n,
-        "amplitude_m": vibration.amplitude_m,
-        "phase_lag_deg": lag_deg - vibration.phase_error_deg,
-        "level_error": missed,
-        "modal_frequency_hz": float(mode.modal_frequency_hz[0]),
-        "damping_ratio": damping if math.isfinite(damping) else None,
-        **found,
-        **of_a_record(bench, vibration, rows, settling),
-    }
+    point = settled_point(plan, target, bench, vibration, rows, off_level)
+    result = SteppedPhaseResult(
+        force_rms_n=force_rms_n, phase_lag_deg=lag_deg - vibration.phase_error_deg, level_error=missed
+    )
+    return with_settling(replace(point, modal=modal_part(mode), result=result), settling)

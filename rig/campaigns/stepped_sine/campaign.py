@@ -4,13 +4,14 @@ from identification import FrequencyResponse
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
-from rig.campaigns.stepped_sine.points import STEPPED_SINE_COLUMNS, measure_stepped_sine_point
+from rig.campaigns.stepped_sine.points import STEPPED_SINE_COLUMNS, SteppedSineResult, measure_stepped_sine_point
 
 __all__ = ["STEPPED_SINE"]
 
 
 STEPPED_SINE = Campaign(
     plan=SteppedSinePlan,
+    result=SteppedSineResult,
     measure=measure_stepped_sine_point,
     columns=STEPPED_SINE_COLUMNS,
     draw="rig.campaigns.stepped_sine.figure:draw",

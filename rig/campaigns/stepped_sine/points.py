@@ -1,19 +1,27 @@
-"""From the recorded rows of a stepped-sine point to its result."""
+"""The points of a stepped sine: what they hold, and how they come from recorded rows."""
 
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification import IdentificationError
 from rig.bench import Bench
+from rig.campaigns.evaluation.acceptance import (
+    alien_objection,
+    drift_objection,
+    first_of,
+    level_error,
+    level_objection,
+    with_settling,
+)
 from rig.campaigns.evaluation.alien_force import alien_force
-from rig.campaigns.evaluation.objections import alien_objection, drift_objection, first_of, level_error, level_objection
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS, of_a_record
-from rig.campaigns.evaluation.vibrations import head, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.evaluation.point import Point, Quality, planned_point
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
+from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 
-__all__ = ["STEPPED_SINE_COLUMNS", "measure_stepped_sine_point"]
+__all__ = ["STEPPED_SINE_COLUMNS", "SteppedSineResult", "measure_stepped_sine_point"]
 
 TRUSTED_ALIEN_FORCE = 0.1  # what no lock holds is warned of, where plans under a lock accept no more
 
@@ -26,10 +34,20 @@ STEPPED_SINE_COLUMNS = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class SteppedSineResult:
+    """What a point of a stepped sine has beside the rest."""
+
+    phase_lag_deg: float
+    """Lag of the displacement behind the force, deg."""
+    level_error: float | None
+    """Relative deviation of what a loop held from its level; None with levels in volts."""
+
+
 def measure_stepped_sine_point(
     bench: Bench, plan: SteppedSinePlan, target: Target, rows: np.ndarray, settling: np.void
-) -> dict[str, Any]:
-    """The result of a recorded point, with its own quality; ``settling`` is the outcome record of its settle segment."""
+) -> Point[SteppedSineResult]:
+    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment."""
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
         vibration = recorded_vibration(bench, rows, plan.harmonics)
@@ -45,18 +63,15 @@ def measure_stepped_sine_point(
         )
     )
     alien = alien_force(bench, [rows])
-    point = of_a_record(bench, vibration, rows, settling)
-    point["warnings"] += filter(None, [alien_objection(alien, TRUSTED_ALIEN_FORCE)])
-    return {
-        **head(plan, target),
-        "settled": True,
-        "accepted": not reason,
-        "reason": reason,
-        "frequency_hz": vibration.frequency_hz,
-        "force_n": vibration.force_n,
-        "amplitude_m": vibration.amplitude_m,
-        "level_error": missed,
-        "phase_lag_deg": vibration.phase_lag_deg,
-        "alien_force": alien,
-        **point,
-    }
+    point = replace(
+        planned_point(plan, target),
+        settled=True,
+        reason=reason,
+        quality=Quality.of(reason),
+        warnings=quality_warnings(bench, vibration, rows),
+        alien_force=alien,
+        vibration=vibration_part(vibration, rows),
+        result=SteppedSineResult(phase_lag_deg=vibration.phase_lag_deg, level_error=missed),
+    )
+    objection = alien_objection(alien, TRUSTED_ALIEN_FORCE)
+    return with_settling(point.warned(objection) if objection else point, settling)

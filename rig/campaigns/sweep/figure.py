@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import ForceDropOut, Transient, force_drop_out, zero_crossings
+from rig.campaigns.evaluation.point import result_of
 from rig.campaigns.evaluation.recorded import point_rows, specimen_of
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.sweep.campaign import recorded_sweeps
+from rig.campaigns.sweep.points import SweepResult
 from rig.figures.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
 from rig.figures.style import title as heading
 from rig.recording.reader import Recording
@@ -24,17 +27,18 @@ Float = NDArray[np.float64]
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw the last sweep of a recording; no other rows are read."""
     number, sweep = list(recorded_sweeps(recording).items())[-1]
-    rows, point = point_rows(recording, number), recording.latest[number]
-    held = "uncontrolled"
-    if "held_least" in point:
-        held = f"held within {100.0 * point['held_least']:.1f} to {100.0 * point['held_most']:.1f} %"
+    rows, point = point_rows(recording, number), point_from(recording.latest[number], SweepResult)
+    held = result_of(point).held
+    text = "uncontrolled"
+    if held is not None:
+        text = f"held within {100.0 * held.held_least:.1f} to {100.0 * held.held_most:.1f} %"
     draw_sweep(
         page,
         sweep,
         np.vstack([rows["inputs"].T, rows["output_v"]]),
         float(recording.configuration["bench"]["sample_rate_hz"]),
         drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"].get("off_resonance_hz")),
-        title=f"{specimen_of(recording)}: sweep at {point['level']:g} {point['level_unit']}, {held}",
+        title=f"{specimen_of(recording)}: sweep at {point.level:g} {point.level_unit}, {text}",
     )
 
 

@@ -1,20 +1,20 @@
-"""From the recorded rows of a sweep to its result, and to fundamentals over time."""
+"""Sweeps: what their points hold, how they come from recorded rows, and fundamentals over time."""
 
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from controller import AmplitudeLaw
-from identification import IdentificationError, Transient, demodulate, force_drop_out
+from identification import ForceDropOut, IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged, lost_rows, rms_of
-from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, head, skew_turn
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of
+from rig.campaigns.evaluation.point import PART, Point, Quality, planned_point
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, not_evaluated, skew_turn
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.tick.layout import SATURATED
 
-__all__ = ["SWEEP_COLUMNS", "measure_sweep", "transient_of"]
+__all__ = ["SWEEP_COLUMNS", "HeldCourse", "SweepResult", "measure_sweep", "transient_of"]
 
 NOT_HELD = 0.05  # of its level: a deviation that is said
 USUAL = 0.75  # of a sweep: over so much of it the level is to be held
@@ -31,29 +31,67 @@ SWEEP_COLUMNS = (
 )
 
 
-def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, settling: np.void) -> dict[str, Any]:
-    """The result of a recorded sweep: a transient vibration, that nothing was asked to settle in."""
-    point = head(plan, target)
+@dataclass(frozen=True, kw_only=True)
+class HeldCourse:
+    """What a loop held over a sweep."""
+
+    held_least: float
+    """Smallest value of what was held, over its level."""
+    held_least_frequency_hz: float
+    """Where that was, Hz."""
+    held_most: float
+    """Largest value, over its level."""
+    held_most_frequency_hz: float
+    """Where that was, Hz."""
+    held_rms_error: float
+    """RMS of the relative deviation from the level."""
+    held_usual_error: float
+    """Relative deviation that three quarters of the sweep keep to."""
+    saturated_share: float
+    """Part of the sweep with the output at its limit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepResult:
+    """What was measured of a sweep."""
+
+    drop_out: ForceDropOut = field(metadata=PART)
+    """How far the force's fundamental dropped at the resonance."""
+    minimum_ratio: float
+    """Smallest force over the one off resonance."""
+    overshoot_ratio: float
+    """Largest force after that, over the one off resonance."""
+    duration_s: float
+    """Length of the sweep, s."""
+    held: HeldCourse | None = field(default=None, metadata=PART)
+    """What was held; None with levels in volts."""
+
+
+def measure_sweep(
+    bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, settling: np.void
+) -> Point[SweepResult]:
+    """A recorded sweep, a transient vibration that is not asked to settle."""
     try:
         transient = transient_of(bench, rows)
         drop_out = force_drop_out(transient, off_resonance_hz=plan.off_resonance_hz)
     except (IdentificationError, ArithmeticError) as error:
-        return {**point, "settled": False, "accepted": False, "reason": f"cannot be evaluated: {error}"}
-    held = _held(bench, plan, target, rows, transient)
-    held["warnings"] += _gaps(transient, rows)
-    reason = _level_objection(plan, held.get("held_usual_error"))
-    return {
-        **point,
-        "settled": None,
-        "accepted": not reason,
-        "reason": reason,
-        **asdict(drop_out),
-        "minimum_ratio": drop_out.minimum_ratio,
-        "overshoot_ratio": drop_out.overshoot_ratio,
-        "channel_rms": rms_of(rows),
-        "duration_s": rows.size / bench.sample_rate_hz,
-        **held,
-    }
+        return not_evaluated(plan, target, error, settled=False)
+    held, warnings = _held(bench, plan, target, rows, transient)
+    reason = "" if held is None else _level_objection(plan, held.held_usual_error)
+    return replace(
+        planned_point(plan, target),
+        reason=reason,
+        quality=Quality.of(reason),
+        warnings=(*warnings, *_gaps(transient, rows)),
+        channel_rms=tuple(rms_of(rows)),
+        result=SweepResult(
+            drop_out=drop_out,
+            minimum_ratio=drop_out.minimum_ratio,
+            overshoot_ratio=drop_out.overshoot_ratio,
+            duration_s=rows.size / bench.sample_rate_hz,
+            held=held,
+        ),
+    )
 
 
 def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
@@ -71,9 +109,9 @@ def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
     )
 
 
-def _level_objection(plan: SweepPlan, error: float | None) -> str:
-    """That what was held was too far from its level, jumps aside: through these no loop holds it."""
-    if error is None or error <= plan.accepted_level_error:
+def _level_objection(plan: SweepPlan, error: float) -> str:
+    """That what was held was too far from its level in a large part of the sweep; no loop holds it through a jump."""
+    if error <= plan.accepted_level_error:
         return ""
     held = "displacement" if plan.level_unit == "m" else "force"
     return (
@@ -82,10 +120,12 @@ def _level_objection(plan: SweepPlan, error: float | None) -> str:
     )
 
 
-def _held(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, transient: Transient) -> dict[str, Any]:
-    """Least and largest of what a loop held, over its level; where that was; and what stood in its way."""
+def _held(
+    bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, transient: Transient
+) -> tuple[HeldCourse | None, list[str]]:
+    """Least and largest of what a loop held, over its level, and where; and warnings about it."""
     if plan.amplitude_law is AmplitudeLaw.VOLTAGE:
-        return {"warnings": []}
+        return None, []
     held = _course(bench, plan, rows, transient) / target.level
     least, most = int(np.argmin(held)), int(np.argmax(held))
     share = float(np.mean((rows["flags"] & SATURATED) != 0))
@@ -94,16 +134,16 @@ def _held(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, trans
         if abs(held[place] - 1.0) > NOT_HELD:
             where = f"{100.0 * held[place]:.1f} % of its level at {transient.frequency_hz[place]:.3f} Hz"
             warnings.append(f"the {'displacement' if plan.level_unit == 'm' else 'force'} {name} {where}")
-    return {
-        "held_least": float(held[least]),
-        "held_least_frequency_hz": float(transient.frequency_hz[least]),
-        "held_most": float(held[most]),
-        "held_most_frequency_hz": float(transient.frequency_hz[most]),
-        "held_rms_error": float(np.sqrt(np.mean((held - 1.0) ** 2))),
-        "held_usual_error": float(np.quantile(np.abs(held - 1.0), USUAL)),
-        "saturated_share": share,
-        "warnings": warnings,
-    }
+    course = HeldCourse(
+        held_least=float(held[least]),
+        held_least_frequency_hz=float(transient.frequency_hz[least]),
+        held_most=float(held[most]),
+        held_most_frequency_hz=float(transient.frequency_hz[most]),
+        held_rms_error=float(np.sqrt(np.mean((held - 1.0) ** 2))),
+        held_usual_error=float(np.quantile(np.abs(held - 1.0), USUAL)),
+        saturated_share=share,
+    )
+    return course, warnings
 
 
 def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transient) -> np.ndarray:

@@ -11,12 +11,16 @@ from identification import Experiment, IdentificationError
 from identification.signals.decimation import LARGEST_FACTOR
 from identification.validation import positive
 from rig.bench.configuration import validated
+from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.point import Point, point_name, vibration_of
+from rig.campaigns.evaluation.recorded import points_of
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.planning.drift import of_the_result
+from rig.campaigns.multisine.points import MultisineResult
 from rig.errors import RecordingError
 from rig.measurements import bench_of_recording, point_rows
-from rig.measurements.experiments.periods import Periods, realisation
+from rig.measurements.experiments.periods import Periods, WantedPeriods, realisation
 from rig.measurements.experiments.records import FEWEST_PERIODS, segment, sweep_pieces
 from rig.measurements.experiments.signals import Signals
 from rig.recording.reader import Recording
@@ -107,67 +111,67 @@ def experiments(
             f"rate_hz: is {rate_hz:.10g} Hz, {recording.path} was recorded at {bench.sample_rate_hz:g} Hz; allowed are ratios "
             f"of whole numbers up to {LARGEST_FACTOR}, such as {float(whole) * bench.sample_rate_hz:.10g} Hz"
         )
-    used = _accepted(recording)
-    stem = recording.path.stem
     if _made_of(recording) == "realisations":
         plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
+        ahead = max(1, plan.transient_periods) if transient_periods is None else transient_periods
+        wanted = WantedPeriods(rate_hz=rate_hz, periods=periods, transient_periods=ahead)
         return tuple(
             realisation(
                 signals,
                 plan,
                 point,
-                point_rows(recording, point["number"]),
-                rate_hz=rate_hz,
-                periods=periods,
-                transient_periods=max(1, plan.transient_periods) if transient_periods is None else transient_periods,
-                name=f"{_called(stem, point)}, realisation {point['realisation']}",
+                point_rows(recording, point.number),
+                wanted,
+                f"{_called(recording.path.stem, point)}, realisation {point.realisation}",
             )
-            for point in used
+            for point in _accepted(recording, MultisineResult)
         )
-    found = tuple(_records(recording, signals, used, rate_hz, segment_periods))
+    found = tuple(_records(recording, signals, _accepted(recording), rate_hz, segment_periods))
     if not found:
         raise IdentificationError(f"{recording.path}: no record without lost samples is long enough to be of use")
     return found
 
 
 def _records(
-    recording: Recording, signals: Signals, points: Sequence[dict[str, Any]], rate_hz: float, segment_periods: int
+    recording: Recording, signals: Signals, points: Sequence[Point[Any]], rate_hz: float, segment_periods: int
 ) -> Iterable[Experiment]:
     """Experiments of all that is no multisine."""
     for point in points:
-        rows, name = point_rows(recording, point["number"]), _called(recording.path.stem, point)
+        rows, name = point_rows(recording, point.number), _called(recording.path.stem, point)
         if _made_of(recording) == "sweeps":
             start_hz = float(recording.configuration["plan"]["start_hz"])
-            lead = rows_from_rest(recording, point["number"], Fraction(rate_hz / signals.bench.sample_rate_hz))
+            lead = rows_from_rest(recording, point.number, Fraction(rate_hz / signals.bench.sample_rate_hz))
             rows = np.concatenate([lead, rows])
-            yield from sweep_pieces(signals, point, rows, lead.size, start_hz=start_hz, rate_hz=rate_hz, name=name)
+            yield from sweep_pieces(
+                signals, point.level, rows, lead.size, start_hz=start_hz, rate_hz=rate_hz, name=name
+            )
         else:
-            name = f"{name}, point {point['number']}"
+            name = f"{name}, {point_name(point.number)}"
             found = segment(signals, point, rows, rate_hz=rate_hz, periods=segment_periods, name=name)
             if found is not None:
                 yield found
 
 
 def rows_from_rest(recording: Recording, number: int, ratio: Fraction) -> np.ndarray:
-    """The rows before a point from the last one without an output on: how it was brought to where it begins.
+    """The rows before a point, by its stored ``number`` from 0, from the last one without an output on: how it was approached.
 
     With as many more as it takes for a sample at the new rate to fall on the point's first.
     """
     step = ratio.limit_denominator(LARGEST_FACTOR).denominator
     for part in reversed(recording.parts):
-        for point in part.points:
-            if point["number"] == number and "end_sample" in point:
-                first = int(point["first_sample"])
-                begin = max(
-                    (int(p["end_sample"]) for p in part.points if p.get("end_sample", first + 1) <= first), default=0
-                )
+        points = [point_from(table) for table in part.points]
+        for point in points:
+            if point.number == number and point.rows is not None:
+                first = point.rows.first_sample
+                ends = [one.rows.end_sample for one in points if one.rows is not None]
+                begin = max((end for end in ends if end <= first), default=0)
                 rows = part.read(begin, first)
                 quiet = np.flatnonzero(np.abs(rows["command_v"]) == 0.0)
                 if not quiet.size:
                     return rows[:0]
                 lead = -(-(rows.size - int(quiet[-1])) // step) * step
                 return rows[max(rows.size - lead, rows.size % step) :]
-    raise RecordingError(f"point {number}: nothing was recorded of it")
+    raise RecordingError(f"{point_name(number)}: nothing was recorded of it")
 
 
 def default_rate_hz(recording: Recording) -> float:
@@ -197,20 +201,21 @@ def _highest_hz(recording: Recording) -> float:
         return float(plan["highest_hz"])
     if _made_of(recording) == "sweeps":
         return max(float(plan["start_hz"]), float(plan["stop_hz"]))
-    return max(float(point["frequency_hz"]) for point in _accepted(recording))
+    return max(vibration_of(point).frequency_hz for point in _accepted(recording))
 
 
 def _made_of(recording: Recording) -> str | None:
     return CAMPAIGNS[recording.kind].experiments
 
 
-def _accepted(recording: Recording) -> list[dict[str, Any]]:
+def _accepted(recording: Recording, result: type[Any] | None = None) -> list[Point[Any]]:
     """The accepted points that the plan in force asks for, without the first one repeated at the end."""
-    found = [point for point in of_the_result(recording.latest.values()) if point["accepted"]]
+    points = points_of(recording) if result is None else points_of(recording, result)
+    found = [point for point in of_the_result(points) if point.accepted]
     if not found:
         raise IdentificationError(f"{recording.path}: points: none of the recording was accepted")
-    return [dict(point) for point in found]
+    return found
 
 
-def _called(stem: str, point: dict[str, Any]) -> str:
-    return f"{stem}, {point['level']:.4g} {point['level_unit']}"
+def _called(stem: str, point: Point[Any]) -> str:
+    return f"{stem}, {point.level:.4g} {point.level_unit}"

@@ -1,45 +1,57 @@
 """Multisine realisations as experiments: a settled period each, resampled without any error where the rates allow it."""
 
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from identification import Experiment, IdentificationError
 from rig.bench import Bench
+from rig.campaigns.evaluation.point import Point, result_of
 from rig.campaigns.evaluation.vibrations import skew_turn
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.multisine.points import turned_periods
+from rig.campaigns.multisine.points import MultisineResult, turned_periods
 from rig.measurements.experiments.signals import Signals
 
-__all__ = ["Periods", "realisation"]
+__all__ = ["Periods", "WantedPeriods", "realisation"]
 
 Periods = Literal["mean", "all"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WantedPeriods:
+    """How realisations become experiments."""
+
+    rate_hz: float
+    """Sample rate of the experiments, Hz."""
+    periods: Periods
+    """The mean over the periods of a realisation, or all of them."""
+    transient_periods: float
+    """Periods that are put ahead and do not count."""
 
 
 def realisation(
     signals: Signals,
     plan: MultisinePlan,
-    point: dict[str, Any],
+    point: Point[MultisineResult],
     rows: np.ndarray,
-    *,
-    rate_hz: float,
-    periods: Periods,
-    transient_periods: float,
+    wanted: WantedPeriods,
     name: str,
 ) -> Experiment:
     """The mean over a realisation's periods, or all of them one after the other, begun where the signal begins.
 
     Periods in which samples were lost are left out. Raises `IdentificationError` where none is left, or a period is no
-    whole number of samples at ``rate_hz``.
+    whole number of samples at the wanted rate.
     """
-    bench = signals.bench
-    recorded = turned_periods(bench, plan.model_copy(update={"periods": point["periods"]}), point["realisation"], rows)
-    if periods == "mean":
+    bench, rate_hz = signals.bench, wanted.rate_hz
+    played = plan.model_copy(update={"periods": result_of(point).periods})
+    recorded = turned_periods(bench, played, point.realisation or 0, rows)
+    if wanted.periods == "mean":
         recorded = recorded.mean(axis=1, keepdims=True)
     size = samples_of_a_period(plan, bench, rate_hz)
     slow = _resampled(recorded, bench, size, signals.offset)
     once = slow.reshape(slow.shape[0], -1)
-    ahead = round(transient_periods * size)
+    ahead = round(wanted.transient_periods * size)
     both = np.concatenate([once[:, np.arange(-ahead, 0) % once.shape[1]], once], axis=1)
     return Experiment(
         inputs=both[list(signals.inputs)],
@@ -50,7 +62,7 @@ def realisation(
         counted_from=ahead,
         period_samples=size,
         name=name,
-        level=float(point["level"]),
+        level=point.level,
         specimen=bench.specimen.name,
         excited_hz=(plan.lowest_hz, plan.highest_hz),
     )

@@ -9,8 +9,8 @@ import numpy as np
 from identification import decimated
 from identification.pnlss.experiment import Experiment, InitialState
 from identification.signals.decimation import EDGE_SAMPLES
-from rig.campaigns.evaluation.gaps import lost_rows
-from rig.campaigns.evaluation.vibrations import as_complex
+from rig.campaigns.evaluation.lost_samples import lost_rows
+from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.measurements.experiments.signals import Signals
 
 __all__ = ["segment", "sweep_pieces"]
@@ -24,14 +24,14 @@ SHORTEST_PIECE = 20
 
 
 def segment(
-    signals: Signals, point: dict[str, Any], rows: np.ndarray, *, rate_hz: float, periods: int, name: str
+    signals: Signals, point: Point[Any], rows: np.ndarray, *, rate_hz: float, periods: int, name: str
 ) -> Experiment | None:
     """The first so many periods of a settled point, in its longest stretch without lost samples; None if that is too short.
 
     Its state before the first sample is to be estimated.
     """
-    fs, frequency_hz = signals.bench.sample_rate_hz, float(point["frequency_hz"])
-    static = as_complex(point["harmonics"])[:, 0].real
+    fs, frequency_hz = signals.bench.sample_rate_hz, vibration_of(point).frequency_hz
+    static = spectrum_of(point).harmonics[:, 0].real
     whole = max(_stretches(rows), key=lambda piece: piece.stop - piece.start, default=slice(0, 0))
     values = signals.of(rows[whole])
     offset = signals.offset
@@ -41,12 +41,12 @@ def segment(
     slow = _slower(signals, values[:, : int(enough)], rate_hz, begins_at_rest=False)[:, :wanted]
     if slow.shape[1] < FEWEST_PERIODS * rate_hz / frequency_hz:
         return None
-    return _experiment(signals, slow, rate_hz, "estimated", name, float(point["force_n"]))
+    return _experiment(signals, slow, rate_hz, "estimated", name, vibration_of(point).force_n)
 
 
 def sweep_pieces(
     signals: Signals,
-    point: dict[str, Any],
+    level: float,
     rows: np.ndarray,
     before: int,
     *,
@@ -56,7 +56,7 @@ def sweep_pieces(
 ) -> Iterator[Experiment]:
     """A whole sweep, or its pieces between lost samples; from rest where it begins there, else from an estimated state.
 
-    ``before``: how many of the rows lead to the sweep; they are simulated and do not count.
+    ``before``: how many of the rows lead to the sweep; they are simulated and do not count. ``level``: that of the plan.
     """
     fs = signals.bench.sample_rate_hz
     shortest = SHORTEST_PIECE * fs / start_hz
@@ -70,7 +70,7 @@ def sweep_pieces(
         rest = bool(np.all(first <= AT_REST * np.abs(used).max(axis=1)))
         slow = _slower(signals, values, rate_hz, begins_at_rest=rest)
         called = name if len(pieces) == 1 else f"{name}, piece {number}"
-        found = _experiment(signals, slow, rate_hz, "zero" if rest else "estimated", called, float(point["level"]))
+        found = _experiment(signals, slow, rate_hz, "zero" if rest else "estimated", called, level)
         yield replace(found, counted_from=round(max(0, before - piece.start) * rate_hz / fs))
 
 

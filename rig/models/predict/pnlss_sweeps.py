@@ -15,7 +15,8 @@ from identification import (
 )
 from identification.channels import find_role
 from identification.pnlss.errors import estimated_initial_state
-from rig.campaigns.evaluation.gaps import bridged, lost_rows
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of
 from rig.campaigns.sweep.plan import SweepPlan
@@ -50,7 +51,7 @@ def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swep
         )
         recorded = sweeps(recording)
         for number, sweep in recorded.items():
-            name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
+            name = path.stem if len(recorded) == 1 else f"{path.stem} [{number + 1}]"
             given, more = _recorded(recording, number, models)
             predicted = models.predict(given)
             yield Swept(predicted, force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), (*notes, *more))
@@ -105,8 +106,8 @@ def _largest_in_training(model: PnlssModel, row: int) -> float:
 
 
 def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tuple[SweepGiven, tuple[str, ...]]:
-    """A sweep at the model's rate, with the oscillator's phase at its counted samples; gaps are bridged."""
-    bench, model = bench_of_recording(recording), models.model
+    """A sweep by its stored number, at the model's rate, with the oscillator's phase at its counted samples; gaps are bridged."""
+    bench, model, name = bench_of_recording(recording), models.model, f"sweep {number + 1}"
     try:
         signals = Signals.chosen(bench, [c.name for c in models.inputs], [c.name for c in model.outputs])
     except IdentificationError as error:
@@ -123,25 +124,25 @@ def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tu
     ends = (float(plan["start_hz"]), float(plan["stop_hz"]))
     pieces = sweep_pieces(
         signals,
-        dict(recording.latest[number]),
+        point_from(recording.latest[number]).level,
         rows,
         lead.size,
         start_hz=ends[0],
         rate_hz=rate_hz,
-        name=f"sweep {number}",
+        name=name,
     )
     found = next(pieces, None)
     if found is None:
-        raise IdentificationError(f"{recording.path}: sweep {number} is too short to be predicted")
+        raise IdentificationError(f"{recording.path}: {name} is too short to be predicted")
     turned = np.unwrap(own["theta_rad"].astype(float))
     theta = np.interp(np.arange(found.counted) * fs / rate_hz, np.arange(turned.size), turned)
-    said = [f"{recording.path}: {lost} samples of sweep {number} were lost and are bridged"] if lost else []
+    said = [f"{recording.path}: {lost} samples of {name} were lost and are bridged"] if lost else []
     begin = None
     if found.initial_state == "estimated":
         if models.exciter is None:
             begin = estimated_initial_state(model, found)
         else:
-            said.append(f"{recording.path}: sweep {number} does not begin at rest, but is simulated as if it did")
+            said.append(f"{recording.path}: {name} does not begin at rest, but is simulated as if it did")
     row = find_role(model.outputs, "drive")
     given = SweepGiven(
         inputs=found.inputs,

@@ -25,7 +25,8 @@ from identification import (
 from identification.prediction.comparison import Over
 from identification.prediction.frequency_response import HeldForce
 from identification.prediction.properties import FLAGGED_BEYOND
-from rig.campaigns.evaluation.vibrations import as_complex
+from rig.campaigns.evaluation.point import spectrum_of, vibration_of
+from rig.campaigns.evaluation.recorded import points_of
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import STEPPED, frequency_responses
 from rig.models.files.exciter import EXCITER
@@ -170,10 +171,10 @@ def _references(path: Path, request: PredictionRequest) -> list[Reference]:
     if kind_of(path) in STEPPED:
         with Recording(path) as recording:
             row = [channel["role"] for channel in recording.channels].index("force")
-            for point in (point for point in recording.latest.values() if point["accepted"]):
-                force = np.abs(as_complex(point["harmonics"])[row])
+            for point in (point for point in points_of(recording) if point.accepted):
+                force = np.abs(spectrum_of(point).harmonics[row])
                 if force.size > 2 and force[1] > 0.0:
-                    ratios[point["level"], point["frequency_hz"]] = float(force[2] / force[1])
+                    ratios[point.level, vibration_of(point).frequency_hz] = float(force[2] / force[1])
     found = []
     for measured in _stepped_sines(path):
         top = float(measured.frequency_hz[int(np.argmax(measured.amplitude_m))])

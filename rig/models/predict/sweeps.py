@@ -18,7 +18,7 @@ from identification import (
     zero_crossings,
 )
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged
+from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.sweep.plan import SweepPlan
@@ -92,7 +92,7 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
         if rejected or not recording.complete:
             notes += (f"{path}: is not complete; sweeps accepted, and predicted: {len(recorded)}",)
         for number, sweep in recorded.items():
-            name = path.stem if len(recorded) == 1 else f"{path.stem} [{number}]"
+            name = path.stem if len(recorded) == 1 else f"{path.stem} [{number + 1}]"
             which = models.zero_crossings
             predicted = models.predict(sweep if which is None else _between_crossings(recording, number, which))
             yield Swept(predicted, force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), notes)

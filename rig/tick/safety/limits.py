@@ -82,7 +82,7 @@ def describe_end(guard: np.ndarray, bench: Bench) -> str:
     """One sentence on why the output was brought down: reason, channel, value, sample.
 
     What to look for is said only where no lock was gained at the start; the likely cause of a trip needs what was measured
-    before it (`rig.campaigns.running.advice`).
+    before it (`rig.campaigns.running.trip_advice`).
     """
     reason = EndReason(int(guard["reason"][0]))
     text = TEXT[reason]

@@ -7,7 +7,7 @@ import pytest
 
 import rig
 from rig.campaigns.evaluation.alien_force import FEWEST_PERIODS, alien_force
-from rig.campaigns.evaluation.quality import PURITY_COLUMNS
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plans import load_plan
 from rig.tick.layout import recorded_row

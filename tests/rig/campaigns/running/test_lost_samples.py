@@ -7,7 +7,7 @@ import pytest
 
 import rig
 from rig.bench import Bench
-from rig.campaigns.evaluation.gaps import bridged, lost_rows
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import RecordingError

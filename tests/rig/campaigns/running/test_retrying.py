@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rig
-from rig.campaigns.running.trips import refuse_tripped
+from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.cli import main
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError

@@ -1,10 +1,12 @@
 """At which level a run tripped, and what asks for it again."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.planning.plan import Plan, Target
 from rig.errors import ConfigurationError
 from rig.recording.parts import Part
@@ -78,17 +80,17 @@ def _said(part: Part) -> TrippedAt | None:
     end = part.end or {}
     if "tripped_at" in end:
         return None if end["tripped_at"] is None else TrippedAt(**end["tripped_at"])
-    failed = [point for point in part.points if not point["accepted"]]
-    return TrippedAt(failed[-1]["level"], failed[-1]["level_unit"], start=False) if failed else None
+    failed = [point for point in map(point_from, part.points) if not point.accepted]
+    return TrippedAt(failed[-1].level, failed[-1].level_unit, start=False) if failed else None
 
 
 def _reached_since(parts: Sequence[Part], at: TrippedAt) -> bool:
     """Whether a point at such a level, or a higher one, was accepted later; after a start, any."""
-    return any(_is_beyond(point, at) for part in parts for point in part.points if point["accepted"])
+    return any(_is_beyond(point, at) for part in parts for point in map(point_from, part.points) if point.accepted)
 
 
-def _is_beyond(point: Mapping[str, Any], at: TrippedAt) -> bool:
-    return at.start or (point["level_unit"] == at.level_unit and point["level"] >= ALMOST * at.level)
+def _is_beyond(point: Point[Any], at: TrippedAt) -> bool:
+    return at.start or (point.level_unit == at.level_unit and point.level >= ALMOST * at.level)
 
 
 def _asks_for(plan: Plan, left: Sequence[Target], at: TrippedAt) -> bool:

@@ -4,10 +4,10 @@ from collections import deque
 
 import numpy as np
 
-__all__ = ["KeptRows"]
+__all__ = ["RowBuffer"]
 
 
-class KeptRows:
+class RowBuffer:
     """Chunks of rows in their order, by the number of their first sample."""
 
     def __init__(self, dtype: np.dtype) -> None:

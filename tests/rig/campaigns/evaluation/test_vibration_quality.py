@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Backbone, Channel, PeriodicVibration, nonlinear_mode
-from rig.campaigns.evaluation.quality import lag_scatter_deg, purity, quality_warnings, what_was_skipped
+from rig.campaigns.evaluation.vibration_quality import lag_scatter_deg, purity, quality_warnings, what_was_skipped
 from rig.tick.layout import ROW
 from tests.rig.rigs import bench_with
 

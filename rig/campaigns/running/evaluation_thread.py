@@ -5,13 +5,15 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-__all__ = ["Evaluations"]
+from rig.campaigns.evaluation.point import Point
 
-Points = list[dict[str, Any]]
+__all__ = ["EvaluationThread"]
+
+Points = list[Point[Any]]
 
 
-class Evaluations:
-    """Evaluations in a thread of their own, one after the other, and their points in the order in which they were asked for."""
+class EvaluationThread:
+    """Evaluates points one after the other in a thread of its own, and returns them in the order of the requests."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "evaluation")
@@ -21,7 +23,7 @@ class Evaluations:
         """Have points worked out from ``arguments``, which nobody may change any more."""
         self._asked.append(self._thread.submit(step, *arguments))
 
-    def known(self, point: dict[str, Any]) -> None:
+    def known(self, point: Point[Any]) -> None:
         """Put in a point that needs no evaluation, behind those asked for before."""
         self.ask(lambda: [point])
 

@@ -1,13 +1,14 @@
 """What a trip was likely caused by, from what was measured before it, and what to do."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from rig.bench import Bench
+from rig.campaigns.evaluation.point import Point
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.margins import LIMITS, margin_before
-from rig.campaigns.running.trips import TrippedAt
+from rig.campaigns.running.tripped_level import TrippedAt
 from rig.tick.safety.layout import POLARITY_HINT, EndReason
 
 __all__ = ["Advice", "Before", "Trip", "advice_on"]
@@ -47,7 +48,7 @@ class Trip(NamedTuple):
 class Before(NamedTuple):
     """What the run had come to before it tripped."""
 
-    points: Sequence[Mapping[str, Any]]
+    points: Sequence[Point[Any]]
     """Points that were recorded, accepted or not."""
     locked: bool
     """Whether a lock was gained at any time."""

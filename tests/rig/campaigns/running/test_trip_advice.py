@@ -8,10 +8,10 @@ from rig.bench import load_bench
 from rig.campaigns.evaluation.vibrations import as_pairs
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.plans import load_plan
-from rig.campaigns.running.advice import Before, Trip, advice_on
-from rig.campaigns.running.trips import TrippedAt
+from rig.campaigns.running.trip_advice import Before, Trip, advice_on
+from rig.campaigns.running.tripped_level import TrippedAt
 from rig.tick.safety.layout import POLARITY_HINT, EndReason
-from tests.rig.campaigns.evaluation.test_quality import vibration
+from tests.rig.campaigns.evaluation.test_vibration_quality import vibration
 
 BENCH = load_bench("magnet-beam")
 PLAN = load_plan("magnet-beam/backbone").model_copy(

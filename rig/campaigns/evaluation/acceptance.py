@@ -1,12 +1,23 @@
-"""Why a recorded point is not accepted: one line each, empty where there is nothing to object to."""
+"""Whether a recorded point is accepted.
+
+An objection is a line that says why a point is not accepted; it is empty where there is nothing to object to.
+"""
 
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from controller import AmplitudeLaw
 from identification import PeriodicVibration
 from rig.bench import Bench
+from rig.campaigns.evaluation.alien_force import alien_force
+from rig.campaigns.evaluation.point import Lock, Point, Quality, planned_point
+from rig.campaigns.evaluation.vibration_quality import lag_scatter_deg, quality_warnings, vibration_part
+from rig.campaigns.evaluation.vibrations import frequency_scatter
+from rig.campaigns.planning.locked import SettledPlan
+from rig.campaigns.planning.plan import Target
 
 __all__ = [
     "alien_objection",
@@ -16,7 +27,9 @@ __all__ = [
     "level_error",
     "level_objection",
     "phase_objection",
+    "settled_point",
     "std_objection",
+    "with_settling",
 ]
 
 MOTIONS = ("drive", "response")
@@ -102,3 +115,41 @@ def std_objection(frequency: float, accepted_frequency: float, damping: float, a
         if not std <= accepted:
             return f"standard error of the {name} {100.0 * std:.2g} %, accepted up to {100.0 * accepted:g} %"
     return ""
+
+
+def settled_point(
+    plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, level: str = ""
+) -> Point[Any]:
+    """A point that was settled and then recorded at a held lag, accepted or not; ``level`` is the objection to what was held.
+
+    All campaigns that settle and record at a held lag judge their points here.
+    """
+    scatter, alien = frequency_scatter(rows["theta_rad"]), alien_force(bench, [rows])
+    reason = first_of(
+        (
+            phase_objection(vibration.phase_error_deg, plan.accepted_phase_error_deg),
+            level,
+            alien_objection(alien, plan.accepted_alien_force),
+            hunting_objection(scatter, plan.accepted_frequency_scatter),
+            drift_objection(bench, vibration, plan.accepted_drift),
+        )
+    )
+    return replace(
+        planned_point(plan, target),
+        settled=True,
+        reason=reason,
+        quality=Quality.of(reason),
+        warnings=quality_warnings(bench, vibration, rows),
+        alien_force=alien,
+        vibration=vibration_part(vibration, rows),
+        lock=Lock(
+            phase_error_deg=vibration.phase_error_deg,
+            phase_scatter_deg=lag_scatter_deg(rows),
+            frequency_scatter=scatter,
+        ),
+    )
+
+
+def with_settling(point: Point[Any], settling: np.void) -> Point[Any]:
+    """The point with what its settle segment came to, from the outcome record of that segment."""
+    return replace(point, settle_periods=float(settling["periods"]), amplitude_drift=float(settling["drift"]))

@@ -8,13 +8,13 @@ import pytest
 import rig
 from rig.arming.run_options import Silent
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.running.evaluations import Evaluations
+from rig.campaigns.running.evaluation_thread import EvaluationThread
 from tests.rig.campaigns.running.test_runs import plan_with
 
 
 def test_points_come_in_the_order_in_which_they_were_asked_for_also_those_that_need_no_evaluation():
     free = threading.Event()
-    evaluations = Evaluations()
+    evaluations = EvaluationThread()
     evaluations.ask(lambda: [{"number": 0}] if free.wait(30) else [])
     evaluations.known({"number": 1})
     assert not evaluations.ready()
@@ -25,7 +25,7 @@ def test_points_come_in_the_order_in_which_they_were_asked_for_also_those_that_n
 
 
 def test_what_an_evaluation_raises_is_raised_where_its_points_are_taken():
-    evaluations = Evaluations()
+    evaluations = EvaluationThread()
     evaluations.ask(lambda: [][0])
     with pytest.raises(IndexError):
         evaluations.take()

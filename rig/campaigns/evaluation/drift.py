@@ -1,0 +1,54 @@
+"""How far a specimen has drifted over a run: its first point, measured once more at the end, against the first time."""
+
+from collections.abc import Iterable
+from typing import Any, TypeVar
+
+from rig.campaigns.evaluation.point import Point
+
+__all__ = ["drift_of", "of_the_result"]
+
+Result = TypeVar("Result")
+
+
+def of_the_result(points: Iterable[Point[Result]]) -> list[Point[Result]]:
+    """The points without the repeated one."""
+    return [point for point in points if not point.repeats_first]
+
+
+def drift_of(points: Iterable[Point[Any]]) -> dict[str, Any] | None:
+    """Relative changes of frequency, damping and amplitude from the first point to its repetition, and their stored numbers.
+
+    ``points``: the results in the order of the plan. None where the plan repeats nothing, or one of the two was not accepted; a
+    single change is None where one of the two has no such quantity. The frequency is the modal one: a phase error does not
+    change it.
+    """
+    known = list(points)
+    again = next((point for point in known if point.repeats_first), None)
+    first = None if again is None else next((p for p in of_the_result(known) if _same(p, again)), None)
+    if first is None or again is None or not (first.accepted and again.accepted):
+        return None
+    before, now = _quantities(first), _quantities(again)
+    return {
+        "first": first.number,
+        "again": again.number,
+        **{name: _change(before.get(name), now.get(name)) for name in ("frequency", "damping", "amplitude")},
+    }
+
+
+def _quantities(point: Point[Any]) -> dict[str, float | None]:
+    out: dict[str, float | None] = {}
+    if point.modal is not None:
+        out |= {"frequency": point.modal.modal_frequency_hz, "damping": point.modal.damping_ratio}
+    if point.vibration is not None:
+        out["amplitude"] = point.vibration.amplitude_m
+    return out
+
+
+def _same(point: Point[Any], again: Point[Any]) -> bool:
+    """Whether the plan asks for the same vibration."""
+    wanted, found = ((one.level, one.direction, one.repeat, one.asked_phase_lag_deg) for one in (again, point))
+    return wanted == found
+
+
+def _change(first: float | None, again: float | None) -> float | None:
+    return None if not first or again is None else again / first - 1.0

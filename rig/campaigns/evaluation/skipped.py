@@ -1,0 +1,36 @@
+"""What a run has not measured, and why, in one line."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from rig.campaigns.evaluation.point import Point
+
+__all__ = ["what_was_skipped"]
+
+
+def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
+    """Quality and place of the points that are missing: ``3 of 13 points skipped: not-settled (0.1 N), unreachable (2 N)``.
+
+    Empty where every point was accepted. ``points`` are the last of each number, ``planned`` is how many the plan asks for.
+    """
+    known = list(points)
+    places: dict[str, list[str]] = {}
+    for point in known:
+        if not point.accepted:
+            places.setdefault(point.quality, []).append(_place(point))
+    causes = [f"{quality} ({', '.join(where)})" for quality, where in places.items()]
+    untried = planned - len(known)
+    if untried > 0:
+        causes.append(f"not tried ({untried})")
+    skipped = sum(map(len, places.values())) + untried
+    return f"{skipped} of {planned} points skipped: {'; '.join(causes)}" if skipped else ""
+
+
+def _place(point: Point[Any]) -> str:
+    """Level, and frequency or lag where the plan asks for one."""
+    where = [f"{point.level:.4g} {point.level_unit}"]
+    if point.asked_frequency_hz is not None:
+        where.append(f"{point.asked_frequency_hz:.6g} Hz")
+    if point.asked_phase_lag_deg is not None:
+        where.append(f"{point.asked_phase_lag_deg:g} deg")
+    return " ".join(where)

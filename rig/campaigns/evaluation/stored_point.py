@@ -1,0 +1,158 @@
+"""The JSON form of a point, in journals and HDF5 files: one table whose keys are the names of fields.
+
+The fields of a point's parts stand among its own keys. A part is there if the key of its first field is. Unknown keys are
+ignored. Keys of parts that are missing, as in files of earlier versions, are None.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
+from types import NoneType
+from typing import Any, TypeVar, get_args, get_type_hints, overload
+
+import numpy as np
+
+from rig.campaigns.evaluation.point import ARRAY, PAIRS, PART, Point, Quality
+
+__all__ = ["as_complex", "as_pairs", "names_of", "point_from", "stored", "value_of"]
+
+Result = TypeVar("Result")
+
+
+def as_pairs(values: np.ndarray) -> Any:
+    """Complex numbers as [real, imaginary]."""
+    return np.stack([values.real, values.imag], axis=-1).tolist()
+
+
+def as_complex(pairs: Any) -> np.ndarray:
+    """The inverse of `as_pairs`."""
+    array = np.asarray(pairs, float)
+    return np.asarray(array[..., 0] + 1j * array[..., 1])
+
+
+def stored(point: Point[Any]) -> dict[str, Any]:
+    """The JSON form of a point."""
+    return {**_table(point), "accepted": point.accepted}
+
+
+def _table(value: Any) -> dict[str, Any]:
+    """Keys and values of a dataclass, its parts among them."""
+    out: dict[str, Any] = {}
+    for one in fields(value):
+        content = getattr(value, one.name)
+        if one.metadata == PART:
+            out |= {} if content is None else _table(content)
+        elif one.default is MISSING or content != one.default:
+            out[one.name] = _plain(content)
+    return out
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return as_pairs(value) if np.iscomplexobj(value) else value.tolist()
+    if isinstance(value, Quality):
+        return str(value)
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return _table(value) if is_dataclass(value) else value
+
+
+@overload
+def point_from(table: Mapping[str, Any]) -> Point[Any]: ...
+@overload
+def point_from(table: Mapping[str, Any], result: type[Result]) -> Point[Result]: ...
+
+
+def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Point[Any]:
+    """A point from its JSON form, with what its kind of campaign measured as a ``result``, or without that if None.
+
+    Raises KeyError where a key is missing that points of all versions have.
+    """
+    point: Point[Any] = _read(Point, {**table, "quality": _quality(table)}, result)
+    return point
+
+
+def _quality(table: Mapping[str, Any]) -> Quality:
+    """The quality that a file tells; files of earlier versions have only ``accepted``."""
+    accepted, told = bool(table["accepted"]), table.get("quality")
+    if told in set(Quality) and Quality(told).accepted is accepted:
+        return Quality(told)
+    return Quality.REJECTED if not accepted else Quality.WARNED if table.get("warnings") else Quality.GOOD
+
+
+def _read(kind: Any, table: Mapping[str, Any], result: type[Any] | None = None) -> Any:
+    """A dataclass from the keys of a table."""
+    found: dict[str, Any] = {}
+    for one, inner, optional in _layout(kind):
+        inner = result if inner is None and one.metadata == PART else inner
+        if one.metadata == PART:
+            there = inner is not None and _first_key(inner) in table
+            if there or not optional:
+                found[one.name] = _read(inner, table) if inner is not None else None
+            continue
+        if one.name not in table:
+            if one.default is MISSING:
+                found[one.name] = table[one.name] if kind is Point and not optional else None
+            continue
+        value = table[one.name]
+        if value is not None and one.metadata == PAIRS:
+            value = as_complex(value)
+        elif value is not None and one.metadata == ARRAY:
+            value = np.asarray(value, float)
+        elif isinstance(value, list):
+            value = _tuples(value)
+        elif isinstance(value, Mapping) and inner is not None:
+            value = _read(inner, value)
+        found[one.name] = value
+    return kind(**found)
+
+
+def _first_key(kind: Any) -> str:
+    """Key of the first field of a part, which is there if the part is."""
+    one, inner, _ = _layout(kind)[0]
+    return _first_key(inner) if one.metadata == PART and inner is not None else one.name
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+@cache
+def _layout(kind: Any) -> tuple[tuple[Field[Any], type[Any] | None, bool], ...]:
+    """Of each field: itself, the dataclass that it holds (None: another type), and whether it may be None."""
+    hints = get_type_hints(kind)
+    out = []
+    for one in fields(kind):
+        options = get_args(hints[one.name]) or (hints[one.name],)
+        inner = next((option for option in options if isinstance(option, type) and is_dataclass(option)), None)
+        out.append((one, inner, NoneType in options))
+    return tuple(out)
+
+
+def value_of(point: Point[Any], name: str) -> Any:
+    """The value of a field of a point or of one of its parts by its name; None where the part is not there."""
+    return next((getattr(part, name) for part in _parts(point) if name in _own_names(type(part))), None)
+
+
+def names_of(result: type[Any]) -> frozenset[str]:
+    """Names of all fields of the points of a kind of campaign, by the class of its results."""
+    return frozenset(_names(Point)) | frozenset(_names(result))
+
+
+def _parts(value: Any) -> Iterator[Any]:
+    """A dataclass and the parts in it."""
+    yield value
+    for one in fields(value):
+        if one.metadata == PART and (part := getattr(value, one.name)) is not None:
+            yield from _parts(part)
+
+
+def _own_names(kind: type[Any]) -> frozenset[str]:
+    return frozenset(one.name for one in fields(kind) if one.metadata != PART)
+
+
+def _names(kind: Any) -> Iterator[str]:
+    yield from _own_names(kind)
+    for one, inner, _ in _layout(kind):
+        if one.metadata == PART and inner is not None:
+            yield from _names(inner)

@@ -1,0 +1,107 @@
+"""Quality of a recorded vibration: purity of force and response, bias of the damping by harmonics, scatter of the lag."""
+
+import math
+
+import numpy as np
+
+from identification import PeriodicVibration
+from rig.bench import Bench
+from rig.campaigns.evaluation.point import Purity, Spectrum, Vibration
+from rig.campaigns.evaluation.vibrations import quantisation_warnings
+from rig.campaigns.planning.plan import Column
+
+__all__ = [
+    "PURITY_COLUMNS",
+    "lag_scatter_deg",
+    "purity",
+    "quality_warnings",
+    "vibration_part",
+]
+
+PURITY_COLUMNS = (
+    Column("force_purity", "force purity", "%", ".2f", 100.0),
+    Column("response_purity", "response purity", "%", ".2f", 100.0, in_line=False),
+    Column("power_indicator", "power indicator", "%", ".2f", 100.0, in_line=False),
+)
+"""Columns that stand last in the tables of all campaigns under a lock."""
+
+BIASED_DAMPING = (
+    0.01  # of the fundamental's power in all other harmonics: from here on the two dampings differ too much
+)
+OTHER_MODE = 0.1  # a nonlinear resonance this far from the linear one is rather that of another mode
+SCATTERING_DEG = 5.0  # a lag that scatters more tells of a signal that hardly stands out of noise and converter steps
+
+
+def purity(vibration: PeriodicVibration) -> Purity:
+    """Purity of force, response and power, from the first harmonic on; 1 is pure.
+
+    ``force_purity``, ``response_purity``: ``|Y_1| / sqrt(sum |Y_h|^2)`` of force and drive-point displacement.
+    ``power_indicator``: active over apparent power, ``P / (F_rms V_rms)`` with ``P = sum P_h``,
+    ``P_h = Re(F_h conj(V_h))/2``; 1 where the force is in phase with the velocity at every instant. ``harmonic_power``:
+    ``sum_{h>1} P_h / P_1``, by which part damping from the whole power differs from that of the fundamental.
+    NaN where there is no force or no motion.
+    """
+    force, motion = vibration.force[1:], vibration.drive_m[1:]
+    orders = np.arange(1, force.size + 1)
+    velocity = 2j * math.pi * vibration.frequency_hz * orders * motion
+    powers = 0.5 * np.real(force * np.conj(velocity))
+    apparent = 0.5 * float(np.linalg.norm(force) * np.linalg.norm(velocity))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return Purity(
+            force_purity=float(np.abs(force[0]) / np.linalg.norm(force)),
+            response_purity=float(np.abs(motion[0]) / np.linalg.norm(motion)),
+            power_indicator=float(powers.sum() / np.float64(apparent)),
+            harmonic_power=float(powers[1:].sum() / powers[0]),
+        )
+
+
+def lag_scatter_deg(rows: np.ndarray) -> float:
+    """Standard deviation of the lag as the detector saw it, deg; NaN in open loop."""
+    seen = rows["phase_error_rad"][np.isfinite(rows["phase_error_rad"])].astype(float)
+    return math.degrees(float(seen.std())) if seen.size else math.nan
+
+
+def quality_warnings(
+    bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True
+) -> tuple[str, ...]:
+    """What a user should know of a recorded vibration, one line each. A lag that was not ``held`` may scatter."""
+    out = [*vibration.warnings, *quantisation_warnings(vibration, bench)]
+    scatter = lag_scatter_deg(rows) if held else 0.0
+    if scatter > SCATTERING_DEG:
+        force = bench.channels[bench.index_of("force")]
+        bits = vibration.force_n * abs(force.sensitivity_v_per_unit) / force.resolution_v
+        out.append(
+            f"the lag scatters by {scatter:.1f} deg, trusted up to {SCATTERING_DEG:g}: too little signal "
+            f"(force {vibration.force_n:.3g} N, {bits:.1f} bits), or too quick a detector"
+        )
+    linear_hz = bench.specimen.linear_frequency_hz
+    if math.isfinite(scatter) and abs(vibration.frequency_hz / linear_hz - 1.0) > OTHER_MODE:
+        out.append(
+            f"locked at {vibration.frequency_hz:.4g} Hz, more than {100.0 * OTHER_MODE:g} % from "
+            f"specimen.linear_frequency_hz = {linear_hz:g}: another mode looks the same to a phase"
+        )
+    share = purity(vibration).harmonic_power
+    if share is not None and abs(share) > BIASED_DAMPING:
+        out.append(
+            f"harmonics of the force bias the damping: the whole power gives {100.0 * share:+.1f} % against that of the "
+            f"fundamental, trusted up to {100.0 * BIASED_DAMPING:g} %"
+        )
+    return tuple(out)
+
+
+def vibration_part(vibration: PeriodicVibration, rows: np.ndarray) -> Vibration:
+    """What a point holds of the vibration in its ``rows``."""
+    return Vibration(
+        frequency_hz=vibration.frequency_hz,
+        force_n=vibration.force_n,
+        amplitude_m=vibration.amplitude_m,
+        voltage_v=float(np.abs(rows["command_v"]).mean()),
+        purity=purity(vibration),
+        periods=vibration.periods,
+        spectrum=Spectrum(
+            harmonics=vibration.harmonics,
+            harmonics_std=vibration.harmonics_std,
+            residual_rms=vibration.residual_rms,
+            drift=vibration.drift,
+        ),
+    )
