@@ -61,7 +61,7 @@ class Backbone(Study):
         return {"points": self.responses, "frequency_shift": self.responses.frequency_shift, "loops": loops}
 
     def print_tables(self) -> None:
-        """One line per level, as of a measured backbone."""
+        """Print one line per level, in the form of a measured backbone."""
         r = self.responses
         ratios = [r.force_harmonic_ratio(h) if h < r.force_harmonics_n.shape[1] else None for h in (2, 3)]
         print_table(
@@ -131,7 +131,7 @@ def backbone(
 
 
 def neglected(found: PeriodicResponses) -> str:
-    """How much of the force lies above the harmonics that were balanced."""
+    """Remark on the part of the force above the balanced harmonics."""
     highest = found.force_harmonics_n.shape[1] - 1
     percent = 100.0 * float(np.max(found.neglected_share))
     text = f"up to {percent:.2g} %" if percent >= _WORTH_A_NUMBER else f"less than {_WORTH_A_NUMBER:g} %"
@@ -185,7 +185,7 @@ def _draw_loops(
     loops: dict[int, tuple[HysteresisLoop, ...]],
     joints: Sequence[FrictionSite],
 ) -> None:
-    """One panel per level with the loops of all joints; those of the second half dashed, for pairs may coincide."""
+    """One panel per level with the loops of all joints; those of the second half are dashed, because pairs may coincide."""
     axes = np.atleast_1d(part.subplots(1, len(loops)))
     for axis, (point, several) in zip(axes, loops.items(), strict=True):
         largest = max(float(np.max(np.abs(loop.coordinate))) for loop in several)

@@ -136,7 +136,7 @@ def forced(
 
 
 def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
-    """Vibrations in the order of the grid as far as they are found, and why no further."""
+    """Vibrations in the order of the grid up to where none is found, and why none is."""
     try:
         with refusing():
             return forced_response(subject.rig, voltage_v, grid, **how), ""
@@ -149,7 +149,7 @@ def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any
 def _completed(
     up: PeriodicResponses, down: PeriodicResponses, up_ends: str, down_ends: str
 ) -> tuple[PeriodicResponses, PeriodicResponses, list[str]]:
-    """Directions completed by each other: beyond the end of its branch a sweep jumps to the one that is left."""
+    """Complete each direction by the other: at the end of its branch a sweep jumps to the other branch."""
     n_up, n_down = up.frequency_hz.size, down.frequency_hz.size
     jump = "the branch of {} frequency ends at {:.4f} Hz; beyond, the vibration of the other direction is taken"
     if up_ends and down_ends:
@@ -235,7 +235,7 @@ def joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicRespons
 
 
 def _of_columns(make: Callable[..., Any], *ways: PeriodicResponses) -> PeriodicResponses:
-    """Responses whose every column is made of the columns of others."""
+    """Responses of which each column is computed from the same columns of others."""
     columns: dict[str, Any] = {}
     for field in fields(PeriodicResponses):
         those = [getattr(way, field.name) for way in ways]

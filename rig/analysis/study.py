@@ -161,7 +161,7 @@ LEVEL_COLOURS = "viridis"
 
 
 def length_unit(largest_m: float) -> tuple[float, str]:
-    """Factor and name of the unit in which displacements up to ``largest_m`` read well."""
+    """Factor and name of the unit for displacements up to ``largest_m``."""
     return (1e6, "µm") if largest_m < 5e-4 else (1e3, "mm")
 
 
@@ -173,7 +173,7 @@ def level_colour(number: int, count: int) -> tuple[float, float, float, float]:
 
 
 def roomy(axis: "Axes", values: NDArray[np.float64], least_share: float) -> None:
-    """Let the y axis span at least a share of its middle, so that what hardly changes looks like it."""
+    """Let the y axis span at least a share of its middle value, so that small changes look small."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     middle, half = 0.5 * (low + high), 0.55 * (high - low)
     half = max(half, 0.5 * least_share * abs(middle))
