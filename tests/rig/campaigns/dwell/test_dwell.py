@@ -9,9 +9,8 @@ from pydantic import ValidationError
 import rig
 from rig.arming.run_options import Silent
 from rig.bench import Bench, load_bench
-from rig.campaigns.dwell.campaign import recorded_course
 from rig.campaigns.dwell.plan import DwellPlan
-from rig.campaigns.dwell.points import watch_drift
+from rig.campaigns.dwell.points import recorded_course, watch_drift
 from rig.campaigns.plans import load_plan
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError, RecordingError
