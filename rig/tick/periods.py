@@ -6,10 +6,10 @@ from controller.amplitude import RESPONSE, VOLTAGE
 from controller.lock import LOCKED, next_lock_state
 from controller.period import end_period
 from rig.tick.layout import TickArrays
-from rig.tick.safety.following.kernels import follow_level, see_frequency, silent_side
+from rig.tick.safety.following import follow_level, see_frequency, silent_side
 from rig.tick.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
 from rig.tick.safety.layout import ARMED
-from rig.tick.sequencer.kernels import judge_period
+from rig.tick.sequencer.judgement import judge_period
 from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from vibrolock.compiled import kernel
 

@@ -12,10 +12,11 @@ from controller.amplitude import FORCE, RESPONSE
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
-from rig.tick.safety.following.expected import expected_record
-from rig.tick.safety.following.kernels import (
+from rig.tick.safety.expected import expected_record
+from rig.tick.safety.following import (
     ASTRAY_PERIODS,
     CREEP,
+    FOLLOWING,
     LARGEST_RISE,
     begin_to_follow,
     contradicts_exciter,
@@ -23,7 +24,6 @@ from rig.tick.safety.following.kernels import (
     permitted_level,
     see_frequency,
 )
-from rig.tick.safety.following.layout import FOLLOWING
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.limits import describe_end
 from rig.tick.tick import TickSettings
