@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.drawing import length_unit, roomy
 from rig.analysis.levels import By, level_range, samples_for
-from rig.analysis.study import Study
+from rig.analysis.study import Study, length_unit, roomy
 from rig.analysis.subject import Subject, refusing
 from rig.errors import ConfigurationError
 from rig.figures.style import MAIN, SECOND

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.backbone import neglected
-from rig.analysis.drawing import length_unit, level_colour
 from rig.analysis.levels import highest_resonance, most_points, samples_for
-from rig.analysis.study import Study
+from rig.analysis.study import Study, length_unit, level_colour
 from rig.analysis.subject import Subject, positive, refusing
 from rig.errors import ConfigurationError
 from rig.figures.style import REJECTED, SECOND

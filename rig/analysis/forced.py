@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.backbone import neglected
-from rig.analysis.drawing import length_unit
 from rig.analysis.levels import highest_resonance, most_points, samples_for
-from rig.analysis.study import Study
+from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive, refusing
 from rig.errors import ConfigurationError
 from rig.figures.style import MAIN, REJECTED, SECOND

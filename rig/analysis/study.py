@@ -1,4 +1,4 @@
-"""A finished analysis: it can be printed, drawn and turned into JSON."""
+"""`Study`: a finished analysis that can be printed, drawn and turned into JSON; and what its figures share."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.analysis.subject import Subject
 from rig.errors import RecordingError
@@ -15,9 +16,20 @@ from simulators.analysis import PeriodicResponses
 from simulators.layout import Flag
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Study", "check_ending", "draw", "plain", "points_of"]
+__all__ = [
+    "LEVEL_COLOURS",
+    "Study",
+    "check_ending",
+    "draw",
+    "length_unit",
+    "level_colour",
+    "plain",
+    "points_of",
+    "roomy",
+]
 
 
 def plain(value: Any) -> Any:
@@ -143,3 +155,26 @@ def check_ending(figure: Path) -> None:
     """`RecordingError` unless ``figure`` ends like a figure that can be drawn."""
     if figure.suffix.lower() not in FIGURE_ENDINGS:
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+
+
+LEVEL_COLOURS = "viridis"
+
+
+def length_unit(largest_m: float) -> tuple[float, str]:
+    """Factor and name of the unit in which displacements up to ``largest_m`` read well."""
+    return (1e6, "µm") if largest_m < 5e-4 else (1e3, "mm")
+
+
+def level_colour(number: int, count: int) -> tuple[float, float, float, float]:
+    """Colour of one of several levels, dark to light."""
+    from matplotlib import colormaps
+
+    return colormaps[LEVEL_COLOURS](0.85 * number / max(1, count - 1))
+
+
+def roomy(axis: "Axes", values: NDArray[np.float64], least_share: float) -> None:
+    """Let the y axis span at least a share of its middle, so that what hardly changes looks like it."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    middle, half = 0.5 * (low + high), 0.55 * (high - low)
+    half = max(half, 0.5 * least_share * abs(middle))
+    axis.set_ylim(middle - half, middle + half)

@@ -14,9 +14,9 @@ from rig.check.responses import BAND, FITS, Mode, Responses, fit_mode
 __all__ = ["ALIKE", "best_assignment", "by_magnitude", "by_shape", "driven_findings", "latency_findings"]
 
 Float = NDArray[np.float64]
-ALIKE = 0.03  # log ratio below which two channels cannot be told apart
-BETTER = 0.5  # of the misfit as wired: what another assignment must come down to
-WRONG = 0.05  # RMS log ratio from which on the wiring is in doubt at all
+ALIKE = 0.03  # log ratio below which two channels cannot be distinguished
+BETTER = 0.5  # part of the misfit as wired that another assignment must not exceed
+WRONG = 0.05  # RMS log ratio from which on the wiring is in doubt
 
 
 def by_magnitude(found: Float, expected: Float) -> Float:
@@ -31,7 +31,7 @@ def by_shape(found: NDArray[np.complex128], expected: NDArray[np.complex128]) ->
 
 
 def best_assignment(cost: Float) -> tuple[int, ...] | None:
-    """What each channel really is where that fits far better than the wiring as declared; None where it does not."""
+    """The assignment of channels that fits far better than the declared wiring; None if there is none."""
     rows, columns = linear_sum_assignment(cost)
     as_wired, best = float(np.mean(np.diag(cost))), float(np.mean(cost[rows, columns]))
     if as_wired < WRONG**2 or best > BETTER**2 * as_wired or np.array_equal(rows, columns):
@@ -43,9 +43,9 @@ LATE_SAMPLES = 0.25
 
 
 def latency_findings(bench: Bench, responses: Responses, lead_fraction: float) -> list[Finding]:
-    """Delay of each loopback behind what the driver says; ``lead_fraction``: part of a sample that rows leave in it.
+    """Delay of each loopback beyond the latency that the driver reports, from the slope of its phase over the band.
 
-    The slope of its phase over the band, by least squares.
+    ``lead_fraction`` is the fraction of a sample by which the rows' outputs and inputs are not aligned.
     """
     rows = [i for i, channel in enumerate(bench.channels) if channel.loopback]
     if not rows:
@@ -65,7 +65,7 @@ def _slope(bench: Bench, responses: Responses, row: int, lead_fraction: float) -
 
 
 LIVES, CLEAR = 0.5, 0.98  # coherence
-POWER = 0.5  # part of the power's absolute sum that must flow one way for the way to be told
+POWER = 0.5  # part of the absolute power that must flow one way for a verdict
 SIZE_OK, SIZE_TOLERATED = (0.9, 1.1), (0.67, 1.5)
 FREQUENCY_OK, FREQUENCY_TOLERATED = (0.98, 1.02), (0.9, 1.1)
 TURN_DEG = 3.0
@@ -73,7 +73,7 @@ DISTORTED = 0.05
 
 
 def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], Mode | None]:
-    """Findings from the responses alone and the bench's own facts, and the mode under test."""
+    """Findings from the responses and the bench's facts, and the mode under test."""
     lives = _coherence(bench, responses)
     dead = {finding.channel for finding in lives if finding.verdict == "fail"}
     out = [*lives, *_distortion(bench, responses, dead)]
@@ -117,7 +117,7 @@ def _coherence(bench: Bench, responses: Responses) -> list[Finding]:
 
 
 def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Finding]:
-    """Of the force alone: an amplifier that clips shows there, and so does a specimen that is nonlinear already."""
+    """Distortion of the force, which shows a clipping amplifier and a nonlinear specimen."""
     index = bench.index_of("force")
     name, value = responses.names[index], float(responses.distortion[index])
     if name in dead:
@@ -132,7 +132,7 @@ def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Find
 
 
 def _power(bench: Bench, responses: Responses) -> Finding:
-    """Power goes into a passive structure at its drive point: the mean of force times velocity is positive."""
+    """Direction of the power: into a passive structure, the mean of force times velocity is positive."""
     force, drive = bench.index_of("force"), bench.index_of("drive")
     part = responses.frequency_hz / bench.specimen.linear_frequency_hz
     around = (part > BAND[0]) & (part < BAND[1])
@@ -194,7 +194,7 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
 
 
 def _polarities(bench: Bench, known: Sequence[int], signs: np.ndarray) -> list[Finding]:
-    """Signs of the accelerations against the force; where most of them are against it, it is the force that is reversed."""
+    """Signs of the accelerations against the force; if most are wrong, the force is reversed."""
     force = bench.channels[bench.index_of("force")].name
     names = [bench.channels[i].name for i in known]
     turned = len(known) > 2 and int(np.sum(signs < 0.0)) > len(known) / 2
@@ -239,7 +239,7 @@ def _size(name: str, ratio: float) -> Finding:
 
 
 def _delays(bench: Bench, alive: Sequence[int], mode: Mode) -> list[Finding]:
-    """Phase of the residues, which normal modes have at 0 or 180 degrees: delay of a channel behind the force's."""
+    """Delay of each channel behind the force, from the phase of its residue (0 or 180 degrees for a normal mode)."""
     out = []
     for place, i in enumerate(alive):
         residue = complex(mode.residue[place])

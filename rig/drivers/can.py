@@ -45,7 +45,7 @@ class CanOptions(WireOptions):
 
 
 def make_bus(options: CanOptions) -> FrameBus:
-    """The bus that the options name, not yet open."""
+    """The bus that the options describe, not yet open."""
     if options.interface == "slcan":
         return SlcanBus(str(options.channel), options.timing, options.baud)
     return PythonCanBus(options.interface, options.channel, options.timing, options.node, options.backend)
@@ -54,7 +54,7 @@ def make_bus(options: CanOptions) -> FrameBus:
 class CanDAQ(WireDAQ):
     """A device that speaks the wire protocol on a CAN bus.
 
-    Options: `CanOptions`. The seed is of no use to a real device.
+    Options: `CanOptions`. The seed is ignored.
     """
 
     def __init__(self, bench: Bench, seed: int = 0) -> None:

@@ -13,36 +13,36 @@ __all__ = ["Faults", "FaultySender"]
 
 @dataclass(frozen=True)
 class Faults:
-    """Nothing by default. Blocks are counted from 1; ``every`` of 0 is never."""
+    """Faults of a device; none by default. Blocks count from 1, and 0 in ``..._every`` means never."""
 
     version: int | None = None
-    """Speaks this version of the protocol only."""
+    """The only version of the protocol that it speaks."""
     channel_names: tuple[str, ...] | None = None
-    """Says that its channels are called so."""
+    """Channel names that it reports instead of the true ones."""
     channels_sent: int | None = None
-    """Sends so many channels, whatever it says."""
+    """Number of channels that it sends, whatever it reports."""
     deaf_after_s: float | None = None
-    """Understands nothing any more so long after START, and goes on sampling."""
+    """Time after START from which on it ignores all messages, but goes on sampling, s."""
     silent_after_s: float | None = None
-    """Sends nothing any more so long after START."""
+    """Time after START from which on it sends nothing, s."""
     reset_after_s: float | None = None
-    """Starts anew so long after START."""
+    """Time after START at which it resets, s."""
     drop_every: int = 0
-    """Every so many a block is lost on the way."""
+    """One of so many blocks is lost on the way."""
     drop_burst: int = 1
-    """So many in a row."""
+    """Number of blocks lost in a row."""
     repeat_every: int = 0
-    """Every so many a block comes twice."""
+    """One of so many blocks arrives twice."""
     reorder_every: int = 0
-    """Every so many a block comes after the next one."""
+    """One of so many blocks arrives after the next one."""
     late_every: int = 0
-    """Every so many a block, and all behind it, come late."""
+    """One of so many blocks, and all messages after it, arrive late."""
     late_s: float = 0.05
-    """By so much."""
+    """By how much they are late, s."""
 
 
 class FaultySender:
-    """Sends over a link. What the link does not take, for nobody listens, is dropped; samples so lost are counted."""
+    """Sends over a link, with faults. Messages that the link refuses are dropped; lost samples are counted."""
 
     def __init__(self, link: Link, faults: Faults) -> None:
         self._link, self._faults = link, faults
@@ -65,7 +65,7 @@ class FaultySender:
         self._silent_s = now_s + silent if silent is not None else math.inf
 
     def send(self, message: Message, now_s: float) -> bool:
-        """Send a message behind those that are late; False where the link did not take it."""
+        """Send a message after those that are late; False if the link refused it."""
         if now_s >= self._silent_s:
             return False
         if self._late:
@@ -83,12 +83,12 @@ class FaultySender:
         return True
 
     def flush(self, now_s: float) -> None:
-        """Send what was late."""
+        """Send the late messages that are due."""
         while self._late and self._late[0][0] <= now_s:
             self._send(self._late.popleft()[1])
 
     def send_samples(self, samples: Samples, number: int, now_s: float) -> None:
-        """Send block ``number``, counted from 1, with the faults that it shall have."""
+        """Send block ``number``, counted from 1, with its faults."""
         faults = self._faults
         if faults.drop_every and number % faults.drop_every < faults.drop_burst and number >= faults.drop_every:
             return

@@ -23,7 +23,7 @@ SETTINGS = {
     Parameter.WATCHDOG_US: (Parameter.SHORTEST_WATCHDOG_US, Parameter.LONGEST_WATCHDOG_US),
     Parameter.RAMP_US: (None, Parameter.LONGEST_WATCHDOG_US),
 }
-"""Parameters that can be set, and those that hold their bounds; the lower bound is 1 where there is none, 0 for the ramp."""
+"""Parameters that can be set, with those that hold their bounds. Without a lower bound it is 1; 0 for the ramp."""
 
 
 def described(
@@ -80,7 +80,7 @@ def described(
 
 
 class Parameters:
-    """The words of a device, as it tells them: with the lies of ``faults``."""
+    """The words of a device as it reports them, with those that ``faults`` falsify."""
 
     def __init__(self, words: Words, faults: Faults) -> None:
         self.words = dict(words)
@@ -103,7 +103,7 @@ class Parameters:
         return (Status.UNKNOWN, 0) if word is None else (Status.DONE, word)
 
     def set(self, parameter: int, item: int, value: int) -> tuple[Status, int]:
-        """Answer to SET, carried out where the value is allowed."""
+        """Answer to SET; the value is set if it is allowed."""
         bounds = {int(one): both for one, both in SETTINGS.items()}.get(parameter)
         if bounds is None or item:
             return Status.UNKNOWN, 0

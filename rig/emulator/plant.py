@@ -18,8 +18,8 @@ from simulators.layout import Flag
 
 __all__ = ["LoggedPlant", "Plant", "VirtualPlant", "Wiring"]
 
-WHOLE_RANGE = 2.0**31  # counts of a converter without steps, in 32 bits
-NO_QUEUE = np.zeros(0)  # what is under way is the device's
+WHOLE_RANGE = 2.0**31  # counts of full scale where the virtual converter has no steps
+NO_QUEUE = np.zeros(0)  # the emulated device has its own queue
 
 
 class Plant(Protocol):
@@ -52,9 +52,9 @@ class Plant(Protocol):
 
 
 class Wiring:
-    """How the sensors are connected: right, or as it happens on a Monday. The plant itself is as it is.
+    """How the sensors are connected to the channels; mistakes can be made on purpose. The rig itself is unchanged.
 
-    ``flip``: sensors the other way round. ``dead``: channels that are connected to nothing and read the converter's last bit.
+    ``flip``: sensors mounted the other way round. ``dead``: channels without a sensor, which toggle their last bit.
     ``swap``: pairs of sensors in each other's sockets.
     """
 
@@ -81,7 +81,7 @@ class Wiring:
         self.as_it_should_be = not (flip or dead or swap)
 
     def connect(self, counts: np.ndarray, first: int) -> np.ndarray:
-        """Counts [n, n_channels] as the device gets them; ``first`` is the index of the first row."""
+        """Counts [n, n_channels] by channel from counts by sensor; ``first`` is the index of the first row."""
         out = counts[:, self._order] * self._sign
         for channel in self._dead:
             out[:, channel] = (np.arange(first, first + counts.shape[0]) * 7919 >> 4) & 1
@@ -89,9 +89,9 @@ class Wiring:
 
 
 class VirtualPlant:
-    """The virtual rig of a bench, its converters' counts as they are: scaled by the volts of a count they are its readings.
+    """The virtual rig of a bench, read in counts of its converters: counts times volts per count are the rig's readings.
 
-    A rig that has diverged reads full scale, overloaded.
+    A rig that has diverged reads full scale, with the overload flag.
     """
 
     def __init__(self, bench: Bench, seed: int = 0, wiring: Wiring | None = None) -> None:
@@ -137,7 +137,7 @@ class VirtualPlant:
         self._buffers_for(0)
 
     def _buffers_for(self, n: int) -> None:
-        """The kernel writes into these without asking for their size: they are always those of the block at hand."""
+        """Allocate the kernel's output arrays for blocks of ``n``: the kernel does not check their size."""
         self._readings_v = np.empty((n, len(self.names)))
         self._raised = np.zeros(n, np.uint16)
 
@@ -164,7 +164,7 @@ class VirtualPlant:
         return counts, flags
 
     def _counted(self) -> tuple[np.ndarray, int]:
-        """The readings as counts: they lie on the converter's steps and within its range, so nothing is lost."""
+        """The readings as counts. They lie on the converter's steps and within its range, so nothing is lost."""
         raised = int(np.bitwise_or.reduce(self._raised))
         scaled = self._readings_v / self.v_per_count
         flags = 0
@@ -179,7 +179,7 @@ class VirtualPlant:
 class LoggedPlant:
     """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V.
 
-    One with 0 V more says that the device was stopped and put out nothing any more.
+    A further line with 0 V marks that the device was stopped.
 
     A file that cannot be made is a `ConfigurationError`; a disk that is full later ends the writing and nothing else.
     """
@@ -189,7 +189,7 @@ class LoggedPlant:
         try:
             self._descriptor = os.open(
                 path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644
-            )  # for as long as the device lives
+            )  # open as long as the device lives
         except OSError as error:
             raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
         self._is_full = False

@@ -1,4 +1,4 @@
-"""The device's end of every wire that can be emulated, and how a bench reaches it."""
+"""The device's end of each wire that can be emulated, and the driver options with which a bench reaches it."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -69,7 +69,7 @@ def _can_options(settings: EmulatorSettings) -> dict[str, Any]:
 
 @contextmanager
 def _pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
-    """Descriptor of the near end and path of the far end, which is that of the symbolic link where one is wanted."""
+    """Descriptor of the near end and path of the far end; the path of the symbolic link, if there is one."""
     try:
         line = open_pseudo_terminal()
     except (ImportError, OSError) as error:
@@ -80,14 +80,14 @@ def _pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
         yield line.descriptor, str(link.absolute()) if link is not None else line.path
     finally:
         if link is not None:
-            with suppress(OSError):  # it may have been removed, or lead elsewhere by now
+            with suppress(OSError):  # the link may be gone or lead elsewhere by now
                 if link.readlink() == Path(line.path):
                     link.unlink()
         line.close()
 
 
 def _name(link: Path, path: str) -> None:
-    """Have a symbolic link lead to a port. One that leads nowhere was left behind and gives way."""
+    """Make a symbolic link to a port; a link to a port that no longer exists is replaced."""
     try:
         if link.is_symlink():
             target = link.readlink()

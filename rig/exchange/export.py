@@ -1,4 +1,4 @@
-"""What a file of ours holds, and how it is written for other programs."""
+"""Reads the objects in a file of the bench and writes them for other programs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,11 +28,11 @@ from rig.text.contents import Contents
 __all__ = ["DATA", "export_file", "read_objects", "write_contents"]
 
 DATA = ("results", "time")
-"""What can be taken from a recording."""
+"""Choices of what is taken from a recording."""
 
 
 def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) -> list[Any]:
-    """The objects in a file of ours: one, but for the levels of a multisine, sweeps, time data by point, modes with responses.
+    """The objects in a file of the bench: one, or several (levels of a multisine, sweeps, time data, modes with responses).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The kinds of objects that are exchanged: how each is taken apart and put together again."""
+"""The kinds of objects that are exchanged, each with its conversion to arrays and back."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

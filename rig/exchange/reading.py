@@ -119,7 +119,7 @@ def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
 
 
 def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
-    """Universal files say their units, which are SI by now: a mapping may not say others."""
+    """Refuse a mapping with units for a universal file: those of the file are converted to SI already."""
     from identification.mapping.units import si_of
 
     for channel in getattr(mapping, "channels", ()):

@@ -1,4 +1,4 @@
-"""From journal to HDF5 file, whole or not at all, and back to a journal that continues a finished file."""
+"""From a journal to an HDF5 file, whole or not at all, and a new journal that continues a finished file."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -107,7 +107,7 @@ def _header_of(output: Path) -> Header | None:
 
 
 def check_continuation(journal: Header, file: Header | None, output: Path) -> None:
-    """Refuse by ``RecordingError`` a journal that does not belong to ``output`` beside it (``None``: missing)."""
+    """Raise ``RecordingError`` for a journal that does not belong to the file ``output`` beside it (``None``: no file)."""
     if file is None:
         if journal.first_part:
             raise RecordingError(f"{output}: missing, but its journal continues it; put the file back")

@@ -60,7 +60,7 @@ def recording_integrity(file: Any, path: Path) -> str:
 
 
 def taken_over(integrity: str, n_parts: int) -> str:
-    """What a file says of its integrity that takes over the first parts of a file of that ``integrity``; empty if verified."""
+    """Why a new file that takes over ``n_parts`` of a file with this ``integrity`` is unverified; empty if it is verified."""
     if integrity == VERIFIED or n_parts == 0:
         return ""
     told = integrity.removeprefix("unverified: ")
@@ -117,7 +117,7 @@ def _row_dataset(group: Any, column: Column, field: np.dtype[Any], n_rows: int, 
 
 
 def read_recording(file: Any, path: Path) -> tuple[Header, list[StoredPart]]:
-    """Read an open recording, but for its rows, which stay in the file.
+    """Read an open recording; its rows stay in the file.
 
     Returns:
         Header, with rows as in the last part and ``first_part`` the number of parts; and the parts.

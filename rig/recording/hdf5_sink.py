@@ -39,12 +39,12 @@ class Sink(io.RawIOBase):
         return self._file.fileno()
 
     def close(self) -> None:
-        """Close the file; what is held in memory is gone."""
+        """Close the file; data held in memory are dropped."""
         self._file.close()
         super().close()
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to ``offset``; the end of the file is that of what reached it and of what is held."""
+        """Move to ``offset``; the end counts what was written and what is held in memory."""
         if whence == io.SEEK_END:
             offset += max([self._file.seek(0, io.SEEK_END), *(start + len(data) for start, data in self._held)])
         elif whence == io.SEEK_CUR:
@@ -86,7 +86,7 @@ class Sink(io.RawIOBase):
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the length of the file; after an error only noted."""
+        """Set the length of the file; after an error do nothing."""
         size = self._position if size is None else size
         if self._error is None:
             try:

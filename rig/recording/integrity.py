@@ -20,7 +20,7 @@ _AT_ONCE = 2**20
 
 
 def append_trailer(stream: "BinaryIO | io.RawIOBase") -> None:
-    """Write the digest of all there is in ``stream`` behind it."""
+    """Append the digest of everything in ``stream``."""
     covered = stream.seek(0, os.SEEK_END)
     digest = _digest(stream, covered)
     stream.seek(covered)
@@ -67,7 +67,7 @@ _PATIENCE_S, _SLOWEST_BYTES_S = 60.0, 5e6
 _SETTLED_S = 2.0
 
 _known: dict[tuple[Path, int, int, int, int, int], str] = {}
-"""What was found, by all that tells one state of a file from another."""
+"""Results by path, device, inode, size and times of a file."""
 
 
 def integrity_of(path: Path) -> str:
@@ -83,7 +83,7 @@ def integrity_of(path: Path) -> str:
     facts = path.stat()
     state = (path.absolute(), facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns)
     if state not in _known:
-        # A change within one tick of the file system's clock leaves its times as they are: what is new is not remembered.
+        # A change within one tick of the file system's clock does not show in its times: for new files the result is not kept.
         settled = time.time() - max(facts.st_mtime, facts.st_ctime) > _SETTLED_S
         found = VERIFIED if digest_matches(path) else _read_by_child(path, facts.st_size)
         if not settled:

@@ -1,4 +1,4 @@
-"""All whole blocks of a journal in their order, also those behind damage."""
+"""The whole blocks of a journal in order, including those after damage."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ class Tail:
     reason: str
     """Why reading stopped; empty where nothing follows."""
     torn: bool
-    """Nothing readable follows: a write cut short by a kill, a power cut or a full disk; else damage amid the file."""
+    """True: nothing readable follows, so a write was cut short. False: damage within the file."""
 
 
 class JournalBlocks:
@@ -86,7 +86,7 @@ class JournalBlocks:
             yield block
 
     def _behind(self, stream: BinaryIO, last: Block, size: int) -> Block | None:
-        """The first whole block behind damage that can have followed ``last``."""
+        """The first whole block after damage that can follow ``last``."""
         start = last.stop
         while found := following_block(stream, start, size, last.sequence + 1):
             whole = found.kind is not BlockKind.ROWS or len(found.payload) % self.header.row_dtype.itemsize == 0
@@ -98,7 +98,7 @@ class JournalBlocks:
         return None
 
     def _in_order(self, block: Block, last: Block) -> Block:
-        """The block with its place, which is where it belongs behind ``last``."""
+        """The block with part and row, checked against ``last``; raises `BadBlockError` if it is out of place."""
         if block.sequence != last.sequence + 1:
             raise BadBlockError(f"block {block.sequence} where block {last.sequence + 1} belongs")
         n_rows = len(last.payload) // self.header.row_dtype.itemsize if last.kind is BlockKind.ROWS else 0

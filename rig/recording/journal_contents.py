@@ -1,4 +1,4 @@
-"""What a journal holds, part by part: rows are found by an index of its blocks, without holding them."""
+"""Contents of a journal, part by part; rows stay in the file and are found by an index of blocks."""
 
 from array import array
 from bisect import bisect_right
@@ -21,9 +21,9 @@ __all__ = ["JournalContents", "JournalPart"]
 MISSING = -1
 """Offset of rows that cannot be read."""
 MOST_TOLD = 20
-"""Gaps of a part that are told one by one."""
+"""Gaps of a part that are reported one by one."""
 LARGEST_RATIO = 200
-"""Bytes of missing rows that are believed, per byte of the journal."""
+"""Bytes of missing rows that are accepted per byte of the journal."""
 _SMALL_BYTES = 2**26
 
 
@@ -101,7 +101,7 @@ class JournalContents:
         self.n_blocks, self.size = 1, blocks.header_stop
         """Number of the block to come, and the bytes up to the last whole one."""
         self.damaged = False
-        """Whether something is lost that is not the end of a write cut short."""
+        """Whether anything is lost apart from a write cut short at the end."""
         self.last_part = 0
         """Number of the part of the last whole block, from 1."""
         self._part_number = 0
@@ -143,7 +143,7 @@ class JournalContents:
         self._add_to_part(block, self.parts[-1])
 
     def _tell_homeless(self) -> None:
-        """Say in one line what is lost of a part whose beginning cannot be read."""
+        """Note in one line the loss of a part whose beginning cannot be read."""
         if self._homeless is not None:
             n_bytes, n_blocks, part = self._homeless
             self._homeless = None
@@ -158,7 +158,7 @@ class JournalContents:
         self._before_parts.clear()
 
     def _lost_before(self, block: Block) -> str:
-        """Make up for the rows that are missing before a block of the same part; says which."""
+        """Add missing rows before a block of the same part; return which they are, in words."""
         first, n_rows = self.parts[-1].n_rows, block.row - self.parts[-1].n_rows
         if n_rows == 0:
             return "no rows"
@@ -188,7 +188,7 @@ class JournalContents:
             part.end = block.value
 
     def close(self) -> None:
-        """Let go of the file; may be called twice."""
+        """Close the file; may be called twice."""
         self._stream.close()
 
     def __enter__(self) -> Self:

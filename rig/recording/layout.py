@@ -1,4 +1,4 @@
-"""What all HDF5 files of the bench have in common: how they are recognised, opened, and replaced in one step."""
+"""Common to all HDF5 files of the bench: how they are recognised, opened, and replaced in one step."""
 
 import os
 from collections.abc import Callable, Iterator

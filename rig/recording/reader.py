@@ -75,7 +75,7 @@ class Recording:
 
     @property
     def plans(self) -> list[RecordedPlan]:
-        """The plan that the recording was begun with, and those that took its place."""
+        """The first plan of the recording, and those that replaced it."""
         first = RecordedPlan(0, self._header.configuration.get("plan", {}), None)
         told = ((number, part.information) for number, part in enumerate(self.parts))
         return [first, *(RecordedPlan(n, said["plan"], said["numbers"]) for n, said in told if "plan" in said)]
@@ -135,7 +135,7 @@ class Recording:
         return bool(self.parts) and self.parts[-1].complete
 
     def close(self) -> None:
-        """Let go of the files; may be called twice. Rows can no longer be read."""
+        """Close the files; may be called twice. Rows can no longer be read."""
         self._stack.close()
 
     def __enter__(self) -> Self:

@@ -13,15 +13,15 @@ from rig.errors import ConfigurationError
 
 __all__ = ["LevelChoice", "choose_levels", "low_pass", "lowest_force_n", "needed_v", "reach_m"]
 
-LAG_STD_DEG = 0.75  # of the raw lag: the settle rule averages it over ten periods
-RAISED = 3.0  # times the lowest force wanted
+LAG_STD_DEG = 0.75  # standard deviation of the lag before the settle rule averages it over ten periods
+RAISED = 3.0  # factor by which the lowest force may be raised
 
 
 def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float) -> tuple[float, float, str]:
-    """Largest low-pass (rad/s), the lowest force (N) that the lag can be told at with it, and why.
+    """Largest low-pass (rad/s), the lowest force (N) at which the lag can be measured with it, and why.
 
-    The lag fluctuates by `LAG_STD_DEG` at that force. Where that is not more than `RAISED` times the force wanted, the
-    force is raised rather than the low-pass lowered: a slow low-pass waits at every level.
+    At that force the standard deviation of the lag is `LAG_STD_DEG`. If at most `RAISED` times the wanted force is needed, the
+    force is raised and the low-pass is kept, because a slow low-pass costs time at every level.
     """
     omega = plant.lock_frequency_rad_s()
     accelerance = abs(complex(plant.accelerance(1j * omega)))
@@ -47,9 +47,9 @@ def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float)
     return choice.low_pass_rad_s, force_n, f"{why} {force_n:.3g} N, the lowest level"
 
 
-PART = 1.0 / 3.0  # of the limits at the linear plant: room for what the nonlinearity asks for on top
+PART = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
 SPAN = 30.0  # highest level over lowest, where noise allows
-BITS = 2.0  # amplitude of the force, in the converter's least bits, at the lowest level
+BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,9 @@ def needed_n(plant: PlantModel, level_m: float) -> float:
 
 
 def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tuple[float, str]:
-    """Largest displacement of the drive point (m peak) that keeps the linear plant within the bench's limits, and what ends it.
+    """Largest displacement of the drive point (m peak) within the bench's limits on the linear plant, and which limit ends it.
 
-    ``ratios`` are how far channels move for one metre at the drive point, by name.
+    ``ratios`` are displacements of channels per displacement of the drive point, by name.
     """
     limits, omega = bench.limits, plant.lock_frequency_rad_s()
     name, ratio = max(ratios.items(), key=lambda entry: entry[1], default=("", 1.0))
@@ -96,7 +96,7 @@ def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tup
 
 
 def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
-    """Lowest useful force: a part of the highest one, but some bits of the converter."""
+    """Lowest useful force: a part of the highest one, but at least some bits of the converter."""
     force = next(channel for channel in bench.channels if channel.role == "force")
     bit = force.resolution_v / abs(force.sensitivity_v_per_unit)
     return max(needed_n(plant, highest_m) / SPAN, BITS * bit)
@@ -112,7 +112,7 @@ def choose_levels(
     to_m: float | None = None,
     points: int = 8,
 ) -> LevelChoice:
-    """Levels in equal ratios between the lowest force that can be told and a third of what the limits allow.
+    """Levels in equal ratios, from the lowest force above noise to a third of what the limits allow.
 
     ``ratios`` as for `reach_m`. Raises `ConfigurationError` for a level beyond what the bench reaches.
     """
@@ -143,5 +143,5 @@ def choose_levels(
 
 
 def significant(value: float, digits: int = 5) -> float:
-    """A number with some digits, as people write it."""
+    """A number rounded to some significant digits."""
     return value if value == 0.0 or not math.isfinite(value) else float(f"{value:.{digits}g}")

@@ -28,7 +28,7 @@ __all__ = [
 
 
 class TuningError(RigError):
-    """A rig cannot be tuned: its test says nothing, or no gains suit it; the message has the numbers."""
+    """A rig cannot be tuned: its test shows no mode, or no gains suit it. The message has the numbers."""
 
 
 Real = NDArray[np.float64]
@@ -73,15 +73,14 @@ def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
 ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
 WORTH_SAYING_HZ = 0.005
 WORTH_SAYING_SHAPE = 0.05
-TOLD = 3.0  # standard errors from which on a channel's motion is told from noise
+TOLD = 3.0  # standard errors from which on the motion of a channel counts as measured
 TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-error law
 
 
 def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float) -> PlantModel:
     """The plant fitted to force and drive acceleration per volt around the bench's linear frequency.
 
-    ``lead_samples`` from an output to the input that shows it are those of the run that measured the responses: a device
-    knows its queue and its filters once it has started.
+    ``lead_samples`` from an output to its effect in the inputs are those of the run that measured the responses.
 
     Raises `TuningError` where they show no mode of the structure.
     """
@@ -106,10 +105,10 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: flo
 
 
 def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
-    """How far each response channel moves for one metre at the drive point at resonance, by name.
+    """Displacement of each response channel per displacement of the drive point at resonance, by name.
 
     Least squares of the channel's response to that of the drive point, over the lines within a bandwidth of the mode. A
-    channel that cannot be told from noise is left out.
+    channel that does not stand out of the noise is left out.
     """
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     frequency = responses.frequency_hz
@@ -127,7 +126,7 @@ def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> di
 
 
 def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
-    """What of the bench's facts differs from the measurement, one line each.
+    """Differences between the bench's facts and the measurement, one line each.
 
     Raises `TuningError` where the mode lies so far from the bench's linear frequency that it may be another one.
     """
@@ -180,7 +179,7 @@ def largest_outside(
 def mass_ratios(bench: Bench, responses: FrequencyResponseMatrix, plant: PlantModel) -> tuple[float, float]:
     """Smallest and largest mass ratio mu that models of this band and of all measured lines find.
 
-    Near one mode the exciter's moving mass is hard to tell from its spring: where the two differ, neither is to be believed.
+    Near one mode the exciter's moving mass is hard to separate from its spring: if the two differ, the ratio is not identified.
     """
     try:
         wide = PlantModel.from_frequency_responses(

@@ -65,7 +65,7 @@ class TuningRequest:
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """What a tuning has found."""
+    """Result of a tuning."""
 
     bench: Bench
     """The bench."""
@@ -76,13 +76,13 @@ class Tuning:
     plant: PlantModel
     """The plant near the mode."""
     response_ratios: dict[str, float]
-    """How far each response channel moves for one metre at the drive point at resonance, as measured, by name."""
+    """Measured displacement of each response channel per displacement of the drive point at resonance, by name."""
     chosen: Chosen
     """The gains."""
     levels: LevelChoice
     """The levels."""
     notes: tuple[str, ...]
-    """What a user should know, one line each."""
+    """Notes for the user, one line each."""
     plan_toml: str
     """The plan."""
 
@@ -150,7 +150,7 @@ def tune(
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:
-    """What may go otherwise than the linear plant has it."""
+    """Notes on what may differ from the linear plant."""
     out = []
     if test.distortion > NONLINEAR:
         out.append(

@@ -1,4 +1,4 @@
-"""`VirtualDAQ`: a full sibling of a real driver, with any block and any latency."""
+"""`VirtualDAQ`: a virtual rig behind the DAQ contract, with any block size and any latency."""
 
 import math
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ class Queue(Configured):
     """Latency of the virtual device."""
 
     queue_blocks: int = Field(0, ge=0, le=64)
-    """q: blocks of outputs that the device keeps back, as a buffered DAQ does."""
+    """q: blocks of outputs in the device's queue, as in a buffered DAQ."""
     delay_samples: int = Field(0, ge=0, le=1000)
     """Further samples between the handing over of an output and the converter."""
 
@@ -73,7 +73,7 @@ class VirtualDAQ(DAQ):
         self._first = 0
 
     def _check_arrays(self, seed: int) -> None:
-        """Refuse, before a run has begun, parts whose arrays cannot be computed or hold numbers that are none."""
+        """Refuse, before a run begins, parts whose arrays cannot be computed or are not finite."""
         try:
             with np.errstate(over="raise", divide="raise", invalid="raise"):
                 arrays, _ = self.rig.build(seed)
@@ -145,7 +145,7 @@ class VirtualDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """A virtual rig takes any block, is not paced, and repeats itself; nothing of it outlives its process."""
+        """Any block size, not paced, repeatable; safe without the host because it ends with its process."""
         return Capabilities(largest_block=1_000_000, paced=False, virtual=True, repeatable=True, safe_without_host=True)
 
     @property
@@ -170,7 +170,7 @@ class VirtualDAQ(DAQ):
 
     @property
     def output_v(self) -> float:
-        """What is on the converter, V, as it would be measured at the output; of a rig that is exchanged, not fused."""
+        """Voltage on the converter now, V; only while blocks are exchanged, not in a fused run."""
         past = self._exchanged.loopback.past
         return float(past[(self._first - 1) % past.size])
 
@@ -195,7 +195,7 @@ class VirtualDAQ(DAQ):
             self._swap(voltages, inputs, self.flags)
 
     def _swap(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
-        """Swap samples over which the plant stays as it is."""
+        """Exchange samples during which the plant does not change."""
         exchange_block(self._arrays, self._state, self._exchanged, self._first, voltages, inputs, flags)
         self._first += voltages.size
 
@@ -229,6 +229,6 @@ class VirtualDAQ(DAQ):
         self._rest()
 
     def _rest(self) -> None:
-        """0 V on the converter and on the way there."""
+        """Set the converter and the queue to 0 V."""
         self._exchanged.queue[:] = 0.0
         self._exchanged.loopback.past[:] = 0.0

@@ -12,14 +12,14 @@ LONGEST_S = 4000.0  # microseconds in an unsigned word of four bytes
 
 
 class WireOptions(Configured):
-    """Options that all wires share; a driver adds those that say where the device is."""
+    """Options that all wires share; each driver adds those that locate the device."""
 
     queue_blocks: int = Field(1, ge=1, le=64)
-    """q: blocks between the handing over of an output and the converter; more forgive a later host and delay the loop."""
+    """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop."""
     watchdog_s: float | None = Field(None, gt=0, le=LONGEST_S)
     """Time without an output after which the device brings its own to 0 V, s; by default 0.1 s, or 4 blocks if longer."""
     ramp_s: float = Field(0.05, ge=0, le=LONGEST_S)
-    """Time of the ramp with which the device's watchdog does so, s; 0 drops the output."""
+    """Duration of the ramp to 0 V after the watchdog has tripped, s; 0 drops the output at once."""
     timeout_s: float | None = Field(None, gt=0, le=LONGEST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
 
@@ -34,9 +34,9 @@ def _default_s(block_s: float) -> float:
 
 
 def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> float:
-    """The time to set, s.
+    """Watchdog time to set, s.
 
-    `DaqRefused` where it is shorter than two blocks, or longer than a device that moves something may wait.
+    Raises `DaqRefused` if it is shorter than two blocks, or too long for a device that moves something.
     """
     chosen_s = options.watchdog_s or max(_default_s(block_s), facts.watchdog_s[0])
     shortest_s, longest_s = SHORTEST_BLOCKS * block_s, max(LONGEST_S, LONGEST_BLOCKS * block_s)
@@ -54,7 +54,7 @@ def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> floa
 
 
 def raised_remark(options: WireOptions, facts: DeviceFacts, block_s: float) -> str:
-    """That the device cannot do a watchdog as short as the default; empty where it can, or nobody wanted the default."""
+    """Remark that the device's shortest watchdog time is above the default; empty if the default applies or was not wanted."""
     if options.watchdog_s or facts.watchdog_s[0] <= _default_s(block_s):
         return ""
     return (

@@ -16,7 +16,7 @@ __all__ = ["FLAG_NAMES", "Scaling", "Streaming"]
 
 
 class Scaling:
-    """The scales of a device, for blocks of one size."""
+    """Converts volts to a device's counts and back, for blocks of one size."""
 
     def __init__(self, facts: DeviceFacts, block: int) -> None:
         self._counts_per_v = np.full(block, 1.0 / facts.output_v_per_count)
@@ -27,7 +27,7 @@ class Scaling:
         self._scaled = np.empty(block)
 
     def to_counts(self, voltages: np.ndarray) -> np.ndarray:
-        """The nearest counts [n] of the output's converter."""
+        """The nearest counts [n] of the output converter."""
         scaled = self._scaled
         np.multiply(voltages, self._counts_per_v, out=scaled)
         np.rint(scaled, out=scaled)
@@ -45,7 +45,7 @@ FLAG_NAMES = tuple(str(flag.name).lower() for flag in DeviceFlag)
 
 
 class Streaming:
-    """The two streams of a run.
+    """Outputs to the device and samples from it during one run.
 
     The device begins to sample, and is armed, with the first call of `exchange`.
     """
@@ -87,13 +87,13 @@ class Streaming:
     def _begin(self) -> None:
         self._dialogue.forget()
         self._dialogue.do(Command.START)
-        # The watchdog runs from the first ARM on: where its answer gets lost, there must be time for another and an output.
+        # The watchdog runs from the first ARM on. If its answer is lost, there must be time for a second ARM and an output.
         self._dialogue.do(Command.ARM, value=ARM_KEY, answer_s=min(ANSWER_S, 0.5 * self._watchdog_s))
-        self._dialogue.forget_beats()  # of before
+        self._dialogue.forget_beats()  # those sent before the device was armed
         self._began = True
 
     def exchange(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
-        """Hand over a block of outputs [n], fill in one of inputs [n, n_channels] and its flags [n]."""
+        """Send a block of outputs [n]; fill ``inputs`` [n, n_channels] and ``flags`` [n] with the block received."""
         if not self._began:
             self._begin()
         link = self._link
@@ -124,6 +124,6 @@ class Streaming:
             self._dialogue.note_stray(answer)
 
     def stop(self) -> None:
-        """0 V, no more samples."""
+        """Stop the device: 0 V, no more samples."""
         self._dialogue.do(Command.STOP)
         self._dialogue.early.clear()

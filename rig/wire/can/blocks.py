@@ -28,7 +28,7 @@ def check_stream(shape: Shape, stream: Stream) -> None:
 
 
 class Piece(NamedTuple):
-    """What one frame carries of its block."""
+    """The part of a block that one frame carries."""
 
     rows: slice
     columns: slice
@@ -43,7 +43,7 @@ class Piece(NamedTuple):
 class StreamFrames:
     """The frames of one direction, for blocks of one size: `rig.wire.can.protocol.Shape` worked out.
 
-    Whole blocks go into the sequence numbers, so that a loss of a whole wrap cannot make one block of the frames of two.
+    The sequence numbers wrap after whole blocks, so that after a loss frames of two blocks are never combined to one.
     """
 
     def __init__(self, protocol: Protocol, kind: FrameKind, block: int) -> None:
@@ -97,7 +97,7 @@ class StreamFrames:
 
 
 OPEN_BLOCKS = 4
-"""Blocks of which frames may be under way at the same time; the oldest gives way."""
+"""Blocks that may be incomplete at the same time; the oldest is dropped for a further one."""
 
 
 _NEVER = 1 << 30
@@ -105,7 +105,7 @@ INDICES = 1 << 32  # a frame has 32 bits for the index of a sample
 
 
 class _Open:
-    """A block of which frames are missing."""
+    """An incomplete block."""
 
     def __init__(self, shape: tuple[int, int], n_frames: int) -> None:
         self.counts = np.zeros(shape, np.int16)
@@ -117,9 +117,9 @@ class _Open:
 class Blocks:
     """Puts blocks together from frames that may be lost, doubled or swapped.
 
-    A frame says its sequence number, modulo ``wrap``, and its part. It is taken for the nearest group ahead of the last one if
-    that is less than half a wrap away, else for one behind. A whole block ends all older ones: time does not go back. A group
-    index from elsewhere (`mark`) puts right what a loss of half a wrap or more has confused, once a frame agrees with it.
+    A frame carries its sequence number, modulo ``wrap``, and its part. The number is taken as the nearest group ahead of the
+    last one if that is less than half a wrap away, else as one behind. A complete block ends all older ones. After a loss of
+    half a wrap or more, an index from another message (`mark`) corrects the numbering once a frame agrees with it.
     """
 
     def __init__(self, counters: dict[str, int], stream: StreamFrames) -> None:
@@ -135,11 +135,11 @@ class Blocks:
         self._mark: int | None = None
 
     def begin(self, block: int) -> None:
-        """The first block to come, where it is not block 0."""
+        """Set the first block to come, if it is not block 0."""
         self._oldest, self._next = block, block * self._per_block
 
     def mark(self, sample: int) -> None:
-        """Somebody who knows says that this sample, modulo 2^32, is next. Believed if the sequence numbers cannot tell it."""
+        """Note that ``sample``, modulo 2^32, is next; used only if it is half a wrap or more ahead of the sequence numbers."""
         n = self._shape[0]
         here = self._next // self._per_block * n
         sample += INDICES * round((here - sample) / INDICES)
@@ -148,7 +148,7 @@ class Blocks:
         self._mark = group if far else None
 
     def group(self, sequence: int) -> int:
-        """The group that a sequence number stands for; below 0 from before the start, and too old."""
+        """The group that a sequence number stands for; negative for one from before the start."""
         base = self._next if self._mark is None or sequence != self._mark % self._wrap else self._mark
         ahead = (sequence - base) % self._wrap
         return base + ahead - self._wrap * (ahead >= self._wrap // 2)
@@ -156,7 +156,7 @@ class Blocks:
     def put(
         self, group: int, part: int, piece: Piece, counts: np.ndarray, flags: int
     ) -> tuple[int, np.ndarray, int] | None:
-        """Take the counts (int16, rows by columns) of a frame; return number, counts and flags of a block that is whole now."""
+        """Add the counts (int16, rows by columns) of a frame; return number, counts and flags of a block it completes."""
         if self._mark is not None and group == self._mark:
             self._count("resynchronised")
             self._drop(group // self._per_block)
@@ -185,7 +185,7 @@ class Blocks:
         if held.seen[frame]:
             self._count("repeated_frames")
             if not np.array_equal(into, counts):
-                held.missing = _NEVER  # one of the two is false, and nobody knows which
+                held.missing = _NEVER  # the two differ and either may be wrong: the block is given up
             return None
         held.seen[frame] = 1
         held.missing -= 1
@@ -198,7 +198,7 @@ class Blocks:
         return block, held.counts, held.flags
 
     def _drop(self, oldest: int) -> None:
-        """Give up what is older than this block."""
+        """Drop incomplete blocks before ``oldest``."""
         self._oldest = oldest
         if not self._open:
             return

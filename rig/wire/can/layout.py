@@ -1,4 +1,4 @@
-"""Layouts of CAN messages as numpy dtypes, compiled from DBC files: frames to values and back."""
+"""Layouts of CAN messages as numpy dtypes, compiled from DBC files; they convert frames to values and back."""
 
 import zlib
 from collections.abc import Callable, Sequence
@@ -73,7 +73,9 @@ class CompiledMessage:
 
         Raises `ValueError` for any other number of bytes than the message has.
         """
-        data = memoryview(bytearray(self.length))  # seen as the numbers that it is: nothing is made anew but the values
+        data = memoryview(
+            bytearray(self.length)
+        )  # the views below read this buffer, so that a frame costs no allocation but the values
         views = [np.frombuffer(data, run.kind, run.n_signals, run.first) for run in self._runs]
         scale, offset = self.scale, self.offset if self.offset.any() else None
         if len(views) == 1:

@@ -54,12 +54,12 @@ def traffic(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: 
 
 
 def _marks_hz(blocks_hz: float, groups: int, wrap: int) -> float:
-    """How often the other end is told an index: with the first block that would end beyond half a wrap after the last one."""
+    """Rate of index messages: one with each block that would end more than half a wrap after the last message."""
     return blocks_hz / max((wrap - wrap % groups) // 2 // groups, 1)
 
 
 def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float) -> Load:
-    """The sum, in bits of the bit rate; CAN FD's faster bits are counted by the time they take."""
+    """Load of the bus in bits of its bit rate; the faster bits of CAN FD count by their duration."""
     parts = traffic(shape, stream, bit_rate_hz, data_bit_rate_hz)
     share = sum(part.share for part in parts)
     terms = " + ".join(
@@ -73,14 +73,14 @@ def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz:
 COMMAND_S = 0.1
 """How long a command may wait for the bus."""
 SHORTEST_DEADLINE_S = 0.005
-_FRAMES_A_CALL = 256  # a bus full of strangers does not keep a call that must not wait
+_FRAMES_A_CALL = 256  # bounds a call with a time-out of 0 on a bus full of foreign frames
 
 
 class CanLink(Link):
     """The protocol on a bus, for a number of channels and a node.
 
-    Samples and outputs that cannot be sent within the time of a block expire: they are dropped and counted ("expired_frames").
-    A device's answers to one host are its own business: two devices under one node are noticed by who asks them.
+    Samples and outputs that cannot be sent within the duration of a block are dropped and counted ("expired_frames"). The link
+    does not notice two devices with the same node; `rig.drivers.wire.dialogue.Dialogue` does.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class CanLink(Link):
         self._deadline_s = max(stream.block / stream.rate_hz, SHORTEST_DEADLINE_S)
 
     def send(self, message: Message) -> None:
-        """Send one message; one that cannot be sent in time is dropped, for what it says will be out of date."""
+        """Send one message; one that cannot be sent in time is dropped, because it would be out of date."""
         left_s = self._deadline_s if isinstance(message, Samples | Output) else COMMAND_S
         frames = self._codec.encode(message)
         if len(frames) == 1:
@@ -119,7 +119,7 @@ class CanLink(Link):
         deadline = time.monotonic() + left_s
         for frame in frames:
             if not self._bus.send(frame, max(deadline - time.monotonic(), 0.0)):
-                return  # a block without one of its frames is none
+                return  # the rest of an incomplete block is useless
 
     def receive(self, timeout_s: float) -> Message | None:
         """The next message."""
@@ -151,9 +151,9 @@ class CanLink(Link):
 
     @property
     def largest_block(self) -> int:
-        """Samples a block may have on this bus."""
+        """Largest number of samples in a block on this bus."""
         return self._protocol.shape.largest_block
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Close the bus."""
         self._bus.close()

@@ -80,7 +80,7 @@ class Shape:
 
     @property
     def largest_block(self) -> int:
-        """Samples: half of the sequence numbers, so that what is missing can be told from what comes twice."""
+        """Largest block: half of the sequence numbers, so that a missing frame can be told from a repeated one."""
         return min(self.wrap // 2 * self.rows, self.output_wrap // 2 * self.output_rows)
 
     def columns(self, part: int) -> slice:
@@ -89,7 +89,7 @@ class Shape:
 
 
 def shape_of(n_channels: int, fd: bool) -> Shape:
-    """How rows of so many channels are spread over frames; `DaqRefused` where there are too many."""
+    """How rows of ``n_channels`` are spread over frames; `DaqRefused` for too many channels."""
     largest = CHANNELS_A_FRAME[fd] * (FD_PARTS if fd else CLASSICAL_PARTS)
     if not 1 <= n_channels <= largest:
         bus = "CAN FD" if fd else "classical CAN"
@@ -103,7 +103,7 @@ def shape_of(n_channels: int, fd: bool) -> Shape:
 def definition(n_channels: int, fd: bool) -> str:
     """The DBC file of the protocol for so many channels, as text, for node 0.
 
-    Written out here, for what cantools writes changes with its versions; cantools reads it in the tests.
+    It is written here because the output of cantools changes with its version; the tests read it with cantools.
     """
     shape = shape_of(n_channels, fd)
     messages = [
@@ -126,7 +126,7 @@ def definition(n_channels: int, fd: bool) -> str:
 
 
 _HEAD = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: Host Device\n\n'
-_FD_FORMAT = 14  # place of StandardCAN_FD in the list below, which is that of the format's inventor
+_FD_FORMAT = 14  # place of StandardCAN_FD in the list of formats below
 _FORMATS = (
     '\nBA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG",'
     + '"reserved",' * 10
@@ -157,7 +157,7 @@ def _message(frame_id: int, name: str, sender: str, signals: list[tuple[str, int
 
 
 class FrameKind(Enum):
-    """Messages that a bus carries; outputs and samples as many of one layout over classical CAN."""
+    """Kinds of messages on a bus; over classical CAN, outputs and samples are many messages of one layout."""
 
     EMERGENCY_STOP = "EmergencyStop"
     HEARTBEAT = "Heartbeat"
@@ -178,7 +178,7 @@ class Protocol:
 
     @cached_property
     def kinds(self) -> dict[int, tuple[FrameKind, int]]:
-        """What an identifier stands for: kind and number within its kind (sequence and part), by identifier."""
+        """Kind and number within the kind (sequence and part), by identifier."""
         out: dict[int, tuple[FrameKind, int]] = {}
         for name, message in self.layout.messages.items():
             base, _, number = name.partition("_")

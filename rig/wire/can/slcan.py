@@ -20,33 +20,32 @@ _NOBODY_S = 0.01
 
 
 class TextPort:
-    """An open file descriptor, which stays the caller's.
+    """Lines over an open file descriptor, which the caller closes.
 
-    ``on_hang_up`` is called where nobody is at the other end any more, and the port waits on; without it `DaqDisconnected` is
-    raised then.
+    If the other end hangs up, ``on_hang_up`` is called and the port goes on waiting; without it `DaqDisconnected` is raised.
     """
 
     def __init__(self, name: str, descriptor: int, on_hang_up: Callable[[], None] | None = None) -> None:
         self.name = name
         self._descriptor, self._on_hang_up = descriptor, on_hang_up
         self._tail = b""
-        """What is left of a line of which the beginning is written."""
+        """Rest of a line whose beginning is written."""
         os.set_blocking(descriptor, False)
 
     def forget(self, longest_s: float) -> None:
-        """Read what an earlier conversation has left on the line."""
+        """Drop what an earlier conversation has left on the line."""
         deadline = time.monotonic() + longest_s
         while time.monotonic() < deadline and self._has_come(0.0):
             if not self._bytes():
                 return
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come; waits at most so long for something."""
+        """Bytes that have arrived, after a wait of at most ``timeout_s``."""
         if timeout_s > 0.0 and not self._has_come(timeout_s):
             return b""
         data = self._bytes()
         if not data and timeout_s > 0.0:
-            time.sleep(min(timeout_s, _NOBODY_S))  # nobody at the other end: select returns at once
+            time.sleep(min(timeout_s, _NOBODY_S))  # without another end, select returns at once
         return data
 
     def _has_come(self, timeout_s: float) -> bool:
@@ -68,7 +67,7 @@ class TextPort:
         return data
 
     def write(self, line: bytes, timeout_s: float) -> bool:
-        """Write all of a line within the time, or nothing of it that counts."""
+        """Write a line within the time; False if nothing of it was written."""
         deadline = 0.0
         started = False
         data = self._tail + line
@@ -91,7 +90,7 @@ class TextPort:
             left = deadline - now
             if left <= 0:
                 self._tail = data if started else data[: len(data) - len(line)]
-                return started  # what has begun will be ended before the next line, and so is sent
+                return started  # a line that was begun is ended before the next one, so it counts as sent
             select((), (self._descriptor,), (), left)
 
     def _gone(self, error: OSError) -> None:
@@ -152,7 +151,7 @@ class SlcanBus(FrameBus):
         return self._text
 
     def send(self, frame: Frame, timeout_s: float) -> bool:
-        """Write a line; one that is half written when the time is over is ended before the next one."""
+        """Write the line of a frame; one that is half written when the time is over is ended before the next."""
         if not self._on_bus:
             return True  # as on a bus without listeners
         if self._line().write(encode_line(frame), timeout_s):
@@ -193,7 +192,7 @@ class SlcanBus(FrameBus):
                 return
 
     def _obey(self) -> None:
-        """Do, as an adapter, what the other end commands."""
+        """As an adapter, carry out the commands of the other end."""
         while self._lines.commands:
             command = self._lines.commands.popleft()
             if not self._adapter:

@@ -67,7 +67,7 @@ def _decode_line(line: bytes) -> Frame | None:
 
 
 class SlcanLines:
-    """Cuts a stream of bytes into frames and commands; garbage is counted, and costs no frame behind the next line end."""
+    """Splits a stream of bytes into frames and commands; garbage is counted and ends at the next line end."""
 
     def __init__(self, counters: dict[str, int]) -> None:
         self._counters = counters
@@ -85,7 +85,7 @@ class SlcanLines:
             rest = rest[-LONGEST_LINE:]
         self._rest = rest
         for line in lines:
-            line = line.lstrip(b"\a")  # an adapter's word for an error, without a line end
+            line = line.lstrip(b"\a")  # an adapter reports an error by this character, without a line end
             if line:
                 self._take(line)
 

@@ -23,9 +23,9 @@ BITS_A_BYTE = 10  # 8N1: start, eight bits, stop
 
 
 def line_load(stream: Stream, baud: int | None) -> Load:
-    """Bits per second against those of the line; None for a line without a rate.
+    """Bits per second that a stream needs against the baud rate; None is a line without a rate.
 
-    Of the direction from the device alone: the line carries both at a time, and outputs are always less than samples.
+    Only the direction from the device counts: the line carries both at once, and outputs are always fewer than samples.
     """
     blocks_hz = stream.rate_hz / stream.block
     samples = largest_frame(Codec.sizes(stream)[0])
@@ -107,10 +107,10 @@ class SerialLink(Link):
         self._reader.configure(stream)
 
     def send(self, message: Message) -> None:
-        """Send one message; `DaqTimeout` says that the line takes no more, and that nothing of it was sent."""
+        """Send one message. `DaqTimeout`: the line takes no more bytes, and nothing of the message was sent."""
         data = frame(self._codec.encode(message))
         if message.__class__ not in STREAMED:
-            data = b"\0" + data  # ends what noise on an idle line may have begun
+            data = b"\0" + data  # a leading zero ends a false frame that noise on the idle line may have begun
         if self._unfinished:
             data = self._unfinished + data
         written = self._write(data)
@@ -120,7 +120,7 @@ class SerialLink(Link):
             self._unfinished = b""
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait for it at most so long."""
+        """Return the next message, or None after ``timeout_s``."""
         received = self._received
         if received:
             return received.popleft()
@@ -145,11 +145,11 @@ class SerialLink(Link):
         return line_load(stream, None if unlimited else self._baud)
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         self._descriptor, self._input = -1, NoInput()
         self._received.clear()
         self._unfinished = b""
-        with suppress(Exception):  # what a vanished port raises differs by system, and it is gone either way
+        with suppress(Exception):  # errors of a vanished port differ by system, and the port is gone in any case
             self._held.close()
 
     def _write(self, data: bytes) -> int:
@@ -170,7 +170,7 @@ class SerialLink(Link):
                 raise self._gone(error) from error
             written += self._write(data[written:])
         if written > old:
-            self._unfinished = data[written:]  # the rest goes before the next message
+            self._unfinished = data[written:]  # the rest is sent before the next message
             return
         self._unfinished = data[written:old]
         self.counters["unsent_frames"] += 1
