@@ -178,19 +178,16 @@ def begin_to_follow(expected: Record, following: Record, amplitude_v: float, lev
 def follow_level(
     expected: Record,
     following: Record,
-    amplitude_v: float,
+    period: Record,
     wanted: float,
-    held: float,
-    force: float,
-    response: float,
     law: int,
     slipping: bool,
     may_jump: bool,
 ) -> bool:
     """Once a period: take in what is held; returns whether it has been astray for `ASTRAY_PERIODS`.
 
-    ``amplitude_v`` is the output, ``held`` what should be ``wanted`` (N or m), ``force`` (N) and ``response`` (m/s^2) the
-    fundamentals; ``slipping``: a lock is about to be lost, so that nothing may be learned.
+    Of the ``period`` (of `controller.period.PERIOD`) count the output, the fundamentals, and what is held; it should be
+    ``wanted`` (N or m). ``slipping``: a lock is about to be lost, so that nothing may be learned.
 
     What is held follows where it has grown towards its level, or is near it while the output creeps. A force may also be too
     large while the vibration builds up, and sag by less than a quarter, with an output that creeps, where the vibration has
@@ -198,6 +195,7 @@ def follow_level(
     structure jumps past a turning point. It is astray where the output has risen and it has stayed, has fallen to a half
     without any such growth, or is too much.
     """
+    amplitude_v, held, force, response = period.output_v, period.held, period.force_n, period.drive_m_s2
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
     visible = (response if law == RESPONSE else force) >= smallest
