@@ -1,4 +1,7 @@
-"""Compiled adaptive filter: several harmonics and the mean of a signal at once (least mean squares; Hippold et al. 2024)."""
+"""Compiled adaptive filter: several harmonics and the mean of a signal at once (least mean squares; Hippold et al. 2024).
+
+Arrays are complex128 with a number for the mean and each harmonic up to H = ``harmonics``; they may be longer.
+"""
 
 import math
 
@@ -11,16 +14,16 @@ MOST_HARMONICS = 12
 
 
 @kernel
-def turn_phasors(phasors: np.ndarray, cos_theta: float, sin_theta: float) -> None:
-    """Fill ``phasors`` (complex128[H+1]) with ``exp(i h theta)``."""
+def turn_phasors(phasors: np.ndarray, harmonics: int, cos_theta: float, sin_theta: float) -> None:
+    """Fill ``phasors`` with ``exp(i h theta)``."""
     phasors[0] = 1.0
     turn = complex(cos_theta, sin_theta)
-    for order in range(1, phasors.size):
+    for order in range(1, harmonics + 1):
         phasors[order] = phasors[order - 1] * turn
 
 
 @kernel
-def adapt(coefficients: np.ndarray, phasors: np.ndarray, value: float, gain: float) -> None:
+def adapt(coefficients: np.ndarray, phasors: np.ndarray, harmonics: int, value: float, gain: float) -> None:
     """One step of the filter towards all harmonics and the mean of a signal.
 
     ``y_hat = Re sum C_h exp(i h theta)``, ``C_h <- C_h + 2 gain exp(-i h theta) (y - y_hat)``, the mean with half the step.
@@ -28,21 +31,21 @@ def adapt(coefficients: np.ndarray, phasors: np.ndarray, value: float, gain: flo
     holds makes no ripple, only harmonics beyond H do.
     """
     error = value - coefficients[0].real
-    for order in range(1, coefficients.size):
+    for order in range(1, harmonics + 1):
         c, p = coefficients[order], phasors[order]
         error -= c.real * p.real - c.imag * p.imag
     coefficients[0] += gain * error
     step = 2.0 * gain * error
-    for order in range(1, coefficients.size):
+    for order in range(1, harmonics + 1):
         p = phasors[order]
         coefficients[order] += complex(step * p.real, -step * p.imag)
 
 
 @kernel
-def root_mean_square(coefficients: np.ndarray) -> float:
+def root_mean_square(coefficients: np.ndarray, harmonics: int) -> float:
     """Root mean square of all harmonics of an adaptive filter, without the mean."""
     total = 0.0
-    for order in range(1, coefficients.size):
+    for order in range(1, harmonics + 1):
         c = coefficients[order]
         total += c.real * c.real + c.imag * c.imag
     return math.sqrt(0.5 * total)

@@ -140,11 +140,10 @@ def detect(
     """
     gain = parameters.gain
     if parameters.kind == ADAPTIVE:
-        used = parameters.harmonics + 1
-        phasors = state.phasors[:used]
-        turn_phasors(phasors, phasor.real, phasor.imag)
-        adapt(state.force_filter[:used], phasors, force, gain)
-        adapt(state.drive_filter[:used], phasors, drive, gain)
+        harmonics = parameters.harmonics
+        turn_phasors(state.phasors, harmonics, phasor.real, phasor.imag)
+        adapt(state.force_filter, state.phasors, harmonics, force, gain)
+        adapt(state.drive_filter, state.phasors, harmonics, drive, gain)
         vibration.force, vibration.drive = state.force_filter[1], state.drive_filter[1]
     else:
         vibration.force = demodulate(vibration.force, force, phasor.real, phasor.imag, gain)
@@ -160,7 +159,7 @@ def detect(
 def force_rms(parameters: Record, state: Record) -> float:
     """Root mean square of the force without its mean, all harmonics together (N)."""
     if parameters.kind == ADAPTIVE:
-        return root_mean_square(state.force_filter[: parameters.harmonics + 1])
+        return root_mean_square(state.force_filter, parameters.harmonics)
     return math.sqrt(state.force_square)
 
 

@@ -17,12 +17,14 @@ PERIOD = np.dtype(
         ("force_n", "f8"),
         ("drive_m_s2", "f8"),
         ("held", "f8"),
+        ("output_v", "f8"),
         ("saturated", "i8"),
         ("clamped", "i8"),
     ]
 )
 """Sums over the period under way, and the means of the last one (one record). ``held``: what the amplitude law holds (N or m).
-``saturated``, ``clamped``: whether output and frequency stood at a bound at its end."""
+``output_v``, ``saturated``, ``clamped``: amplitude of the output, and whether output and frequency stood at a bound, at its
+end."""
 
 
 @inner_kernel

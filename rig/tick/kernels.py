@@ -18,7 +18,7 @@ from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
 from rig.tick.measure import pass_over, take_in
 from rig.tick.periods import close_period
-from rig.tick.safety.following.kernels import begin_to_follow, contradicts_exciter, permitted_level
+from rig.tick.safety.following import begin_to_follow, contradicts_exciter, permitted_level
 from rig.tick.safety.kernels import (
     NON_FINITE_OUTPUT,
     PLANT_CONTRADICTED,

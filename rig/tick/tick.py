@@ -11,12 +11,12 @@ from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.errors import ConfigurationError
 from rig.tick.layout import HISTORY, LOOP, ROW, TickArrays, recorded_row
-from rig.tick.safety.following.expected import expected_record
-from rig.tick.safety.following.kernels import see_frequency
-from rig.tick.safety.following.layout import FOLLOWING
+from rig.tick.safety.expected import expected_record
+from rig.tick.safety.following import FOLLOWING, see_frequency
 from rig.tick.safety.kernels import is_over
 from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
-from rig.tick.sequencer.layout import PROGRESS, SETTLING
+from rig.tick.sequencer.judgement import SETTLING
+from rig.tick.sequencer.layout import PROGRESS
 from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
 __all__ = ["Tick", "TickSettings"]

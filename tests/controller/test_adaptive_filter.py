@@ -21,8 +21,8 @@ def follow(values, harmonics=5, low_pass=LOW_PASS, omega=OMEGA):
     history = np.empty((values.size, harmonics + 1), complex)
     turn = np.exp(1j * omega * np.arange(values.size) / FS)
     for k, value in enumerate(values.tolist()):
-        turn_phasors(phasors, turn.real[k], turn.imag[k])
-        adapt(coefficients, phasors, value, gain)
+        turn_phasors(phasors, harmonics, turn.real[k], turn.imag[k])
+        adapt(coefficients, phasors, harmonics, value, gain)
         history[k] = coefficients
     return history
 
@@ -112,4 +112,4 @@ def test_the_root_mean_square_is_that_of_the_signal_without_its_mean():
     amplitudes = np.array([3.0, 1.0 - 0.4j, 0.3j, 0.2, -0.1 + 0.05j, 0.02j])
     theta = 2 * math.pi * np.arange(1000) / 1000
     values = np.real(sum(a * np.exp(1j * h * theta) for h, a in enumerate(amplitudes)))
-    assert root_mean_square(amplitudes) == pytest.approx(values.std(), rel=1e-12)
+    assert root_mean_square(amplitudes, amplitudes.size - 1) == pytest.approx(values.std(), rel=1e-12)

@@ -12,8 +12,9 @@ from controller.lock import LOCK
 from controller.period import PERIOD
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import guard_record
-from rig.tick.sequencer.kernels import advance, judge_period
-from rig.tick.sequencer.layout import PROGRESS, SETTLING, OnFailure, Outcome, SegmentKind
+from rig.tick.sequencer.judgement import SETTLING, judge_period
+from rig.tick.sequencer.kernels import advance
+from rig.tick.sequencer.layout import PROGRESS, OnFailure, Outcome, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
 RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)

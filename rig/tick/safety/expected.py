@@ -6,8 +6,7 @@ import numpy as np
 
 from controller.tuning import PlantModel
 from rig.bench import Bench
-from rig.tick.safety.following.kernels import VISIBLE
-from rig.tick.safety.following.layout import EXPECTED
+from rig.tick.safety.following import EXPECTED, VISIBLE
 
 __all__ = ["expected_record"]
 
@@ -20,7 +19,7 @@ FLOOR_PART = 0.025  # of the largest voltage: where the output may always be
 def expected_record(
     bench: Bench, smallest_n: float, smallest_m_s2: float, exciter: PlantModel | None = None
 ) -> np.ndarray:
-    """One record of `rig.tick.safety.following.layout.EXPECTED`.
+    """One record of `rig.tick.safety.following.EXPECTED`.
 
     ``smallest_n`` and ``smallest_m_s2`` are the smallest amplitudes of which a phase can be read. Of the plant only the
     ``exciter`` counts: it is the part that a nonlinear structure leaves as it is.

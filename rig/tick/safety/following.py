@@ -14,6 +14,8 @@ from controller.amplitude import RESPONSE
 from controller.primitives import TWO_PI, size
 from vibrolock.compiled import Record, kernel
 
+__all__ = ["EXPECTED", "FOLLOWING"]
+
 LARGEST_RISE = 2.0  # of the output above what last sufficed, and so also within one period
 CREEP = 1.05  # a period: so fast may an output rise by which a held quantity stays at its level
 ASTRAY_RISE = 1.5  # from here on a level that does not follow is astray, or with less than half of what there was
@@ -33,6 +35,59 @@ UNLIKE = 0.6  # of the largest of output sent and terms of the known exciter
 TOO_STRONG = 4.0  # times the output: what an amplifier of another gain makes of it, also while the vibration grows
 WIDE = 3.0  # times its band, in which the known exciter tells an amplifier of another gain
 UNLIKE_PERIODS = 1.0  # of the mode under test, for which it must last
+
+EXPECTED = np.dtype(
+    [
+        ("known", "i8"),
+        ("force_v_n", "f8", (4,)),
+        ("acceleration_v_s2_m", "f8", (4,)),
+        ("centre_rad_s", "f8"),
+        ("lowest_rad_s", "f8"),
+        ("highest_rad_s", "f8"),
+        ("noise_n", "f8"),
+        ("noise_m_s2", "f8"),
+        ("visible_n", "f8"),
+        ("visible_m_s2", "f8"),
+        ("floor_v", "f8"),
+        ("force_skew_s", "f8"),
+        ("drive_skew_s", "f8"),
+    ]
+)
+"""What is known beforehand (one record). ``known``: whether there is an exciter ``u = alpha F + beta A``, with its
+coefficients as in `controller.tuning.PlantModel` and the band in which they hold. ``noise_``: amplitudes below which it is
+not judged by. ``visible_``: amplitudes from which on a force or acceleration is told from noise. ``floor_v``: output that is
+never too much. ``_skew_s``: delays of the two channels."""
+
+FOLLOWING = np.dtype(
+    [
+        ("alpha", "c16"),
+        ("beta", "c16"),
+        ("alpha_rate", "c16"),
+        ("beta_rate", "c16"),
+        ("sent", "c16"),
+        ("late_sent", "c16"),
+        ("late_force", "c16"),
+        ("late_drive", "c16"),
+        ("needed", "c16"),
+        ("told", "i8"),
+        ("unlike_s", "f8"),
+        ("most_unlike_s", "f8"),
+        ("silent_periods", "i8"),
+        ("reference_v", "f8"),
+        ("reference_level", "f8"),
+        ("reference_other", "f8"),
+        ("astray_periods", "i8"),
+        ("largest_rise", "f8"),
+        ("most_periods", "i8"),
+    ]
+)
+"""State of the watch (one record). ``alpha``, ``beta``: exciter at this period's frequency, ``_rate`` their derivatives by s,
+``told``: whether they are known apart there. ``sent``: complex output as the detector's filter would show it, ``late_`` what
+has passed that filter once more, ``needed``: output that the known exciter needs for it. ``unlike_s``: time without a break in
+which the two contradict each other, ``most_unlike_s`` the longest. ``silent_periods`` in which one of force and motion showed
+nothing and the other much. ``reference_``: output (V), held quantity and the other of
+force and motion when the held quantity last followed. ``astray_periods`` since in which it did not, ``most_periods`` of these
+there ever were, ``largest_rise`` of the output above its reference in them."""
 
 
 @kernel
@@ -123,19 +178,16 @@ def begin_to_follow(expected: Record, following: Record, amplitude_v: float, lev
 def follow_level(
     expected: Record,
     following: Record,
-    amplitude_v: float,
+    period: Record,
     wanted: float,
-    held: float,
-    force: float,
-    response: float,
     law: int,
     slipping: bool,
     may_jump: bool,
 ) -> bool:
     """Once a period: take in what is held; returns whether it has been astray for `ASTRAY_PERIODS`.
 
-    ``amplitude_v`` is the output, ``held`` what should be ``wanted`` (N or m), ``force`` (N) and ``response`` (m/s^2) the
-    fundamentals; ``slipping``: a lock is about to be lost, so that nothing may be learned.
+    Of the ``period`` (of `controller.period.PERIOD`) count the output, the fundamentals, and what is held; it should be
+    ``wanted`` (N or m). ``slipping``: a lock is about to be lost, so that nothing may be learned.
 
     What is held follows where it has grown towards its level, or is near it while the output creeps. A force may also be too
     large while the vibration builds up, and sag by less than a quarter, with an output that creeps, where the vibration has
@@ -143,6 +195,7 @@ def follow_level(
     structure jumps past a turning point. It is astray where the output has risen and it has stayed, has fallen to a half
     without any such growth, or is too much.
     """
+    amplitude_v, held, force, response = period.output_v, period.held, period.force_n, period.drive_m_s2
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
     visible = (response if law == RESPONSE else force) >= smallest
