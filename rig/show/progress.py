@@ -47,7 +47,7 @@ class RunProgress:
             if point.settle_periods is not None:
                 parts.append(f"settled in {number(point.settle_periods, '.0f'):>4} periods")
         if point.quality is not Quality.GOOD:
-            parts.append(f"{point.quality}: {point.reason}" if point.reason else str(point.quality))
+            parts.append(str(point.quality) + (f": {point.reason}" if point.reason not in ("", point.quality) else ""))
         self._print("  ".join(parts))
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:

@@ -69,7 +69,7 @@ def test_below_four_tenths_of_a_bit_no_phase_is_read_and_none_is_reported():
     assert points[0]["quality"] == "not-settled"
     assert "too small for its phase to be read" in points[0]["reason"]
     assert points[1]["accepted"]
-    assert end["skipped"] == "1 of 2 points skipped: not settled (0.002 V)"
+    assert end["skipped"] == "1 of 2 points skipped: not-settled (0.002 V)"
 
 
 @pytest.mark.parametrize("levels", [{"levels_m": (5e-5, 2e-4)}, {"levels_n": (2.0, 40.0)}])

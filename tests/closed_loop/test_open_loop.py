@@ -7,6 +7,7 @@ import pytest
 
 import rig
 from rig.arming.run_options import Silent
+from rig.campaigns.evaluation.point import Quality
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import MULTISINE_COLUMNS
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
@@ -21,6 +22,7 @@ from rig.tick.safety.layout import GuardMode
 from simulators.virtual_rig import VirtualRig
 from tests.reference.harmonic_balance import response_to_voltage
 from tests.reference.parameters import ONE_SIDED
+from tests.rig.campaigns.made_points import made_point
 from tests.rig.rigs import bench_with
 
 QUIET = {"noise_scale": 0.0, "converter": {"adc_bits": 0, "dac_bits": 0}}
@@ -266,13 +268,13 @@ def test_a_point_that_failed_says_where_it_is_and_nothing_of_a_phase_that_nobody
     with rig.run(plan, bench=bench_with(**QUIET), progress=RunProgress(STEPPED_SINE_COLUMNS)) as run:
         assert "at 24.5 Hz: not settled within 30 periods" in run.recording.points[0]["reason"]
         assert "phase" not in run.recording.points[0]["reason"]
-    assert "FAILED: at 24.5 Hz" in capsys.readouterr().err
+    assert "  not-settled: at 24.5 Hz" in capsys.readouterr().err
 
 
 def test_an_interrupted_realisation_is_shown_as_failed_without_empty_columns(capsys):
-    point = {"level": 0.1, "level_unit": "V RMS", "realisation": 0, "accepted": False, "reason": "interrupted"}
+    point = made_point(0.1, "V RMS", quality=Quality.INTERRUPTED, reason="interrupted", realisation=0)
     RunProgress(MULTISINE_COLUMNS).point(point, 1, 2)
-    assert capsys.readouterr().err.endswith("FAILED: interrupted\n")
+    assert capsys.readouterr().err.endswith("0.1 V RMS  interrupted\n")
 
 
 def test_a_level_of_a_multisine_stands_in_its_plan_once():

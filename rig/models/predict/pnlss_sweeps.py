@@ -106,7 +106,7 @@ def _largest_in_training(model: PnlssModel, row: int) -> float:
 
 
 def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tuple[SweepGiven, tuple[str, ...]]:
-    """A sweep by its stored number, at the model's rate, with the oscillator's phase at its counted samples; gaps are bridged."""
+    """A sweep by its stored number, at the model's rate, with the oscillator's phase at its counted samples."""
     bench, model, name = bench_of_recording(recording), models.model, f"sweep {number + 1}"
     try:
         signals = Signals.chosen(bench, [c.name for c in models.inputs], [c.name for c in model.outputs])

@@ -325,9 +325,9 @@ def test_a_run_with_a_failed_point_exits_with_one(command, tmp_path):
     status, out, err = command("run plan.toml -o run.h5")
     assert status == 1
     assert "0 of 2 points accepted" in out
-    assert "2 of 2 points skipped: not settled (0.4 V, 0.8 V)" in out.splitlines()
-    assert "2 of 2 points skipped: not settled (0.4 V, 0.8 V)" in command("show run.h5")[1].splitlines()
-    assert err.count("FAILED") == 2
+    assert "2 of 2 points skipped: not-settled (0.4 V, 0.8 V)" in out.splitlines()
+    assert "2 of 2 points skipped: not-settled (0.4 V, 0.8 V)" in command("show run.h5")[1].splitlines()
+    assert err.count("  not-settled: not settled within 39 periods") == 2
     assert command("identify run.h5 -o model.h5")[0] == 1
     assert not (tmp_path / "model.h5").exists()
     assert command("plot run.h5 -o run.png")[0] == 0

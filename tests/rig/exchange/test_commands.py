@@ -107,7 +107,7 @@ def test_samples_that_go_out_and_in_give_the_same_responses(command, multisine_f
     with rig.Recording(multisine_file) as recording:
         first = next(iter(rig.measurements.spectra(recording).values()))
         bench = recording.configuration["bench"]
-    status, _, err = command(f"export {multisine_file} --data time --point 0 --point 1 -o time.uff")
+    status, _, err = command(f"export {multisine_file} --data time --point 1 --point 2 -o time.uff")
     assert status == 0, err
     channels = "".join(
         f'[[channels]]\nname = "{c.name}"\nrole = "{c.role}"\nunit = "{c.unit}"\nvalue = "{c.name}"\n'
@@ -126,7 +126,7 @@ def test_samples_that_go_out_and_in_give_the_same_responses(command, multisine_f
 
 
 def test_samples_are_those_of_the_recording(command, backbone_file, tmp_path):
-    assert command(f"export {backbone_file} --data time --point 1 -o time.mat")[0] == 0
+    assert command(f"export {backbone_file} --data time --point 2 -o time.mat")[0] == 0
     data = scipy.io.loadmat(tmp_path / "time.mat", simplify_cells=True)["time_data"]
     with rig.Recording(backbone_file) as recording:
         rows = rig.measurements.point_rows(recording, 1)
@@ -149,7 +149,8 @@ def test_a_model_goes_to_csv_for_a_spreadsheet(command, backbone_file, tmp_path)
         ("export {file} -o x.xls", 1, "x.xls: the ending says no format; give --to, one of mat, uff, csv"),
         ("export {file} --to xls -o x", 1, "--to = 'xls': allowed is mat, uff, csv"),
         ("export {file} --data raw -o x.mat", 1, "--data = 'raw': allowed is results or time"),
-        ("export {file} --data time --point 9 -o x.mat", 1, "point 9: nothing was recorded of it; there are 0, 1"),
+        ("export {file} --data time --point 9 -o x.mat", 1, "point 9: nothing was recorded of it; there are 1, 2"),
+        ("export {file} --data time --point 0 -o x.mat", 2, "--point"),
         ("export {file} --item 3 -o x.mat", 1, "--item = 3"),
         ("export missing.h5 -o x.mat", 1, "missing.h5"),
         ("export {file} -o nowhere/x.mat", 1, "there is no folder nowhere"),

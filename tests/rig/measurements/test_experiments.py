@@ -5,7 +5,7 @@ import pytest
 
 import rig
 from identification import IdentificationError
-from rig.campaigns.evaluation.vibrations import as_complex
+from rig.campaigns.evaluation.stored_point import as_complex
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
 from rig.measurements import point_rows, spectra

@@ -10,13 +10,15 @@ import rig
 from rig.arming.run_options import Silent
 from rig.bench import Bench, load_bench
 from rig.campaigns.dwell.plan import DwellPlan
-from rig.campaigns.dwell.points import recorded_course, watch_drift
+from rig.campaigns.dwell.points import DwellResult, Length, recorded_course, watch_drift
+from rig.campaigns.evaluation.point import Quality
 from rig.campaigns.plans import load_plan
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import point_rows
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
+from tests.rig.campaigns.made_points import made_modal, made_point, made_vibration
 
 SHORT = {"cycles": 750, "mean_s": 0.5, "record_every": 4, "telemetry_s": 0.02, "ramp_periods": 20.0}
 
@@ -77,7 +79,7 @@ def test_rows_stored_thinly_are_those_of_a_full_recording_and_results_are_the_sa
 def test_rows_of_means_that_are_stored_in_full_are_found_and_others_are_refused(thin, full):
     for number in (0, 4, 8, 9):
         np.testing.assert_array_equal(point_rows(thin, number)["inputs"], point_rows(full, number)["inputs"])
-    with pytest.raises(RecordingError, match="point 1: nothing was recorded of it"):
+    with pytest.raises(RecordingError, match="point 2: nothing was recorded of it; points 1, 2, 3"):
         point_rows(thin, 1)
 
 
@@ -145,9 +147,13 @@ def test_an_abort_ramps_down_at_the_first_mean_beyond_it(tmp_path):
         assert abs(recording.parts[-1].rows("output_v")[-1]) == 0.0
 
 
-def mean(frequency_hz, **changes):
-    point = {"accepted": True, "modal_frequency_hz": frequency_hz, "damping_ratio": 0.004, "amplitude_m": 1e-4}
-    return point | {"force_n": 2.0, "cycles_in_mean": 100.0, "seconds_in_mean": 1.0} | changes
+def mean(frequency_hz, *, quality=Quality.GOOD, force_n=2.0, amplitude_m=1e-4):
+    return made_point(
+        quality=quality,
+        vibration=made_vibration(frequency_hz=frequency_hz, force_n=force_n, amplitude_m=amplitude_m),
+        modal=made_modal(frequency_hz),
+        result=DwellResult(length=Length(cycles_in_mean=100.0, seconds_in_mean=1.0)),
+    )
 
 
 def plan_of(unit="N", alarm=None, abort=None):
@@ -164,8 +170,8 @@ def test_a_change_is_warned_of_at_its_alarm_and_ends_the_test_at_its_abort(sign)
     first = mean(100.0)
     for change, alarmed, aborted in ((0.0099, False, False), (0.0101, True, False), (0.0201, True, True)):
         point, stop = watch_drift(plan, [first], mean(100.0 * (1.0 + sign * change)))
-        assert point["frequency_change"] == pytest.approx(sign * change)
-        assert any("alarm.frequency is 1 %" in text for text in point.get("warnings", [])) == alarmed
+        assert point.result.changes.frequency_change == pytest.approx(sign * change)
+        assert any("alarm.frequency is 1 %" in text for text in point.warnings or ()) == alarmed
         assert ("abort.frequency is 2 %" in stop) == aborted
         assert bool(stop) == aborted
 
@@ -179,10 +185,10 @@ def test_where_the_displacement_is_held_the_force_is_watched_instead():
 
 def test_a_mean_that_was_not_accepted_is_no_reference_and_stops_nothing_but_its_cycles_count():
     plan = plan_of(abort={"frequency": 0.02})
-    bad = mean(90.0, accepted=False)
+    bad = mean(90.0, quality=Quality.REJECTED)
     point, stop = watch_drift(plan, [bad], mean(100.0))
     assert not stop
-    assert point["cycles"] == 150.0
+    assert point.result.cycles == 150.0
     assert watch_drift(plan, [mean(100.0)], bad)[1] == ""
     assert watch_drift(plan, [bad, mean(100.0)], mean(97.0))[1]
 

@@ -69,7 +69,7 @@ def test_asked_for_later_it_is_measured_alone_and_tells_what_has_changed_since(b
     assert drift["damping"] == pytest.approx(1.0 / 1.02 - 1.0, abs=5e-3)
     assert abs(drift["frequency"]) < 2e-5
     print_summary(summary)
-    assert "drift from the first point to the same again (point 2): frequency " in capsys.readouterr().out
+    assert "drift from the first point to the same again (point 3): frequency " in capsys.readouterr().out
     with rig.resume(path, plan=plan_with(**LEVELS)) as run:
         assert sorted(run.recording.former) == [2]
     assert summarise(path)["drift"] is None

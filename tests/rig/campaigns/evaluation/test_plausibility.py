@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.campaigns.evaluation.plausibility import REFUSED, WARNED, with_plausibility
-from rig.campaigns.evaluation.vibrations import as_pairs
 from rig.campaigns.plans import load_plan
+from tests.rig.campaigns.made_points import made_point, made_vibration
 from tests.rig.rigs import bench_with
 
 BACKBONE = load_plan("magnet-beam/backbone")
@@ -33,16 +33,8 @@ def point(*shapes, level=1.0, resistance=1.0, lag_deg=90.0, hz=HZ, std=0.0, driv
     )
     harmonics = np.zeros((4, 3), complex)
     harmonics[:, 1] = [force, drive, *(shape / DRIVE_SHAPE for shape in shapes)]
-    return {
-        "level": level,
-        "level_unit": "V",
-        "frequency_hz": hz,
-        "harmonics": as_pairs(harmonics),
-        "harmonics_std": np.full((4, 3), std).tolist(),
-        "accepted": True,
-        "reason": "",
-        "warnings": [],
-    }
+    vibration = made_vibration(harmonics, hz, std=np.full((4, 3), std))
+    return made_point(level, warnings=(), vibration=vibration)
 
 
 def judged(one, *before, plan=BACKBONE, known=(1.010938, 1.444326)):
@@ -52,9 +44,9 @@ def judged(one, *before, plan=BACKBONE, known=(1.010938, 1.444326)):
 @given(st.floats(0.7, 1.4), st.floats(0.7, 1.4), st.floats(30.0, 150.0))
 def test_a_shape_that_has_changed_as_nonlinear_modes_do_is_good_at_any_lag(beside, tip, lag_deg):
     found = judged(point(1.010938 * beside, 1.444326 * tip, lag_deg=lag_deg))
-    assert found["accepted"]
-    assert not found["warnings"]
-    assert found["misfit"] < WARNED
+    assert found.accepted
+    assert not found.warnings
+    assert found.misfit < WARNED
 
 
 @pytest.mark.parametrize(
@@ -62,13 +54,13 @@ def test_a_shape_that_has_changed_as_nonlinear_modes_do_is_good_at_any_lag(besid
 )
 def test_a_channel_is_warned_of_and_then_refused_as_it_leaves_its_mode_shape(tip, accepted, warned):
     found = judged(point(1.010938, tip))
-    assert found["accepted"] is accepted
-    assert bool(found["warnings"]) is warned
-    assert ("acc_magnet" in found["reason"] + "".join(found["warnings"])) is (tip != 1.444)
+    assert found.accepted is accepted
+    assert bool(found.warnings) is warned
+    assert ("acc_magnet" in found.reason + "".join(found.warnings)) is (tip != 1.444)
 
 
 def test_the_reason_names_what_was_seen_what_was_expected_and_where_to_look():
-    assert judged(point(1.010938, 0.0144))["reason"] == (
+    assert judged(point(1.010938, 0.0144)).reason == (
         "channel acc_magnet has 0.0159 times the size of the drive channel, expected 1.59 by the mode shapes of the bench, "
         "refused from a factor 4: look at sensor, cable and sensitivity_v_per_unit of acc_magnet"
     )
@@ -76,8 +68,8 @@ def test_the_reason_names_what_was_seen_what_was_expected_and_where_to_look():
 
 @given(st.floats(-0.1, 0.1))
 def test_a_channel_at_a_node_is_judged_by_its_distance_from_the_other_shapes(tip):
-    assert judged(point(1.010938, tip), known=(1.010938, 0.0))["accepted"]
-    assert judged(point(1.010938, tip), known=(1.010938, 0.0))["misfit"] < WARNED
+    assert judged(point(1.010938, tip), known=(1.010938, 0.0)).accepted
+    assert judged(point(1.010938, tip), known=(1.010938, 0.0)).misfit < WARNED
 
 
 def test_without_mode_shapes_and_points_before_nothing_is_said():
@@ -87,13 +79,13 @@ def test_without_mode_shapes_and_points_before_nothing_is_said():
 
 def test_a_reversed_channel_is_refused_whatever_its_size():
     found = judged(point(1.010938, -1.444326))
-    assert "moves the other way" in found["reason"]
-    assert "polarity" in found["reason"]
+    assert "moves the other way" in found.reason
+    assert "polarity" in found.reason
 
 
 def test_a_drive_channel_that_reads_a_tenth_is_named_although_all_others_seem_off():
     found = judged(point(1.010938, 1.444326, drive=0.1))
-    assert found["reason"].startswith("channel drive: all others (acc_drive, acc_magnet) are 10 times as large")
+    assert found.reason.startswith("channel drive: all others (acc_drive, acc_magnet) are 10 times as large")
 
 
 @pytest.mark.parametrize(
@@ -102,24 +94,24 @@ def test_a_drive_channel_that_reads_a_tenth_is_named_although_all_others_seem_of
 )
 def test_force_over_velocity_may_change_with_the_root_of_the_level(times, level, accepted):
     found = judged(point(1.010938, 1.444326, level=level, resistance=times), point(1.010938, 1.444326))
-    assert found["accepted"] is accepted
-    assert ("force over velocity" in found["reason"]) is not accepted
+    assert found.accepted is accepted
+    assert ("force over velocity" in found.reason) is not accepted
 
 
 def test_points_that_were_warned_of_are_no_measure_of_others():
     none = (None, None)
     good, off = point(1.0, 1.4), judged(point(1.0, 0.5), point(1.0, 1.4), known=none)
-    assert off["accepted"]
-    assert off["misfit"] > WARNED
-    assert judged(point(1.0, 0.5), good, off, off, off, known=none)["misfit"] == pytest.approx(off["misfit"])
+    assert off.accepted
+    assert off.misfit > WARNED
+    assert judged(point(1.0, 0.5), good, off, off, off, known=none).misfit == pytest.approx(off.misfit)
 
 
 def test_a_signal_within_its_noise_is_not_judged():
-    assert judged(point(1.010938, 0.0, std=1.0))["misfit"] < WARNED
+    assert judged(point(1.010938, 0.0, std=1.0)).misfit < WARNED
 
 
 @pytest.mark.parametrize(("hz", "misfit"), [(24.3, REFUSED), (23.0, WARNED), (30.0, 1.0)])
 def test_in_open_loop_less_is_said_of_a_dead_channel_the_further_from_the_mode(hz, misfit):
     found = judged(point(1.010938, 0.0, lag_deg=1.0 if hz < 24.3 else 179.0, hz=hz), plan=STEPPED)
-    assert found.get("misfit", 1.0) >= misfit
-    assert hz < 30.0 or "misfit" not in found
+    assert (found.misfit or 1.0) >= misfit
+    assert hz < 30.0 or found.misfit is None

@@ -43,5 +43,5 @@ def test_a_channel_that_stands_still_for_a_whole_record_is_refused_by_name(const
     rows["inputs"] = np.random.default_rng(1).normal(size=rows["inputs"].shape) + played[:, None]
     rows["inputs"][:, bench.index_of("drive")] = constant
     point = measure_multisine_point(bench, plan, plan.targets()[0], rows, np.zeros(1)[0])
-    assert not point["accepted"]
-    assert point["reason"].startswith("channel drive does not change at all")
+    assert not point.accepted
+    assert point.reason.startswith("channel drive does not change at all")

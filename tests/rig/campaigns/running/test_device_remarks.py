@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from rig.campaigns.evaluation.point import Quality
 from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.tick.layout import DEVICE_SHIFT, SAMPLE_LOST, recorded_row
+from tests.rig.campaigns.made_points import made_point
 
 COUNTERS = ("overload", "output_clipped", "output_held", *(f"counter_{n}" for n in range(3, 22)))
 
@@ -18,24 +20,24 @@ def rows_with(flag: int, count: int, size: int = 1000) -> np.ndarray:
 @pytest.mark.parametrize(("held", "accepted"), [(0, True), (50, True), (51, False)])
 def test_a_point_with_more_than_a_twentieth_of_its_outputs_held_is_not_accepted(held: int, accepted: bool) -> None:
     rows = rows_with(1 << (DEVICE_SHIFT + 2), held)
-    point = with_device_remarks({"accepted": True, "warnings": ["before"]}, rows, COUNTERS)
-    assert point["accepted"] is accepted
-    assert point["warnings"][0] == "before"
-    assert (f"output held in {held} of 1000 samples" in point["warnings"]) is (held > 0)
+    point = with_device_remarks(made_point(warnings=("before",)), rows, COUNTERS)
+    assert point.accepted is accepted
+    assert point.warnings[0] == "before"
+    assert (f"output held in {held} of 1000 samples" in point.warnings) is (held > 0)
     if not accepted:
-        assert "output held in 51 of 1000" in point["reason"]
+        assert "output held in 51 of 1000" in point.reason
 
 
 def test_a_point_that_failed_for_another_reason_keeps_it() -> None:
     rows = rows_with(1 << (DEVICE_SHIFT + 2), 900)
-    point = with_device_remarks({"accepted": False, "reason": "not settled"}, rows, COUNTERS)
-    assert point["reason"] == "not settled"
+    point = with_device_remarks(made_point(quality=Quality.REJECTED, reason="not settled"), rows, COUNTERS)
+    assert point.reason == "not settled"
 
 
 def test_overloads_warn_and_lost_samples_are_counted() -> None:
-    point = with_device_remarks({"accepted": True}, rows_with(1 << DEVICE_SHIFT, 3), COUNTERS)
-    assert point["accepted"]
-    assert point["warnings"] == ["overload in 3 of 1000 samples"]
-    point = with_device_remarks({"accepted": True}, rows_with(SAMPLE_LOST, 7), COUNTERS)
-    assert point["lost_samples"] == 7
-    assert point["warnings"] == ["7 of 1000 samples were lost on their way"]
+    point = with_device_remarks(made_point(), rows_with(1 << DEVICE_SHIFT, 3), COUNTERS)
+    assert point.accepted
+    assert point.warnings == ("overload in 3 of 1000 samples",)
+    point = with_device_remarks(made_point(), rows_with(SAMPLE_LOST, 7), COUNTERS)
+    assert point.lost_samples == 7
+    assert point.warnings == ("7 of 1000 samples were lost on their way",)

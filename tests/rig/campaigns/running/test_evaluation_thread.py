@@ -9,17 +9,18 @@ import rig
 from rig.arming.run_options import Silent
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.running.evaluation_thread import EvaluationThread
+from tests.rig.campaigns.made_points import made_point
 from tests.rig.campaigns.running.test_runs import plan_with
 
 
 def test_points_come_in_the_order_in_which_they_were_asked_for_also_those_that_need_no_evaluation():
     free = threading.Event()
     evaluations = EvaluationThread()
-    evaluations.ask(lambda: [{"number": 0}] if free.wait(30) else [])
-    evaluations.known({"number": 1})
+    evaluations.ask(lambda: [made_point(number=0)] if free.wait(30) else [])
+    evaluations.known(made_point(number=1))
     assert not evaluations.ready()
     free.set()
-    assert [evaluations.take(), evaluations.take()] == [[{"number": 0}], [{"number": 1}]]
+    assert [[point.number for point in evaluations.take()] for _ in range(2)] == [[0], [1]]
     assert not evaluations
     evaluations.close()
 

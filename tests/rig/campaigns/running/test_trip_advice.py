@@ -5,13 +5,13 @@ import math
 import pytest
 
 from rig.bench import load_bench
-from rig.campaigns.evaluation.vibrations import as_pairs
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import TrippedAt
 from rig.tick.safety.layout import POLARITY_HINT, EndReason
 from tests.rig.campaigns.evaluation.test_vibration_quality import vibration
+from tests.rig.campaigns.made_points import made_point, made_vibration
 
 BENCH = load_bench("magnet-beam")
 PLAN = load_plan("magnet-beam/backbone").model_copy(
@@ -25,7 +25,7 @@ def point(level, tip_m, force_n=1.0):
     """A point whose tip has moved so far, in a pure sine."""
     measured = vibration([force_n], [-1j * tip_m / 1.6], HZ).harmonics.copy()
     measured[TIP, 1] = (2 * math.pi * HZ) ** 2 * tip_m
-    return {"level": level, "level_unit": "N", "frequency_hz": HZ, "harmonics": as_pairs(measured), "accepted": True}
+    return made_point(level, "N", vibration=made_vibration(measured, HZ))
 
 
 def said(reason, channel=TIP, *, points=(), locked=True, first=False, at=AT_8_N, hz=HZ, plan=PLAN):

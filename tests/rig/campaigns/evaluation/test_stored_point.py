@@ -1,0 +1,97 @@
+"""The stored form of points: what is written is read again, and files of earlier versions are read, too."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rig.campaigns.backbone.points import ShortPointResult
+from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult
+from rig.campaigns.dwell.points import DwellResult
+from rig.campaigns.evaluation.point import Quality, point_name
+from rig.campaigns.evaluation.stored_point import as_complex, as_pairs, names_of, point_from, stored, value_of
+from rig.campaigns.kinds import KINDS
+from tests.docs.test_file_format import PLANS
+from tests.rig.campaigns.made_points import made_point, made_vibration
+
+FAILED = {"number": 3, "level": 1.0, "level_unit": "V", "direction": "up", "repeat": 1}
+FAILED |= {"settled": False, "accepted": False, "reason": "not settled"}
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_a_recorded_point_of_every_kind_is_read_and_written_as_it_was(name):
+    import rig
+    from rig.campaigns.plans import plan_from
+
+    plan = plan_from(PLANS[name], name)
+    with rig.run(plan) as run:
+        table = run.recording.parts[0].points[0]
+    assert table["accepted"]
+    point = point_from(table, KINDS[plan.kind].result)
+    again = stored(point)
+    assert again.keys() == table.keys()
+    assert json.dumps(again, sort_keys=True) == json.dumps(table, sort_keys=True)
+
+
+def test_a_point_that_failed_holds_no_data_and_is_written_without_any():
+    point = point_from({**FAILED, "quality": "not-settled"})
+    assert not point.accepted
+    assert point.vibration is point.rows is point.warnings is None
+    assert stored(point) == {**FAILED, "quality": "not-settled"}
+
+
+@pytest.mark.parametrize(
+    ("told", "quality"),
+    [
+        ({"accepted": True}, Quality.GOOD),
+        ({"accepted": True, "warnings": ["one"]}, Quality.WARNED),
+        ({"accepted": False}, Quality.REJECTED),
+        ({"accepted": False, "quality": "of a later version"}, Quality.REJECTED),
+        ({"accepted": True, "quality": "rejected"}, Quality.GOOD),
+        ({"accepted": False, "quality": "lost-lock"}, Quality.LOST_LOCK),
+    ],
+)
+def test_the_quality_of_files_of_earlier_and_later_versions_follows_from_what_is_accepted(told, quality):
+    assert point_from({**FAILED, **told}).quality is quality
+
+
+def test_keys_that_an_earlier_version_did_not_write_are_none_and_unknown_ones_are_ignored():
+    table = stored(made_point(vibration=made_vibration(np.ones((2, 3), complex)))) | {"of_a_later_version": 1}
+    del table["power_indicator"], table["harmonic_power"], table["drift"]
+    point = point_from(table)
+    assert point.vibration.purity.power_indicator is None
+    assert point.spectrum.drift is None
+    np.testing.assert_array_equal(point.spectrum.harmonics, np.ones((2, 3)))
+
+
+def test_a_point_without_a_number_is_refused():
+    with pytest.raises(KeyError, match="number"):
+        point_from({"accepted": True})
+
+
+def test_pairs_are_complex_numbers():
+    values = np.array([[1 + 2j, -3j], [0.5, 0.0]])
+    np.testing.assert_array_equal(as_complex(as_pairs(values)), values)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_column_of_a_kind_is_a_field_of_its_points(kind):
+    names = names_of(KINDS[kind].result)
+    assert {column.key for column in KINDS[kind].columns} <= names
+
+
+def test_a_value_is_found_in_the_part_that_has_it():
+    point = made_point(2.0, vibration=made_vibration(), result=DwellResult(cycles=7.0))
+    assert [value_of(point, name) for name in ("level", "force_n", "force_purity", "cycles")] == [2.0, 1.0, 1.0, 7.0]
+    assert value_of(point, "frequency_change") is None
+    assert value_of(made_point(), "force_n") is None
+
+
+def test_the_names_of_a_part_do_not_hide_those_of_all_points():
+    for result in (ShortPointResult, ContinuousBackboneResult, *(campaign.result for campaign in KINDS.values())):
+        own = {one for one in names_of(result) if one in names_of(DwellResult)}
+        assert {"number", "level", "quality", "warnings"} <= own
+
+
+def test_people_count_points_from_one():
+    assert point_name(0) == "point 1"
