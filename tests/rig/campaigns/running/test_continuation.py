@@ -10,11 +10,14 @@ from hypothesis import strategies as st
 from controller import preset
 from rig.bench import load_bench
 from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.evaluation.point import Quality
+from rig.campaigns.evaluation.stored_point import stored
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.running.continuation import changed_keys, identities, numbered, what_is_left
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import ConfigurationError
+from tests.rig.campaigns.made_points import made_point
 
 LAW = preset("magnet-beam").model_dump()
 
@@ -137,7 +140,8 @@ def recording(tmp_path, *plans, points=()):
 )
 def test_what_is_done_is_what_was_accepted_and_is_asked_for(tmp_path_factory, accepted, levels):
     before = backbone(levels_v=(0.1, 0.2, 0.3))
-    points = [{"number": number, "accepted": good} for number, good in enumerate(accepted)]
+    qualities = [Quality.GOOD if good else Quality.REJECTED for good in accepted]
+    points = [stored(made_point(quality=quality, number=number)) for number, quality in enumerate(qualities)]
     change = backbone(levels_v=tuple(level / 10 for level in levels))
     left = what_is_left(recording(tmp_path_factory.getbasetemp(), (before, None), points=points), change)
     good = {level for level, ok in zip((0.1, 0.2, 0.3), accepted, strict=True) if ok}
