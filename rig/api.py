@@ -1,4 +1,4 @@
-"""The bench from Python: what ``rig run`` and ``rig resume`` do, in one call each."""
+"""Run and resume campaigns from Python. Each call does what ``rig run`` or ``rig resume`` does."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,7 +29,7 @@ __all__ = ["Run", "resume", "run"]
 
 
 class Run:
-    """A new recording and its measurements. Without an output file the recording is removed with this object."""
+    """A new recording and its measurements. If no output file was given, the recording is deleted together with this object."""
 
     def __init__(self, recording: Recording, folder: "TemporaryDirectory[str] | None" = None) -> None:
         self.recording = recording
@@ -41,27 +41,33 @@ class Run:
         return self.recording.complete
 
     def backbone(self) -> Backbone:
-        """The accepted points as a backbone."""
+        """Return the accepted points as a backbone."""
         return backbone(self.recording)
 
     def frequency_responses(self) -> tuple[FrequencyResponse, ...]:
-        """The accepted points of a stepped sine, stepped phase or response-controlled test, one response per level and pass."""
+        """Return the frequency responses of a stepped-sine, stepped-phase or response-controlled test.
+
+        Each response holds the accepted points of one level and pass.
+        """
         return frequency_responses(self.recording)
 
     def force_surface(self) -> ForceSurface:
-        """The force over frequency and displacement, from held displacements: curves at constant force are cut from it."""
+        """Return the force over frequency and displacement, measured at held displacements.
+
+        Curves at constant force can be cut from this surface.
+        """
         return force_surface(self.recording)
 
     def sweeps(self) -> dict[int, Transient]:
-        """Fundamentals over time of every sweep, by the number of its point."""
+        """Return the fundamentals over time of every sweep, keyed by point number."""
         return sweeps(self.recording)
 
     def spectra(self) -> dict[float, PeriodicSpectra]:
-        """Spectra of all realisations of a multisine test, by level in V RMS."""
+        """Return the spectra of all realisations of a multisine test, keyed by level in V RMS."""
         return spectra(self.recording)
 
     def response_matrices(self, *, estimator: Estimator = "instrument") -> dict[float, FrequencyResponseMatrix]:
-        """Frequency responses from the force to every motion of a multisine test, by level in V RMS."""
+        """Return the frequency responses from the force to every motion of a multisine test, keyed by level in V RMS."""
         return response_matrices(self.recording, estimator=estimator)
 
     def experiments(
@@ -74,7 +80,7 @@ class Run:
         transient_periods: float | None = None,
         segment_periods: int = 30,
     ) -> tuple[Experiment, ...]:
-        """The accepted points as data of nonlinear state-space models (`rig.measurements.experiments.experiments`)."""
+        """Return the accepted points as data for nonlinear state-space models (`rig.measurements.experiments.experiments`)."""
         return experiments(
             self.recording,
             inputs=inputs,
@@ -86,7 +92,7 @@ class Run:
         )
 
     def close(self) -> None:
-        """Close the file; a temporary one is removed."""
+        """Close the file. A temporary file is deleted."""
         self.recording.close()
         if self._folder is not None:
             self._folder.cleanup()
@@ -115,18 +121,18 @@ def run(
     specimen_serial: str = "",
     notes: Sequence[str] = (),
 ) -> Run:
-    """Carry out a plan: a plan object, the name of a shipped one (``"magnet-beam/backbone"``) or a TOML file.
+    """Carry out a plan: a plan object, the name of a shipped plan (``"magnet-beam/backbone"``) or a TOML file.
 
-    ``bench`` replaces the bench that the plan names. ``seed`` draws the noise of a virtual rig; the same seed gives the
-    same recording bit for bit on the same machine. ``realtime`` holds a virtual rig back to the wall clock.
+    ``bench`` replaces the bench that the plan names. ``seed`` seeds the noise of a virtual rig; the same seed gives the same
+    recording bit for bit on the same machine. With ``realtime`` a virtual rig runs no faster than the wall clock.
 
     A bench on which something physical moves must be armed by a person: ``arm`` is True, or a callable that receives a
-    `rig.arming.arming.ArmingRequest` and returns whether to go on. ``operator`` (the user if not given),
-    ``specimen_serial`` and ``notes`` are recorded.
+    `rig.arming.arming.ArmingRequest` and returns whether to go on. ``operator`` (by default the user), ``specimen_serial`` and
+    ``notes`` are recorded.
 
-    Raises `rig.errors.ConfigurationError` for a plan or bench that is not allowed, `rig.errors.RecordingError` for a
-    file that cannot be written, `rig.errors.DaqError` for a device that cannot be started, `rig.errors.NotArmed`. A run that
-    ends early raises nothing; ``complete`` is false and the recording says why.
+    Raises `rig.errors.ConfigurationError` for a plan or bench that is not allowed, `rig.errors.RecordingError` for a file that
+    cannot be written, `rig.errors.DaqError` for a device that cannot be started, and `rig.errors.NotArmed` if the bench was not
+    armed. A run that ends early raises no error: ``complete`` is then false and the recording gives the reason.
     """
     options = RunOptions(
         seed=seed,
@@ -167,16 +173,19 @@ def resume(
     retry_tripped: bool = False,
     trust_code: bool = False,
 ) -> Run:
-    """Continue a recording: accepted points stay, the others are measured in a further part.
+    """Continue a recording: keep the accepted points and measure the remaining points in a new part.
 
-    A changed ``plan`` of the same kind and bench replaces the plan in force. Points that it asks for and that were accepted
-    under any earlier plan are not measured again; points that it does not ask for stay in the file but no longer count.
-    ``seed`` draws the noise of the further part; if None, a seed that no part had. ``arm`` to ``notes``: as for `run`.
-    A level that tripped, and any higher one, is not tried again unless ``retry_tripped``. Functions of the user's own that
-    the recorded bench names are code chosen by the author of the file: they are imported only with ``trust_code``.
+    A changed ``plan`` of the same kind and bench replaces the current plan. Points of the new plan that were accepted under any
+    earlier plan are not measured again. Recorded points that the new plan does not contain stay in the file but no longer
+    count.
 
-    Raises `rig.errors.ConfigurationError` for a plan that cannot follow or asks for a level that tripped,
-    `rig.errors.RecordingError` for a file that cannot be read or written.
+    ``seed`` seeds the noise of the new part; if None, a seed is chosen that no earlier part has used. ``arm``, ``operator``,
+    ``specimen_serial`` and ``notes`` are as for `run`. A level that tripped, and every higher level, is tried again only with
+    ``retry_tripped``. The recorded bench may name functions of the user, which are code chosen by the author of the file: they
+    are imported only with ``trust_code``.
+
+    Raises `rig.errors.ConfigurationError` for a plan that cannot follow the recorded one or that asks for a level that tripped,
+    and `rig.errors.RecordingError` for a file that cannot be read or written.
     """
     options = RunOptions(
         seed=seed,

@@ -38,20 +38,20 @@ class Backbone(Study):
     responses: PeriodicResponses
     """One point per level."""
     loops: dict[int, tuple[HysteresisLoop, ...]]
-    """Loops of all friction joints, by the number of the point: lowest, middle and highest level; empty without joints."""
+    """Loops of all friction joints, by the number of the point (lowest, middle and highest level); empty without joints."""
 
     @property
     def figure_in(self) -> tuple[float, float]:
-        """Taller where there are loops."""
+        """Width and height of the figure, inches; it is taller if there are loops."""
         return (9.0, 8.6) if self.loops else (9.0, 6.4)
 
     @property
     def title(self) -> str:
-        """What this is."""
+        """Title of the analysis."""
         return f"backbone by harmonic balance, {self.responses.frequency_hz.size} levels"
 
     def numbers(self) -> dict[str, Any]:
-        """Points and loops."""
+        """Return points and loops."""
         joints = [f"{joint.at} ({joint.kind})" for joint in self.subject.rig.friction]
         loops = [
             {"point": point, "joint": name, "dissipated_j": loop.dissipated_j, "loop": loop}
@@ -88,7 +88,7 @@ class Backbone(Study):
             print(f"lost per period in the joints at {r.force_n[point]:.4g} N, J: {lost}")
 
     def draw_on(self, page: "Figure") -> None:
-        """Frequency, damping, amplitude and harmonics over the level, and the loops."""
+        """Draw frequency, damping, amplitude and harmonics over the level, and the loops."""
         draw_backbone(page, self.responses, self.loops, self.subject.rig.friction)
 
 
@@ -101,10 +101,10 @@ def backbone(
     points: int = 15,
     harmonics: int = 15,
 ) -> Backbone:
-    """Backbone over levels of force (peak of the fundamental, N) or voltage (V), in a geometric row.
+    """Compute the backbone over geometrically spaced levels of force (peak of the fundamental, N) or voltage (V).
 
-    Without ``highest`` up to where the bench's limits or the valid range of the rig end it, without ``lowest`` from a
-    hundredth of that. Raises `ConfigurationError` for values that are not allowed, and where nothing is found.
+    By default ``highest`` is the level at which the bench's limits or the valid range of the rig end the backbone, and
+    ``lowest`` a hundredth of it. Raises `ConfigurationError` for values that are not allowed, and if no vibration is found.
     """
     levels = level_range(subject, by, lowest, highest, points, harmonics)
     ask: dict[str, Any] = {"forces_n" if by == "force" else "voltages_v": levels}
@@ -131,7 +131,7 @@ def backbone(
 
 
 def neglected(found: PeriodicResponses) -> str:
-    """Remark on the part of the force above the balanced harmonics."""
+    """Return a remark on the part of the force above the balanced harmonics."""
     highest = found.force_harmonics_n.shape[1] - 1
     percent = 100.0 * float(np.max(found.neglected_share))
     text = f"up to {percent:.2g} %" if percent >= _WORTH_A_NUMBER else f"less than {_WORTH_A_NUMBER:g} %"
@@ -146,7 +146,7 @@ def draw_backbone(
     loops: dict[int, tuple[HysteresisLoop, ...]],
     joints: Sequence[FrictionSite],
 ) -> None:
-    """Four panels over the level, and one more per level that has loops."""
+    """Draw four panels over the level, and one more panel per level that has loops."""
     upper: Figure | SubFigure = page
     lower: SubFigure | None = None
     if loops:
@@ -185,7 +185,10 @@ def _draw_loops(
     loops: dict[int, tuple[HysteresisLoop, ...]],
     joints: Sequence[FrictionSite],
 ) -> None:
-    """One panel per level with the loops of all joints; those of the second half are dashed, because pairs may coincide."""
+    """Draw one panel per level with the loops of all joints.
+
+    The loops of the second half of the joints are dashed, because pairs of loops may coincide.
+    """
     axes = np.atleast_1d(part.subplots(1, len(loops)))
     for axis, (point, several) in zip(axes, loops.items(), strict=True):
         largest = max(float(np.max(np.abs(loop.coordinate))) for loop in several)
@@ -207,7 +210,7 @@ def _draw_loops(
 
 
 def _units(joints: Sequence[FrictionSite], largest: float) -> tuple[float, str, str]:
-    """Factor and axis labels for the joints' coordinate and force."""
+    """Return scale factor and axis labels for the joints' coordinate and force."""
     if all(joint.relative_to_mode_1 for joint in joints):
         return 1e3, "joint coordinate, 1e-3 kg$^{1/2}$ m", "joint force, N/kg$^{1/2}$"
     if all(joint.quantity == "deflection" and not joint.relative_to_mode_1 for joint in joints):

@@ -34,27 +34,27 @@ _BACKBONE_POINTS = 15
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ConstantForce(Study):
-    """One response curve per force, phase lag rising along each, and the backbone up to the highest force."""
+    """One response curve per force, along each of which the phase lag rises, and the backbone up to the highest force."""
 
     curves: dict[float, PeriodicResponses]
     """Curves by their force, peak of the fundamental in N."""
     resonances: PeriodicResponses
-    """The backbone."""
+    """The backbone: vibrations at phase resonance."""
 
     @property
     def title(self) -> str:
-        """What this is."""
+        """Title of the analysis."""
         return f"responses at constant force, {', '.join(f'{force:.4g}' for force in self.curves)} N"
 
     def numbers(self) -> dict[str, Any]:
-        """Curves with their folds, and the backbone."""
+        """Return the curves with their folds, and the backbone."""
         curves = [
             {"force_n": force, "folds_hz": folds_of(curve), "points": curve} for force, curve in self.curves.items()
         ]
         return {"curves": curves, "backbone": self.resonances}
 
     def print_tables(self) -> None:
-        """One line per curve."""
+        """Print one line per curve."""
         rows = []
         for force, curve in self.curves.items():
             top = int(np.argmax(curve.amplitude_m))
@@ -74,16 +74,16 @@ class ConstantForce(Study):
         print_table(headings, rows)
 
     def draw_on(self, page: "Figure") -> None:
-        """Amplitude and phase over frequency."""
+        """Draw amplitude and phase over frequency."""
         draw_curves(page, self.curves, self.resonances)
 
 
 def constant_force(
     subject: Subject, forces_n: Sequence[float] = (), *, points: int = 141, harmonics: int = 15
 ) -> ConstantForce:
-    """Response curves at constant fundamental force (N), ``points`` phase lags each.
+    """Compute response curves at constant fundamental force (N), with ``points`` phase lags each.
 
-    Without forces: a tenth, three tenths, and all of what the backbone reaches within the bench's limits.
+    By default the forces are a tenth, three tenths, and all of the force that the backbone reaches within the bench's limits.
     """
     lags = np.unique(np.append(np.linspace(*_LAGS_DEG, most_points(points, 3)), _RESONANCE_DEG))
     if not forces_n:
@@ -118,7 +118,7 @@ def constant_force(
 
 
 def folds_of(curve: PeriodicResponses) -> list[float]:
-    """Frequencies (Hz), lowest first, between which the curve has an unstable branch; empty where it has none."""
+    """Return the frequencies (Hz), lowest first, between which the curve has an unstable branch; empty if it has none."""
     if curve.stable is None or np.all(curve.stable):
         return []
     unstable = curve.frequency_hz[~curve.stable]
@@ -126,7 +126,7 @@ def folds_of(curve: PeriodicResponses) -> list[float]:
 
 
 def draw_curves(page: "Figure", curves: dict[float, PeriodicResponses], resonances: PeriodicResponses) -> None:
-    """Amplitude above phase lag, over the frequency."""
+    """Draw amplitude above phase lag, over the frequency."""
     from matplotlib.lines import Line2D
 
     top, bottom = page.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
@@ -149,7 +149,7 @@ def draw_curves(page: "Figure", curves: dict[float, PeriodicResponses], resonanc
 
 
 def _branches(axis: "Axes", curve: PeriodicResponses, values: np.ndarray, colour: object) -> None:
-    """Stable parts solid, unstable ones dashed, each up to the neighbouring point of the other."""
+    """Draw stable parts solid and unstable parts dashed; the dashes extend to the neighbouring stable points."""
     stable = np.ones(values.size, bool) if curve.stable is None else curve.stable
     for kind, style in ((True, "-"), (False, (0, (4, 2)))):
         mine = stable == kind

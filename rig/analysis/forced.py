@@ -1,4 +1,4 @@
-"""Steady response to a constant voltage, up and down: the force drops at resonance, as a slow sweep without control sees it."""
+"""Steady response to a constant voltage, up and down: the force drops at resonance, as in a slow uncontrolled sweep."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -26,7 +26,7 @@ Real = NDArray[np.float64]
 _DEFAULT_SHARE = 0.5
 _SPAN = (0.7, 1.3)
 _DENSE_WIDTHS = 12.0
-"""Half-widths of the resonance, on either side of it, in which half of the points lie."""
+"""Half width of the dense part of the frequency grid on either side of the resonance, in half-widths of the resonance."""
 _SAME = 1e-3
 
 
@@ -35,27 +35,27 @@ class Forced(Study):
     """Steady vibrations at one voltage, followed up and down in frequency."""
 
     voltage_v: float
-    """Amplitude of the voltage."""
+    """Amplitude of the voltage, V."""
     up: PeriodicResponses
-    """Frequency rising [n]."""
+    """Vibrations for rising frequency [n]."""
     down: PeriodicResponses
-    """Frequency falling [n], in the order of rising frequency."""
+    """Vibrations for falling frequency [n], sorted by rising frequency."""
 
     @property
     def title(self) -> str:
-        """What this is."""
+        """Title of the analysis."""
         return f"steady response to {self.voltage_v:.4g} V"
 
     @property
     def differ_hz(self) -> Real:
-        """Frequencies at which the two directions differ; empty where they never do, or were not found."""
+        """Frequencies at which the two directions differ; empty if they never do, or if a direction is incomplete."""
         if not self.complete:
             return np.zeros(0)
         apart = np.abs(self.up.amplitude_m - self.down.amplitude_m) > _SAME * np.max(self.up.amplitude_m)
         return np.asarray(self.up.frequency_hz[apart])
 
     def numbers(self) -> dict[str, Any]:
-        """Both directions, drop-out and overshoot."""
+        """Return both directions, drop-out and overshoot."""
         return {
             "voltage_v": self.voltage_v,
             "up": self.up,
@@ -65,7 +65,7 @@ class Forced(Study):
         }
 
     def print_tables(self) -> None:
-        """Drop-out and overshoot of the force, and where the directions differ."""
+        """Print drop-out and overshoot of the force, and the frequencies at which the directions differ."""
         rows = []
         for name, one in (("up", self.up), ("down", self.down)):
             extremes = _extremes(one)
@@ -93,7 +93,7 @@ class Forced(Study):
             print("up and down agree everywhere")
 
     def draw_on(self, page: "Figure") -> None:
-        """Force, response and lag over frequency."""
+        """Draw force, response and lag over frequency."""
         draw_forced(page, self.up, self.down if self.differ_hz.size or not self.complete else None)
 
 
@@ -106,10 +106,10 @@ def forced(
     points: int = 401,
     harmonics: int = 15,
 ) -> Forced:
-    """Steady response to a constant voltage over frequency, rising and falling; half of the points lie around resonance.
+    """Compute the steady response to a constant voltage for rising and falling frequency.
 
-    Default: half of the voltage that the bench may be driven at in resonance,
-    from 0.7 to 1.3 times the frequency of the mode under test.
+    Half of the points lie around resonance. By default the voltage is half of that at which the bench may be driven in
+    resonance, and the frequencies are from 0.7 to 1.3 times that of the mode under test.
     """
     if voltage_v is None:
         path, last = highest_resonance(subject, harmonics)
@@ -136,7 +136,7 @@ def forced(
 
 
 def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
-    """Vibrations in the order of the grid up to where none is found, and why none is."""
+    """Follow the vibrations in the order of the grid until none is found; also return why none is found."""
     try:
         with refusing():
             return forced_response(subject.rig, voltage_v, grid, **how), ""
@@ -163,7 +163,7 @@ def _completed(
 
 
 def _resonance(subject: Subject, voltage_v: float, how: dict[str, Any]) -> tuple[float, float, float]:
-    """Linear frequency, frequency at phase resonance under the voltage, and half-width of that resonance, Hz."""
+    """Return the linear frequency, the frequency at phase resonance at this voltage, and the half-width there, Hz."""
     try:
         with refusing():
             path = phase_resonance_backbone(subject.rig, voltages_v=voltage_v * np.array([0.05, 0.3, 1.0]), **how)
@@ -174,7 +174,7 @@ def _resonance(subject: Subject, voltage_v: float, how: dict[str, Any]) -> tuple
 
 
 def _grid(low: float, high: float, points: int, resonance: tuple[float, float, float]) -> Real:
-    """Frequencies from low to high: half of them even, half of them where the resonance is or was."""
+    """Return frequencies from low to high: half evenly spaced, half around the linear and the nonlinear resonance."""
     linear_hz, resonance_hz, width_hz = resonance
     first = min(linear_hz, resonance_hz) - _DENSE_WIDTHS * width_hz
     last = max(linear_hz, resonance_hz) + _DENSE_WIDTHS * width_hz
@@ -184,7 +184,7 @@ def _grid(low: float, high: float, points: int, resonance: tuple[float, float, f
 
 
 def _extremes(way: PeriodicResponses) -> dict[str, float]:
-    """Force at the lowest frequency, smallest and largest force and where, also as shares of the first."""
+    """Return the force at the lowest frequency, and the extremes of the force with their frequencies and ratios to it."""
     force, lowest, highest = way.force_n, int(np.argmin(way.force_n)), int(np.argmax(way.force_n))
     return {
         "at_first_n": float(force[0]),
@@ -198,7 +198,7 @@ def _extremes(way: PeriodicResponses) -> dict[str, float]:
 
 
 def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses | None) -> None:
-    """Three panels over the frequency; the falling direction where it differs."""
+    """Draw three panels over the frequency; the falling direction is drawn only if it differs."""
     force, response, lag = page.subplots(3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.0))
     scale, unit = length_unit(float(np.max(up.amplitude_m)))
     ways: list[tuple[PeriodicResponses, Any, str, str]] = [
@@ -220,22 +220,22 @@ def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses |
 
 
 def turned(way: PeriodicResponses) -> PeriodicResponses:
-    """The same points in the opposite order."""
+    """Return the same points in the opposite order."""
     return part(way, slice(None, None, -1))
 
 
 def part(way: PeriodicResponses, rows: slice) -> PeriodicResponses:
-    """Some of the points."""
+    """Return some of the points."""
     return _of_columns(lambda column: column[rows], way)
 
 
 def joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicResponses:
-    """The points of one after those of another."""
+    """Return the points of one followed by those of the other."""
     return _of_columns(lambda one, other: np.concatenate([one, other]), first, then)
 
 
 def _of_columns(make: Callable[..., Any], *ways: PeriodicResponses) -> PeriodicResponses:
-    """Responses of which each column is computed from the same columns of others."""
+    """Build responses, computing each column from the same columns of the given responses."""
     columns: dict[str, Any] = {}
     for field in fields(PeriodicResponses):
         those = [getattr(way, field.name) for way in ways]

@@ -1,4 +1,4 @@
-"""Levels of an analysis: those asked for, or as far as the bench may be driven."""
+"""Levels of an analysis: as requested, or up to the limits of the bench."""
 
 from typing import Literal
 
@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 By = Literal["force", "voltage"]
 
 _LOWEST_SHARE = 0.01
-"""The lowest level of a range that is not given, over the highest."""
+"""Default of the lowest level of a range, relative to the highest."""
 _SEARCHED = 25
 _MOST_POINTS = 20_000
 
@@ -23,9 +23,9 @@ _MOST_POINTS = 20_000
 def level_range(
     subject: Subject, by: By, lowest: float | None, highest: float | None, points: int, harmonics: int
 ) -> Real:
-    """Levels [points] in a geometric row: peaks of the fundamental force (N) or voltages (V).
+    """Return geometrically spaced levels [points]: peaks of the fundamental force (N) or voltages (V).
 
-    Without ``highest`` they end where the bench's limits, or the valid range of the rig, end the backbone.
+    Without ``highest`` they end where the bench's limits or the valid range of the rig end the backbone.
     """
     unit = "n" if by == "force" else "v"
     if highest is None:
@@ -39,14 +39,14 @@ def level_range(
 
 
 def most_points(points: int, least: int) -> int:
-    """``points`` if it lies within the allowed range; raises `ConfigurationError` otherwise."""
+    """Return ``points`` if it lies within the allowed range; raise `ConfigurationError` otherwise."""
     if not least <= points <= _MOST_POINTS:
         raise ConfigurationError(f"points = {points}: allowed is {least} to {_MOST_POINTS}")
     return points
 
 
 def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicResponses, int]:
-    """A backbone over the voltages of the bench, and the index of its last point within the bench's limits."""
+    """Return a backbone over the voltages of the bench, and the index of its last point within the bench's limits."""
     limit_v = subject.bench.limits.voltage_v
     volts = np.geomspace(_LOWEST_SHARE * limit_v, limit_v, _SEARCHED)
     try:
@@ -71,5 +71,5 @@ def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicRespons
 
 
 def samples_for(harmonics: int) -> int:
-    """Samples per period that resolve the nonlinear forces well: 512 up to 15 harmonics, then in proportion."""
+    """Return enough samples per period for the nonlinear forces: 512 up to 15 harmonics, then in proportion."""
     return max(512, 32 * (harmonics + 1))

@@ -25,15 +25,15 @@ Complex = NDArray[np.complex128]
 _BELOW_LOWEST_MODE = 0.5
 _ABOVE_HIGHEST_MODE = 1.2
 _AROUND_A_MODE = np.tan(np.linspace(-1.5, 1.5, 41))
-"""Places around a resonance in units of its half-width, dense where the response turns."""
+"""Positions around a resonance in units of its half-width, dense where the phase turns."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Responses(Study):
-    """Linear frequency responses in continuous time, of what the sensors are exposed to."""
+    """Linear frequency responses in continuous time, at the inputs of the sensors."""
 
     found: FrequencyResponses
-    """Everything as `simulators.analysis` has it."""
+    """All responses as computed by `simulators.analysis`."""
     force_n_per_v: Complex
     """Stinger force per voltage [n]."""
     acceleration_per_v: dict[str, Complex]
@@ -43,12 +43,12 @@ class Responses(Study):
 
     @property
     def title(self) -> str:
-        """What this is."""
+        """Title of the analysis."""
         f = self.found.frequency_hz
         return f"linear frequency responses, {f[0]:.4g} to {f[-1]:.4g} Hz, {f.size} points"
 
     def numbers(self) -> dict[str, Any]:
-        """Curves over the frequency."""
+        """Return the curves over the frequency."""
         return {
             "frequency_hz": self.found.frequency_hz,
             "force_n_per_v": self.force_n_per_v,
@@ -59,7 +59,7 @@ class Responses(Study):
         }
 
     def print_tables(self) -> None:
-        """Magnitudes and phases at the modes of the structure that lie in the range, and at both ends."""
+        """Print magnitudes and phases at the structure's modes within the range, and at both ends."""
         f, modes = self.found.frequency_hz, self.subject.rig.linear_modes.frequency_hz
         shown = {0, f.size - 1} | {int(np.argmin(np.abs(f - m))) for m in modes if f[0] <= m <= f[-1]}
         drive = next(channel.name for channel in self.subject.bench.channels if channel.role == "drive")
@@ -85,7 +85,7 @@ class Responses(Study):
         )
 
     def draw_on(self, page: "Figure") -> None:
-        """Magnitudes and phases."""
+        """Draw magnitudes and phases."""
         draw_responses(
             page, self.found.frequency_hz, self.force_n_per_v, self.acceleration_per_v, self.accelerance_per_kg
         )
@@ -94,9 +94,9 @@ class Responses(Study):
 def responses(
     subject: Subject, *, from_hz: float | None = None, to_hz: float | None = None, points: int = 500
 ) -> Responses:
-    """Linear frequency responses over a geometric row of frequencies, with more points around every resonance.
+    """Compute linear frequency responses at geometrically spaced frequencies, with more points around every resonance.
 
-    Default: from half of the lowest mode to above the highest mode, a quarter of the sample rate at most.
+    By default the range is from half of the lowest mode to above the highest mode, at most a quarter of the sample rate.
     """
     rig, modes = subject.rig, subject.rig.linear_modes
     highest = min(_ABOVE_HIGHEST_MODE * modes.frequency_hz[-1], 0.25 * subject.bench.sample_rate_hz)
@@ -127,7 +127,7 @@ def responses(
 def draw_responses(
     page: "Figure", frequency_hz: Real, force: Complex, per_v: dict[str, Complex], per_n: dict[str, Complex]
 ) -> None:
-    """Three columns; the channels share their colours."""
+    """Draw three columns; each channel has the same colour in all of them."""
     from matplotlib.ticker import MultipleLocator
 
     axes = page.subplots(2, 3, sharex=True)

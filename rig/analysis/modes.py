@@ -25,24 +25,24 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Modes(Study):
-    """Modes of the structure with elements at their linear stiffness and joints stuck, and of the coupled rig."""
+    """Linear modes of the structure, with linear stiffness of the elements and stuck joints, and of the coupled rig."""
 
     structure: LinearModes
     """Modes of the structure alone."""
     coupled: LinearModes
-    """Modes of structure, stinger and exciter from the voltage."""
+    """Modes of structure, stinger and exciter, driven by the voltage."""
     channel_shapes: dict[str, Real]
-    """Mass-normalised deflection (kg^-1/2) [n_mode] at every acceleration channel, by its name."""
+    """Mass-normalised shapes (kg^-1/2) [n_mode] at every acceleration channel, by channel name."""
     point_shapes: dict[str, Real]
-    """The same at every named point; at a joint's site in its own coordinate."""
+    """Mass-normalised shapes at every named point; at a joint's site in the coordinate of the joint."""
 
     @property
     def title(self) -> str:
-        """What this is."""
+        """Title of the analysis."""
         return f"linear modes, {self.structure.frequency_hz.size} of the structure"
 
     def numbers(self) -> dict[str, Any]:
-        """Structure and coupled rig."""
+        """Return the modes of structure and coupled rig."""
         structure, coupled = (
             [
                 {"frequency_hz": frequency_hz, "damping_ratio": damping_ratio}
@@ -57,7 +57,7 @@ class Modes(Study):
         return {"structure": structure, "coupled": coupled}
 
     def print_tables(self) -> None:
-        """One line per mode."""
+        """Print one line per mode."""
         modes, channels = self.structure, self.channel_shapes
         print("structure: elements at their linear stiffness, joints stuck; shapes in kg^-1/2 at the channels")
         print_table(
@@ -83,12 +83,12 @@ class Modes(Study):
         )
 
     def draw_on(self, page: "Figure") -> None:
-        """The shapes, along the beam where the structure is one."""
+        """Draw the mode shapes; along the beam if the structure is a beam."""
         draw_modes(page, self.subject.rig, self.structure)
 
 
 def modes(subject: Subject) -> Modes:
-    """Linear modes of the rig of a bench."""
+    """Compute the linear modes of the rig of a bench."""
     rig = subject.rig
     linear = rig.linear_modes
     points = {at: linear.at(rig.shape(at)) for at in rig.structure.points}
@@ -108,7 +108,7 @@ _MARKERS = "osD^vPX*<>ph"
 
 
 def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:
-    """One panel per mode, the lowest eight at most."""
+    """Draw one panel per mode, for the lowest eight modes at most."""
     count = min(_MOST, modes.frequency_hz.size)
     rows = (count + 1) // 2
     panels = page.subplots(rows, min(2, count), sharex=True, squeeze=False).ravel()
@@ -150,7 +150,7 @@ def _at_the_points(axis: "Axes", rig: VirtualRig, modes: LinearModes, k: int) ->
 
 
 def _attached(rig: VirtualRig) -> dict[str, str]:
-    """What is attached to each point of the structure, in words."""
+    """Describe what is attached to each point of the structure."""
     there: dict[str, list[str]] = {rig.stinger.at: ["stinger"]}
     for sensor in rig.sensors:
         if sensor.at is not None:

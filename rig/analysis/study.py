@@ -1,4 +1,4 @@
-"""`Study`: a finished analysis that can be printed, drawn and turned into JSON; and what its figures share."""
+"""`Study`: a finished analysis that can be printed, drawn and converted to JSON; and helpers shared by its figures."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ __all__ = [
 
 
 def plain(value: Any) -> Any:
-    """``value`` with arrays as lists, dataclasses as dictionaries, and a complex number as ``[re, im]``."""
+    """Convert ``value``: arrays to lists, dataclasses to dictionaries, complex numbers to ``[re, im]``."""
     if isinstance(value, PeriodicResponses):
         return points_of(value)
     if is_dataclass(value) and not isinstance(value, type):
@@ -49,7 +49,7 @@ def plain(value: Any) -> Any:
 
 
 def points_of(responses: PeriodicResponses) -> list[dict[str, Any]]:
-    """One dictionary per point with everything that is known of it; flags by their names."""
+    """Return one dictionary per point with all its quantities; flags are given by name."""
     columns: dict[str, Any] = {
         field.name: getattr(responses, field.name)
         for field in fields(responses)
@@ -75,11 +75,11 @@ class Study(ABC):
     """One analysis of one bench."""
 
     subject: Subject
-    """What was analysed."""
+    """Bench and rig that were analysed."""
     notes: tuple[str, ...] = ()
-    """What a user should know about these numbers, one line each."""
+    """Remarks on these numbers for the user, one line each."""
     complete: bool = True
-    """Whether everything that was asked for was found."""
+    """Whether everything requested was found."""
 
     @property
     def figure_in(self) -> tuple[float, float]:
@@ -89,22 +89,22 @@ class Study(ABC):
     @property
     @abstractmethod
     def title(self) -> str:
-        """What this is, in a few words."""
+        """Title of the analysis in a few words."""
 
     @abstractmethod
     def numbers(self) -> dict[str, Any]:
-        """All numbers by name: arrays, dataclasses, dictionaries and lists of them."""
+        """Return all numbers by name: arrays, dataclasses, dictionaries and lists of them."""
 
     @abstractmethod
     def print_tables(self) -> None:
-        """Print what a person wants to read."""
+        """Print tables for a person."""
 
     @abstractmethod
     def draw_on(self, page: "Figure") -> None:
         """Draw on an empty page."""
 
     def summary(self) -> dict[str, Any]:
-        """Everything in one JSON-able dictionary; a complex number is a list of real and imaginary part."""
+        """Return everything in one JSON-able dictionary; a complex number is a list of real and imaginary part."""
         bench = self.subject.bench
         modes, mode = self.subject.rig.linear_modes, self.subject.mode
         head = {
@@ -134,7 +134,7 @@ class Study(ABC):
 
 
 def draw(study: Study, figure: Path) -> None:
-    """Draw an analysis into ``figure`` (png, pdf or svg by its ending); `RecordingError` where it cannot be written."""
+    """Draw an analysis into ``figure`` (png, pdf or svg, by its suffix); raise `RecordingError` if it cannot be written."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -152,7 +152,7 @@ def draw(study: Study, figure: Path) -> None:
 
 
 def check_ending(figure: Path) -> None:
-    """`RecordingError` unless ``figure`` ends like a figure that can be drawn."""
+    """Raise `RecordingError` unless the suffix of ``figure`` is that of a figure format."""
     if figure.suffix.lower() not in FIGURE_ENDINGS:
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
 
@@ -161,19 +161,19 @@ LEVEL_COLOURS = "viridis"
 
 
 def length_unit(largest_m: float) -> tuple[float, str]:
-    """Factor and name of the unit for displacements up to ``largest_m``."""
+    """Return factor and name of the unit for displacements up to ``largest_m``."""
     return (1e6, "µm") if largest_m < 5e-4 else (1e3, "mm")
 
 
 def level_colour(number: int, count: int) -> tuple[float, float, float, float]:
-    """Colour of one of several levels, dark to light."""
+    """Return the colour of one of several levels, from dark to light."""
     from matplotlib import colormaps
 
     return colormaps[LEVEL_COLOURS](0.85 * number / max(1, count - 1))
 
 
 def roomy(axis: "Axes", values: NDArray[np.float64], least_share: float) -> None:
-    """Let the y axis span at least a share of its middle value, so that small changes look small."""
+    """Let the y axis span at least a given share of its middle value, so that small changes look small."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     middle, half = 0.5 * (low + high), 0.55 * (high - low)
     half = max(half, 0.5 * least_share * abs(middle))

@@ -1,4 +1,4 @@
-"""What is analysed: the virtual rig behind a bench, the mode under test, and the limits of the bench."""
+"""Subject of an analysis: the virtual rig behind a bench, the mode under test, and the limits of the bench."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,7 +31,7 @@ FLAG_WORDS = {
 
 @dataclass(frozen=True, eq=False)
 class Demand:
-    """A quantity that the bench limits, over the points of an analysis."""
+    """A quantity that the bench limits, with its values over the points of an analysis."""
 
     name: str
     values: Real
@@ -43,7 +43,7 @@ class Demand:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A bench and its virtual rig; of a rig that scatters, the nominal one."""
+    """A bench and its virtual rig. If the rig has scatter, the nominal rig is used."""
 
     bench: Bench
     rig: VirtualRig
@@ -58,18 +58,18 @@ class Subject:
 
     @property
     def frequency_hz(self) -> float:
-        """Linear frequency of the mode under test."""
+        """Linear frequency of the mode under test, Hz."""
         return float(self.rig.linear_modes.frequency_hz[self.mode])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What holds for every analysis of this bench."""
+        """Remarks that apply to every analysis of this bench."""
         scatter = ("the specimen scatters from run to run or by assembly; this is the nominal one, without scatter",)
         wear = ("the specimen wears within a run; this is the one that a run begins with",)
         return (*(scatter if self.rig.scatters else ()), *(wear if self.rig.wear.wears else ()), *self.remarks)
 
     def demands(self, responses: PeriodicResponses) -> list[Demand]:
-        """Demands of the points on the bench, with their limits."""
+        """Return the limited quantities at the points, with their limits."""
         limits, omega = self.bench.limits, 2.0 * np.pi * responses.frequency_hz
         moving = [
             responses.sensor_harmonics[channel.name]
@@ -87,14 +87,14 @@ class Subject:
         ]
 
     def within(self, responses: PeriodicResponses) -> NDArray[np.bool_]:
-        """Which points [n] lie within the limits and raise no flag."""
+        """Return which points [n] lie within the limits and raise no flag."""
         inside = [demand.values <= _TOLERANCE * demand.limit for demand in self.demands(responses)]
         low, high = self.bench.limits.frequency_hz
         frequency = (responses.frequency_hz >= low) & (responses.frequency_hz <= high)
         return np.asarray(np.all(inside, axis=0) & frequency & (responses.flags == 0))
 
     def excesses(self, responses: PeriodicResponses, of: str = "points") -> tuple[str, ...]:
-        """Where points leave the valid range of the rig or the limits of the bench, one line each."""
+        """Describe where points leave the valid range of the rig or the limits of the bench, one line each."""
         total = responses.frequency_hz.size
         lines = [
             f"{text} in {count} of {total} {of}"
@@ -111,10 +111,10 @@ class Subject:
 
 
 def subject_of(bench: Bench | str | Path, near_hz: float | None = None) -> Subject:
-    """The virtual rig of a bench, or of a bench by its name or TOML file.
+    """Return the virtual rig of a bench, which is given as an object, by name or as a TOML file.
 
-    ``near_hz``: the mode under test is the one nearest to it; without it, to the linear frequency that the bench states.
-    Raises `ConfigurationError` for a bench that is not allowed or whose driver is not the virtual one.
+    The mode under test is the one nearest to ``near_hz``, by default to the linear frequency that the bench states. Raises
+    `ConfigurationError` for a bench that is not allowed or whose driver is not the virtual one.
     """
     loaded = bench if isinstance(bench, Bench) else load_bench(bench)
     if loaded.driver.name != "virtual":
@@ -128,7 +128,7 @@ def subject_of(bench: Bench | str | Path, near_hz: float | None = None) -> Subje
 
 
 def positive(name: str, value: float) -> float:
-    """``value`` where it is a finite number above zero; `ConfigurationError` otherwise."""
+    """Return ``value`` if it is a finite number above zero; raise `ConfigurationError` otherwise."""
     if not 0.0 < value < np.inf:
         raise ConfigurationError(f"{name} = {value:g}: allowed is a number above 0")
     return value
@@ -136,7 +136,7 @@ def positive(name: str, value: float) -> float:
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """Turn a `ValueError` of the simulators into a `ConfigurationError`."""
+    """Convert a `ValueError` of the simulators to a `ConfigurationError`."""
     try:
         yield
     except ValueError as error:
@@ -144,7 +144,7 @@ def refusing() -> Iterator[None]:
 
 
 def peak(harmonics: NDArray[np.complex128], samples: int = 256) -> Real:
-    """Largest absolute value over a period [n] of signals with harmonics [n, H + 1]."""
+    """Return the largest absolute value over a period [n] of signals with harmonics [n, H + 1]."""
     theta = 2.0 * np.pi * np.arange(samples) / samples
     waves = np.exp(1j * np.outer(np.arange(harmonics.shape[1]), theta))
     return np.asarray(np.max(np.abs(np.einsum("nh,ht->nt", harmonics, waves).real), axis=1))

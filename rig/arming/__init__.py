@@ -1,1 +1,1 @@
-"""Arming: who runs the test, what a person has to read before anything moves, and what is remembered of a bench."""
+"""Arming: who runs the test, what a person must read before anything moves, and what is remembered of a bench."""

@@ -1,4 +1,4 @@
-"""Arming: who has let something physical move. A virtual rig arms itself, any other bench is armed by a person."""
+"""Arming: permission to move something physical. A virtual rig needs none; any other bench is armed by a person."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,24 +29,24 @@ class ArmingRequest:
     identity: dict[str, str]
     """Identity of the device."""
     memory: BenchMemory
-    """Last check and trip."""
+    """Last check and last trip of the bench."""
     cautions: tuple[str, ...]
     """Reasons against arming, one line each."""
     unseen: tuple[str, ...] = ()
-    """Those reasons that only a person who has seen them can overrule: a trip, a device that has latched."""
+    """Those reasons that only a person who has seen them can overrule: a trip, or a device that has latched."""
     unguarded: str = ""
-    """Why only a person may arm: the output outlives the host. Empty if it does not."""
+    """Why only a person may arm: the output continues if the host dies. Empty if it does not."""
 
     @property
     def unguarded_refusal(self) -> str:
-        """The line that refuses a switch, or a bench that arms itself, if the output is ``unguarded``."""
+        """Message that refuses ``arm`` = True, or a bench that arms itself, if the output is ``unguarded``."""
         return (
             f"bench {self.bench.name}: {self.unguarded}; run at a terminal without `arm` and type the bench's name, or test "
             "such a stop and set [arming] hardware_emergency_stop = true"
         )
 
     def lines(self) -> list[str]:
-        """All of it for the terminal."""
+        """Return the request as lines for the terminal."""
         bench, limits, check = self.bench, self.bench.limits, self.memory.check
         device = ", ".join(f"{key} {value}" for key, value in self.identity.items()) or "unknown"
         last = (
@@ -70,9 +70,9 @@ def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]
     """Arm the bench; return how and by whom, for the record. A person who arms it also clears a remembered trip.
 
     A virtual rig needs no arming. ``[arming] automated`` arms a bench if there are no reasons against it. ``arm`` True arms it
-    unless a trip is remembered or the device has latched, because nobody has seen those. Neither suffices if the output would
-    outlive the host and no hardware emergency stop is declared. Raises `NotArmed`, which says how to arm, before anything has
-    moved.
+    unless a trip is remembered or the device has latched, because no person has seen these. Neither suffices if the output
+    would continue after the host dies and no hardware emergency stop is declared. Raises `NotArmed`, which says how to arm,
+    before anything has moved.
     """
     if session.capabilities.virtual:
         return {"how": "virtual", "by": "", "at": now(), "cautions": []}
@@ -115,9 +115,10 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
 
 
 def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str]) -> tuple[str, ...]:
-    """Reasons against arming for ``what``: limits that do not fit the sensors, no check, or a check that does not count.
+    """Return the reasons against arming for ``what``.
 
-    A check has none: it moves the rig gently, and finds such faults.
+    Reasons are limits that do not fit the sensors, a missing check, or a check that does not count. For a check itself there
+    are none: it moves the rig gently, and finds such faults.
     """
     check = memory.check
     if what == CHECK:
@@ -138,7 +139,7 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[
 
 
 def unguarded_text(bench: Bench, capabilities: Capabilities) -> str:
-    """Why a hardware emergency stop is needed; empty if it is not.
+    """Return why a hardware emergency stop is needed; an empty string if it is not.
 
     A switch on an input channel (``[emergency_stop]``) does not count, because the host reads it and may be dead.
     """
@@ -151,7 +152,7 @@ def unguarded_text(bench: Bench, capabilities: Capabilities) -> str:
 
 
 def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:
-    """What no person has seen yet: a trip, a run without an end, flags latched in the device."""
+    """Return what no person has seen yet: a trip, a run without an end, or flags latched in the device."""
     out: list[str] = []
     if memory.trip is not None:
         out.append(f"the last run tripped: {memory.trip.text}" if memory.trip.recording else memory.trip.text)
@@ -161,7 +162,7 @@ def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:
 
 
 def asked_once(arm: Arm) -> Arm:
-    """Permission for several parts of one recording: a person is asked before the first part, and again after a trip."""
+    """Wrap a permission for several parts of one recording: a person is asked before the first part, and again after a trip."""
     if not callable(arm):
         return arm
     answers: list[bool] = []

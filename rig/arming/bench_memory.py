@@ -1,7 +1,7 @@
-"""What is remembered of a bench from run to run: its last check, and a trip that a person has to look at.
+"""Memory of a bench from run to run: its last check, and a trip that a person has to look at.
 
-One small JSON file a bench in the user's state folder (``$XDG_STATE_HOME/vibrolock/benches``), replaced whole. Nothing is kept
-about virtual rigs.
+There is one small JSON file per bench in the user's state folder (``$XDG_STATE_HOME/vibrolock/benches``). It is always replaced
+as a whole. Nothing is kept about virtual rigs.
 """
 
 import hashlib
@@ -38,13 +38,13 @@ class RememberedCheck:
     """The last check of a bench."""
 
     at: str
-    """When it ended, ISO 8601 with time zone."""
+    """End of the check, ISO 8601 with time zone."""
     failed: tuple[str, ...]
-    """Names of the findings that failed; none where it passed."""
+    """Names of the findings that failed; empty if the check passed."""
     recording: str
-    """Path of its recording."""
+    """Path of the recording of the check."""
     fingerprint: str
-    """`fingerprint` of the bench as it was."""
+    """`fingerprint` of the bench at the time of the check."""
 
 
 @dataclass(frozen=True)
@@ -52,25 +52,25 @@ class RememberedTrip:
     """A trip that nobody has looked at yet."""
 
     at: str
-    """When, ISO 8601 with time zone."""
+    """Time of the trip, ISO 8601 with time zone."""
     text: str
-    """What tripped."""
+    """What tripped, as text."""
     recording: str
     """Path of the recording; empty if no run tripped but this memory could not be read."""
 
 
 @dataclass(frozen=True)
 class BenchMemory:
-    """What is remembered of a bench."""
+    """Memory of a bench."""
 
     check: RememberedCheck | None = None
-    """Its last check."""
+    """Last check of the bench."""
     trip: RememberedTrip | None = None
     """The last trip, until a person has armed the bench again."""
 
 
 def memory_path(bench: Bench) -> Path:
-    """The file of a bench, by its name."""
+    """Return the path of the memory file of a bench, which depends on the name of the bench."""
     base = os.environ.get("XDG_STATE_HOME", "")
     folder = Path(base) if base and Path(base).is_absolute() else Path.home() / ".local" / "state"
     readable = re.sub(r"[^A-Za-z0-9_.-]+", "-", bench.name).strip(".-")
@@ -80,9 +80,9 @@ def memory_path(bench: Bench) -> Path:
 
 
 def fingerprint(bench: Bench, identity: Mapping[str, str]) -> str:
-    """Digest of what a check depends on: channels, emergency stop, driver, rate, range, and the device.
+    """Digest of everything that a check depends on: channels, emergency stop, driver, rate, range, and the device.
 
-    Of ``identity``, the driver's description of the device, only ``serial_number`` counts. The port may change, the channels
+    Of ``identity``, the driver's description of the device, only ``serial_number`` counts. The port may change; the channels
     may not.
     """
     kept = {"channels", "sample_rate_hz", "output_range_v", "emergency_stop"}
@@ -93,7 +93,7 @@ def fingerprint(bench: Bench, identity: Mapping[str, str]) -> str:
 
 
 def memory_of(bench: Bench) -> BenchMemory:
-    """What is remembered of a bench. A file that cannot be read counts as a trip, because it may have held one."""
+    """Return the memory of a bench. A file that cannot be read counts as a trip, because it may have contained one."""
     path = memory_path(bench)
     try:
         if not path.exists():
@@ -113,7 +113,7 @@ def memory_of(bench: Bench) -> BenchMemory:
 
 
 def _check_time(at: str) -> None:
-    """Raise `ValueError` or `TypeError` for what is not a time, or a time without time zone."""
+    """Raise `ValueError` or `TypeError` for a text that is not a time, or a time without time zone."""
     if datetime.fromisoformat(at).tzinfo is None:
         raise ValueError(f"at = {at!r}: has no time zone")
 
@@ -131,5 +131,5 @@ def remember(bench: Bench, **changes: Any) -> None:
 
 
 def now() -> str:
-    """The present time, ISO 8601."""
+    """Return the present time, ISO 8601."""
     return datetime.now(UTC).isoformat(timespec="seconds")

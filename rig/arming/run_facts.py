@@ -26,7 +26,7 @@ class About:
     notes: tuple[str, ...] = ()
     """Notes, one line each."""
     purpose: str = ""
-    """What the run belongs to: ``check`` or ``tuning``; empty for a campaign on its own."""
+    """Purpose of the run: ``check`` or ``tuning``; empty for a separate campaign."""
 
     def __post_init__(self) -> None:
         texts = [("operator", self.operator or ""), ("specimen_serial", self.specimen_serial)]
@@ -35,7 +35,7 @@ class About:
                 raise ConfigurationError(f"{name} = {text!r}: allowed is printable text in one line")
 
     def facts(self) -> dict[str, Any]:
-        """The facts as they are recorded."""
+        """Return the facts as they are recorded."""
         return {
             "operator": self.operator or user_name(),
             "specimen_serial": self.specimen_serial,
@@ -45,7 +45,7 @@ class About:
 
 
 def user_name() -> str:
-    """``VIBROLOCK_OPERATOR``, or the user of the operating system; empty where neither is known."""
+    """Return ``VIBROLOCK_OPERATOR``, or the user of the operating system; an empty string if neither is known."""
     given = os.environ.get("VIBROLOCK_OPERATOR", "")
     if given and given.isprintable():
         return given
@@ -56,7 +56,7 @@ def user_name() -> str:
 
 
 def calibration_remarks(bench: Bench, today: date) -> list[str]:
-    """One line for each sensor whose calibration is past its due date."""
+    """Return one line for each sensor whose calibration is past its due date."""
     return [
         f"channel {channel.name}: calibration was due on {channel.calibration_due}"
         for channel in bench.channels

@@ -1,4 +1,4 @@
-"""How a run is carried out, whatever its plan: seed, pace, output file, who watches, who arms, what is recorded about it."""
+"""Options of a run that do not depend on its plan: seed, pace, output file, progress display, arming, recorded facts."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
@@ -18,16 +18,16 @@ LARGEST_SEED = 2**63 - 1
 
 
 class Progress(Protocol):
-    """Receives what happens while a run is carried out, for a display."""
+    """Receives the events of a run for a display."""
 
     def point(self, point: Any, number: int, total: int) -> None:
-        """A `rig.campaigns.evaluation.point.Point` was measured or has failed; it is ``number`` of ``total``."""
+        """Take note that a `rig.campaigns.evaluation.point.Point` was measured or has failed; it is ``number`` of ``total``."""
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
-        """A chunk of telemetry rows was recorded."""
+        """Take note that a chunk of telemetry rows was recorded."""
 
     def remark(self, text: str) -> None:
-        """The driver or the bench has something to say, in one line."""
+        """Take note of a one-line remark of the driver or the bench."""
 
 
 class Silent:
@@ -45,19 +45,20 @@ class Silent:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """Options of a run that do not depend on its plan; campaigns, checks and tunings take the same.
+    """Options of a run that do not depend on its plan. Campaigns, checks and tunings take the same options.
 
     Raises `ConfigurationError` for a seed outside its range.
     """
 
     seed: int | None = None
-    """Seed of a virtual rig's noise, 0 to 2**63 - 1. If None: 0 for a new recording, for a further part one not used before."""
+    """Seed of a virtual rig's noise, 0 to 2**63 - 1. If None: 0 for a new recording, and for a further part a seed not used
+    before."""
     realtime: bool = False
-    """Whether a virtual rig is held back to the wall clock."""
+    """Whether a virtual rig runs no faster than the wall clock."""
     overwrite: bool = False
     """Whether a new recording may replace an existing file."""
     progress: Progress = field(default_factory=Silent)
-    """Watches the run."""
+    """Receives the events of the run."""
     arm: Arm = None
     """Permission to move something physical: True, a callable that asks a person, or None (`rig.arming.arming`)."""
     about: About = field(default_factory=About)

@@ -1,1 +1,1 @@
-"""Campaigns: plans as data, and the one runner that carries them out."""
+"""Campaigns: plans as data, and the one runner that carries out all of them."""

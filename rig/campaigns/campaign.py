@@ -1,4 +1,4 @@
-"""What a kind of campaign declares: all that the rest of the program asks of it."""
+"""Declaration of a kind of campaign: everything that the rest of the program needs to know about it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,36 +13,38 @@ __all__ = ["Campaign"]
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """One kind of campaign: the end of `points.py` in its own folder, and one line in `rig.campaigns.kinds`."""
+    """One kind of campaign. It is declared at the end of `points.py` in its own folder and listed in `rig.campaigns.kinds`."""
 
     plan: type[Plan]
-    """Model of its plans."""
+    """Class of its plans."""
     result: type
-    """What its points hold beside what all points have: class of `Point.result`."""
+    """Class of `Point.result`: the results that only points of this kind have."""
     measure: Callable[..., Any]
-    """``(bench, plan, target, rows, settling) -> point``: the result of a recorded point, with its own quality."""
+    """``(bench, plan, target, rows, settling) -> point``: evaluates the rows of one point, including the quality."""
     columns: tuple[Column, ...]
-    """What is shown of a point."""
+    """Columns that tables show of a point."""
     draw: str
-    """``module:function`` that draws a recording on an empty page, ``(page, recording)``; loaded when a figure is wanted."""
+    """``module:function`` that draws a recording on an empty page, ``(page, recording)``. It is imported only when a figure is
+    drawn."""
     in_one_go: bool = False
-    """Whether points are measured together: ``(bench, plan, targets, rows, passages, ended) -> points``."""
+    """Whether several points are measured together; then ``measure`` is ``(bench, plan, targets, rows, passages, ended) ->
+    points``."""
     watch: Callable[[Any, Sequence[Point[Any]], Point[Any]], tuple[Point[Any], str]] | None = None
-    """``(plan, points so far, point) -> (point, why to stop)``: completes a new point by those before it. If the text is not
-    empty, the output is ramped down and the run ends."""
+    """``(plan, points so far, point) -> (point, why to stop)``: completes a new point with the help of the points before it. If
+    the text is not empty, the output is ramped down and the run ends."""
     identity: tuple[str, ...] = ()
-    """Keys of a plan that make all its points other vibrations where they are changed."""
+    """Keys of a plan that define its vibrations. If one of them changes, no recorded point counts for the new plan."""
     fixed: tuple[str, ...] = ()
-    """Keys of a plan that must not change when a recording is resumed, because all points must be evaluated alike."""
+    """Keys of a plan that must not change when a recording is resumed, because all points must be evaluated in the same way."""
     measurements: Mapping[type, Callable[[Recording], Any]] = field(default_factory=dict)
-    """What a recording yields, by the type of the measurement."""
+    """Measurements that a recording yields: the function that reads each of them, by the type of the measurement."""
     exchanged: Callable[[Recording], list[Any]] = lambda _: []
-    """The objects of a recording that are written for other programs."""
+    """Returns the objects of a recording that are exported to other programs."""
     experiments: Literal["realisations", "sweeps", "segments"] | None = None
-    """How a recording becomes data for nonlinear state-space models: whole realisations of a multisine, whole sweeps, segments
-    of settled points; None where it does not."""
+    """How a recording becomes data for nonlinear state-space models: whole realisations of a multisine, whole sweeps, or
+    segments of settled points. None if it cannot."""
 
     @property
     def kind(self) -> str:
-        """Name of the kind, as plans and files have it."""
+        """Name of the kind, as used in plans and files."""
         return str(self.plan.model_fields["kind"].default)

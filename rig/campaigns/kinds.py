@@ -1,4 +1,4 @@
-"""The kinds of campaigns: one line for each, which stands in its own folder."""
+"""Registry of the kinds of campaigns: one line for each kind. Each kind has its own folder."""
 
 from rig.campaigns.backbone.points import BACKBONE
 from rig.campaigns.continuous_backbone.points import CONTINUOUS_BACKBONE
@@ -24,9 +24,9 @@ KINDS = {
         DWELL,
     )
 }
-"""Every kind by its name."""
+"""All kinds by name."""
 
 
 def kinds_that_yield(measurement: type) -> tuple[str, ...]:
-    """Names of the kinds whose recordings yield a type of measurement."""
+    """Return the names of the kinds whose recordings yield a given type of measurement."""
     return tuple(name for name, campaign in KINDS.items() if measurement in campaign.measurements)

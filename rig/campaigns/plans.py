@@ -1,4 +1,4 @@
-"""Plans by name or from TOML files."""
+"""Load plans by name or from TOML files."""
 
 from importlib import resources
 from pathlib import Path
@@ -19,18 +19,18 @@ def _folder() -> Path:
 
 
 def shipped_plans() -> list[str]:
-    """Names ``<bench>/<campaign>`` of the plans that come with the product."""
+    """Return the names ``<bench>/<campaign>`` of the plans that come with the product."""
     return shipped_names(_folder())
 
 
 def load_plan(name_or_path: str | Path) -> Plan:
-    """A shipped plan by its name, or a plan from a TOML file; `ConfigurationError` names what is wrong with it."""
+    """Load a shipped plan by name, or a plan from a TOML file; raise `ConfigurationError` that names the error in it."""
     text = str(name_or_path)
     return plan_from(read_toml(find_toml(name_or_path, _folder(), "plan")), text)
 
 
 def plan_from(table: dict[str, Any], source: str) -> Plan:
-    """A plan of any kind from its table; `ConfigurationError` names what is wrong with it and the ``source``."""
+    """Build a plan of any kind from its table; raise `ConfigurationError` that names the error and the ``source``."""
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigurationError(f"{source}: kind = {shown(kind)}: allowed is {', '.join(map(repr, KINDS))}")
@@ -38,7 +38,7 @@ def plan_from(table: dict[str, Any], source: str) -> Plan:
 
 
 def bench_of(plan: Plan, plan_source: str | Path) -> Bench:
-    """The bench that a plan names; a relative file is looked for beside the plan's own file."""
+    """Load the bench that a plan names. A relative path is relative to the folder of the plan's file."""
     if plan.bench.endswith(".toml") and not Path(plan.bench).is_absolute() and Path(str(plan_source)).suffix == ".toml":
         return load_bench(Path(str(plan_source)).parent / plan.bench)
     return load_bench(plan.bench)

@@ -1,4 +1,4 @@
-"""From the recording of a check to its findings, with or without an earlier check as reference."""
+"""Derive the findings of a check from its recording, with or without an earlier check as reference."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,7 @@ from rig.tick.safety.layout import EndReason
 __all__ = ["PURPOSE", "Assessment", "assess", "is_check", "responses_in"]
 
 PURPOSE = "check"
-SKIPPED = 0.1  # part of the silence at its beginning, left out for the transient of the filters
+SKIPPED = 0.1  # part of the silence that is left out at its beginning because of the transient of the filters
 CUT_SHORT = "the multisine was not played to its end"
 
 
@@ -35,9 +35,9 @@ class Assessment:
     """Result of a check."""
 
     bench: Bench
-    """The bench as it was."""
+    """The bench as it was recorded."""
     recording: Path
-    """Where it is recorded."""
+    """Path of the recording."""
     level_rms_v: float | None
     """Level of the multisine that was evaluated, V RMS."""
     findings: tuple[Finding, ...]
@@ -47,7 +47,7 @@ class Assessment:
     mode: Mode | None
     """The mode under test."""
     reference: Responses | None
-    """Responses of the reference."""
+    """Responses of the reference check; None if there is no reference."""
 
     @property
     def verdict(self) -> Literal["passed", "failed"]:
@@ -66,7 +66,7 @@ def is_check(recording: Recording) -> bool:
 
 
 def assess(recording: Recording, reference: Recording | None = None) -> Assessment:
-    """Findings of a recorded check; raises `RecordingError` if a recording is not that of a check."""
+    """Return the findings of a recorded check; raise `RecordingError` if a recording is not that of a check."""
     bench = bench_of_recording(recording)
     plan = _plan(recording)
     findings = [
@@ -94,7 +94,7 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
 
 
 def _limits(bench: Bench) -> list[Finding]:
-    """Warnings on numbers of the bench that do not fit together."""
+    """Warn of entries of the bench that are inconsistent."""
     return [Finding("limits", "", "warn", one.value, one.unit, one.allowed, one.line) for one in objections(bench)]
 
 
@@ -112,7 +112,7 @@ def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> 
 
 
 def responses_in(recording: Recording) -> Responses | None:
-    """Responses from the multisine of a check; None if it was not played to its end."""
+    """Return the responses to the multisine of a check; None if it was not played to its end."""
     if not is_check(recording):
         raise RecordingError(f"{recording.path}: is not the recording of a check")
     bench, plan = bench_of_recording(recording), _plan(recording)
@@ -135,7 +135,7 @@ def _plan(recording: Recording) -> MultisinePlan:
 
 
 def _silence(recording: Recording, bench: Bench, plan: MultisinePlan) -> np.ndarray:
-    """Readings before the first realisation [n, n_channels]."""
+    """Return the readings before the first realisation, [n, n_channels]."""
     first = recording.plans[0].plan
     samples = round(float(first.get("silent_s", 0.0)) * bench.sample_rate_hz)
     part = recording.parts[0]
@@ -144,7 +144,7 @@ def _silence(recording: Recording, bench: Bench, plan: MultisinePlan) -> np.ndar
 
 
 def _how_it_ended(recording: Recording, bench: Bench) -> list[Finding]:
-    """A finding if the run was ended early, with the channel that tripped."""
+    """Return a finding with the channel that tripped if the run ended early."""
     end = recording.parts[-1].end
     if end is None:
         return [Finding("run", "", "fail", text="the recording was cut short")]

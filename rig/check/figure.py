@@ -1,4 +1,4 @@
-"""Figure of a check: responses beside those of the reference, and what was found."""
+"""Figure of a check: responses, those of the reference if there is one, and a list of findings."""
 
 from pathlib import Path
 from textwrap import wrap
@@ -24,7 +24,7 @@ VERDICTS = {"fail": SECOND, "warn": "#b07d00", "not tested": "#707070"}
 
 
 def write_check(found: Assessment, figure: Path) -> None:
-    """Draw a check into a file; `RecordingError` where it cannot be written."""
+    """Draw a check into a file; raise `RecordingError` if it cannot be written."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -38,9 +38,9 @@ def write_check(found: Assessment, figure: Path) -> None:
 
 
 def draw_check(page: "Figure", found: Assessment) -> None:
-    """Accelerations per force, phase of the velocity, force per volt (dashed: the reference), and a list of faults.
+    """Draw accelerations per force, phase of the velocity, force per volt (dashed: the reference), and a list of faults.
 
-    The velocity of a passive structure's drive point keeps within 90 degrees of the force.
+    The velocity of a passive structure's drive point stays within 90 degrees of the force.
     """
     axes = page.subplots(2, 2)
     title(page, f"{found.bench.specimen.name}: check {found.verdict}")
@@ -87,12 +87,12 @@ def _draw_accelerances(size: "Axes", phase: "Axes", found: Assessment) -> None:
 
 
 def _dead(found: Assessment) -> set[str]:
-    """Channels that do not follow the excitation."""
+    """Return the channels that do not follow the excitation."""
     return {finding.channel for finding in found.findings if (finding.name, finding.verdict) == ("life", "fail")}
 
 
 def _per_force(found: Assessment) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Responses to the force, and those of the reference on the same lines, by name."""
+    """Return the responses to the force, and those of the reference on the same lines, by channel name."""
     if found.responses is None:
         return np.zeros((0, 0)), {}
     force = found.responses.names[found.bench.index_of("force")]
@@ -124,7 +124,7 @@ def _say_findings(axis: "Axes", found: Assessment) -> None:
     axis.set_axis_off()
     told = {
         (f.verdict, f.label): f.text for f in reversed(found.findings) if f.verdict != "ok"
-    }  # the first of each counts
+    }  # of several findings with the same label, the first counts
     fine = sum(f.verdict == "ok" for f in found.findings)
     lines = [(f"{fine} findings in order", MAIN)]
     for verdict, colour in VERDICTS.items():

@@ -16,13 +16,13 @@ class Finding:
     name: str
     """Name of the test: ``noise``, ``polarity`` and so on."""
     channel: str
-    """The channel; empty if the test is of the whole bench."""
+    """The channel; empty if the test concerns the whole bench."""
     verdict: Verdict
     """The verdict."""
     value: float | None = None
     """The measured value."""
     unit: str = ""
-    """Its unit."""
+    """Unit of the value."""
     allowed: str = ""
     """The allowed range, in words."""
     text: str = ""
@@ -30,17 +30,17 @@ class Finding:
 
     @property
     def label(self) -> str:
-        """Name and channel."""
+        """Name and channel of the finding."""
         return f"{self.name} {self.channel}".strip()
 
 
 def graded(value: float, ok: tuple[float, float], tolerated: tuple[float, float]) -> Verdict:
-    """``ok`` within the inner range, ``warn`` within the outer one, else ``fail``; NaN fails."""
+    """Return ``ok`` within the inner range, ``warn`` within the outer range, otherwise ``fail``; NaN fails."""
     if ok[0] <= value <= ok[1]:
         return "ok"
     return "warn" if tolerated[0] <= value <= tolerated[1] else "fail"
 
 
 def failed(findings: Iterable[Finding]) -> tuple[str, ...]:
-    """Labels of the findings that failed."""
+    """Return the labels of the findings that failed."""
     return tuple(finding.label for finding in findings if finding.verdict == "fail")

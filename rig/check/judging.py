@@ -1,4 +1,4 @@
-"""Findings from the driven part of a check: which channels live, are reversed, swapped, wrong in size, or late."""
+"""Findings from the driven part of a check: dead, reversed, swapped or delayed channels, and channels of wrong size."""
 
 import math
 from collections.abc import Sequence
@@ -16,22 +16,25 @@ __all__ = ["ALIKE", "best_assignment", "by_magnitude", "by_shape", "driven_findi
 Float = NDArray[np.float64]
 ALIKE = 0.03  # log ratio below which two channels cannot be distinguished
 BETTER = 0.5  # part of the misfit as wired that another assignment must not exceed
-WRONG = 0.05  # RMS log ratio from which on the wiring is in doubt
+WRONG = 0.05  # RMS log ratio above which the wiring is in doubt
 
 
 def by_magnitude(found: Float, expected: Float) -> Float:
-    """Cost [n, n] of taking channel i for j: squared log ratio of sizes [n] in sensor volts."""
+    """Cost [n, n] of identifying channel i with channel j: squared log ratio of their sizes [n] in sensor volts."""
     return np.asarray((np.log(found)[:, None] - np.log(expected)[None, :]) ** 2)
 
 
 def by_shape(found: NDArray[np.complex128], expected: NDArray[np.complex128]) -> Float:
-    """Cost [n, n] of taking response i for j over all lines [n, n_lines]: mean squared log ratio of their sizes."""
+    """Cost [n, n] of identifying response i with response j: mean squared log ratio of their sizes over all lines.
+
+    Both arguments are [n, n_lines].
+    """
     sizes, known = np.log(np.abs(found)), np.log(np.abs(expected))
     return np.asarray(np.mean((sizes[:, None] - known[None]) ** 2, axis=-1))
 
 
 def best_assignment(cost: Float) -> tuple[int, ...] | None:
-    """The assignment of channels that fits far better than the declared wiring; None if there is none."""
+    """Return the assignment of channels that fits far better than the declared wiring; None if there is none."""
     rows, columns = linear_sum_assignment(cost)
     as_wired, best = float(np.mean(np.diag(cost))), float(np.mean(cost[rows, columns]))
     if as_wired < WRONG**2 or best > BETTER**2 * as_wired or np.array_equal(rows, columns):
@@ -43,7 +46,7 @@ LATE_SAMPLES = 0.25
 
 
 def latency_findings(bench: Bench, responses: Responses, lead_fraction: float) -> list[Finding]:
-    """Delay of each loopback beyond the latency that the driver reports, from the slope of its phase over the band.
+    """Measure the delay of each loopback beyond the latency that the driver reports, from its phase slope over the band.
 
     ``lead_fraction`` is the fraction of a sample by which the rows' outputs and inputs are not aligned.
     """
@@ -73,7 +76,7 @@ DISTORTED = 0.05
 
 
 def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], Mode | None]:
-    """Findings from the responses and the bench's facts, and the mode under test."""
+    """Return the findings from the responses and the bench's facts, and the mode under test."""
     lives = _coherence(bench, responses)
     dead = {finding.channel for finding in lives if finding.verdict == "fail"}
     out = [*lives, *_distortion(bench, responses, dead)]
@@ -117,7 +120,7 @@ def _coherence(bench: Bench, responses: Responses) -> list[Finding]:
 
 
 def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Finding]:
-    """Distortion of the force, which shows a clipping amplifier and a nonlinear specimen."""
+    """Judge the distortion of the force, which reveals a clipping amplifier or a nonlinear specimen."""
     index = bench.index_of("force")
     name, value = responses.names[index], float(responses.distortion[index])
     if name in dead:
@@ -132,7 +135,7 @@ def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Find
 
 
 def _power(bench: Bench, responses: Responses) -> Finding:
-    """Direction of the power: into a passive structure, the mean of force times velocity is positive."""
+    """Judge the direction of the power: into a passive structure, the mean of force times velocity is positive."""
     force, drive = bench.index_of("force"), bench.index_of("drive")
     part = responses.frequency_hz / bench.specimen.linear_frequency_hz
     around = (part > BAND[0]) & (part < BAND[1])
@@ -163,7 +166,7 @@ def _frequency(bench: Bench, mode: Mode) -> Finding:
 
 
 def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode) -> list[Finding]:
-    """Sizes, signs and places of the accelerations against the mode's shape as the bench knows it."""
+    """Judge sizes, signs and places of the accelerations by the mode shape in the bench."""
     drive_shape = bench.specimen.drive_mode_shape
     names, channels = responses.names, bench.channels
     if drive_shape is None:
@@ -194,7 +197,7 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
 
 
 def _polarities(bench: Bench, known: Sequence[int], signs: np.ndarray) -> list[Finding]:
-    """Signs of the accelerations against the force; if most are wrong, the force is reversed."""
+    """Judge the signs of the accelerations relative to the force. If most are wrong, the force is reversed."""
     force = bench.channels[bench.index_of("force")].name
     names = [bench.channels[i].name for i in known]
     turned = len(known) > 2 and int(np.sum(signs < 0.0)) > len(known) / 2
@@ -239,7 +242,7 @@ def _size(name: str, ratio: float) -> Finding:
 
 
 def _delays(bench: Bench, alive: Sequence[int], mode: Mode) -> list[Finding]:
-    """Delay of each channel behind the force, from the phase of its residue (0 or 180 degrees for a normal mode)."""
+    """Judge the delay of each channel behind the force by the phase of its residue (0 or 180 degrees for a normal mode)."""
     out = []
     for place, i in enumerate(alive):
         residue = complex(mode.residue[place])

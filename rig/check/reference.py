@@ -1,4 +1,4 @@
-"""Findings against an earlier check of the same bench: swapped or reversed channels and changed gains."""
+"""Findings from the comparison with an earlier check of the same bench: swapped or reversed channels and changed gains."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ Complex = NDArray[np.complex128]
 
 
 def on_lines_of(frequency_hz: NDArray[np.float64], reference: Responses) -> Complex:
-    """complex[n_channels, n_lines]: the reference's responses per volt, interpolated."""
+    """Interpolate the responses per volt of the reference: complex[n_channels, n_lines]."""
     parts = [
         np.interp(frequency_hz, reference.frequency_hz, part(row))
         for row in reference.per_volt
@@ -24,7 +24,7 @@ def on_lines_of(frequency_hz: NDArray[np.float64], reference: Responses) -> Comp
 
 
 def reference_findings(bench: Bench, found: Responses, reference: Responses, dead: set[str]) -> list[Finding]:
-    """Findings on the channels that both checks have and that are not ``dead``."""
+    """Return the findings on channels that both checks have and that are not ``dead``."""
     both = [i for i, name in enumerate(found.names) if name in reference.names and name not in dead]
     both = [i for i in both if bench.channels[i].role != "monitor"]
     if not both:

@@ -12,7 +12,7 @@ __all__ = ["say", "summary"]
 
 
 def summary(found: Assessment) -> dict[str, Any]:
-    """Verdict, findings and the mode; for JSON."""
+    """Return verdict, findings and mode as a dictionary for JSON."""
     mode = found.mode
     return {
         "kind": "check",

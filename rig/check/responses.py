@@ -1,12 +1,12 @@
-"""From the multisine: coherence of every channel, responses per volt and per newton, the mode under test.
+"""Evaluate the multisine of a check: coherence of every channel, responses per volt and per newton, the mode under test.
 
 Near the mode under test the responses of all accelerations a_i to the force at the drive point share one pole,
 
     a_i / F = s^2 phi_d phi_i / (s^2 + 2 zeta omega_0 s + omega_0^2) + c_i + e_i s^2,    s = j omega,
 
 with mass-normalised shapes phi (normal modes; Ewins, *Modal Testing*, 2nd ed., section 2.4) and other modes as residuals. The
-pole is found by iterated linear least squares (Sanathanan and Koerner, 1963), residues and residuals are then linear; they
-are left complex, for delay between channels turns them.
+pole is found by iterated linear least squares (Sanathanan and Koerner, 1963). Given the pole, residues and residuals follow
+from a linear fit. They remain complex, because delays between channels rotate them.
 """
 
 import math
@@ -23,8 +23,8 @@ __all__ = ["BAND", "FITS", "Mode", "Responses", "fit_mode", "responses_of"]
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-BAND = (0.7, 1.4)  # of the linear frequency, for the fit
-FITS = 0.15  # misfit up to which a fit describes the responses
+BAND = (0.7, 1.4)  # of the linear frequency: band of the fit
+FITS = 0.15  # largest misfit of a fit that describes the responses
 ROUNDS = 12
 
 
@@ -33,37 +33,37 @@ class Responses:
     """Measured responses at the excited lines."""
 
     names: tuple[str, ...]
-    """Channels of the bench, in its order."""
+    """Names of the bench's channels, in the order of the bench."""
     frequency_hz: Float
-    """float[n_lines]."""
+    """float[n_lines], Hz."""
     per_volt: Complex
-    """complex[n_channels, n_lines], unit of the channel per volt of output, skew taken out."""
+    """complex[n_channels, n_lines], unit of the channel per volt of output; the skew is removed."""
     coherence: Float
-    """float[n_channels]: part of a channel's power in the band that repeats itself with the excitation."""
+    """float[n_channels]: part of a channel's power in the band that is periodic with the excitation."""
     distortion: Float
-    """float[n_channels]: RMS of lines that are not excited, less noise, beside that of excited ones."""
+    """float[n_channels]: RMS of lines that are not excited, without noise, relative to that of excited lines."""
 
     def per(self, reference: int) -> Complex:
-        """complex[n_channels, n_lines]: responses to another channel."""
+        """Return the responses relative to another channel, complex[n_channels, n_lines]."""
         return np.asarray(self.per_volt / self.per_volt[reference])
 
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """The mode under test, from force and accelerations."""
+    """The mode under test, identified from force and accelerations."""
 
     frequency_hz: float
-    """Natural frequency."""
+    """Natural frequency, Hz."""
     damping_ratio: float
     """Damping ratio of the structure alone."""
     residue: Complex
-    """complex[n_accelerations], phi_d phi_i, 1/kg; real and positive where a point moves with the drive point."""
+    """complex[n_accelerations], phi_d phi_i, 1/kg; real and positive for a point that moves in phase with the drive point."""
     misfit: float
     """Largest relative RMS difference between fit and measurement."""
 
 
 def responses_of(bench: Bench, measured: PeriodicSpectra) -> Responses:
-    """Responses per volt from the spectra of one level."""
+    """Compute the responses per volt from the spectra of one level."""
     excited = measured.excited
     means, spread = measured.mean, measured.noise_variance
     rows = [measured.index(channel.name) for channel in bench.channels]
@@ -83,11 +83,11 @@ def responses_of(bench: Bench, measured: PeriodicSpectra) -> Responses:
 
 
 def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode | None:
-    """The mode nearest to a frequency, from accelerations per force [n, n_lines]; None where there is none in the band.
+    """Identify the mode nearest to a frequency from accelerations per force [n, n_lines]; None if the band contains none.
 
-    There is none where the residuals of other modes describe the responses as well as a fit must (``FITS``): the equations
-    for the pole then have next to nothing left on either side, and their solution is noise or the rounding of the processor.
-    A mode inside the band leaves 0.9 and more to its residuals (0.2 at a damping ratio of 0.3), one outside up to 0.1.
+    There is no mode if the residuals of other modes alone describe the responses as well as a fit has to (``FITS``): then
+    almost nothing remains in the equations for the pole, and their solution is noise or rounding error. With a mode inside the
+    band, the residuals alone leave a misfit of 0.9 and more (0.2 at a damping ratio of 0.3); with a mode outside, up to 0.1.
     """
     around = (frequency_hz > BAND[0] * near_hz) & (frequency_hz < BAND[1] * near_hz)
     if np.count_nonzero(around) < 12:
@@ -109,14 +109,14 @@ def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode 
 
 
 def _fitted(terms: Complex, values: Complex) -> tuple[Complex, float]:
-    """Factors of the terms for each response, and the largest relative RMS difference that they leave."""
+    """Fit factors of the terms for each response; also return the largest relative RMS difference that remains."""
     found, *_ = np.linalg.lstsq(terms, values.T, rcond=None)
     left = np.linalg.norm(values.T - terms @ found, axis=0) / np.linalg.norm(values, axis=1)
     return np.asarray(found), float(left.max())
 
 
 def _pole(s: NDArray[Any], values: NDArray[Any]) -> tuple[float, float] | None:
-    """Stiffness and damping term of the common denominator, frequencies relative to the one looked near."""
+    """Return the stiffness and damping terms of the common denominator, with frequencies relative to the expected one."""
     rows, powers = [], s[:, None] ** np.arange(5)[None, :]
     weight = np.ones(s.size)
     stiffness, damping = 1.0, 0.01
@@ -135,7 +135,7 @@ def _pole(s: NDArray[Any], values: NDArray[Any]) -> tuple[float, float] | None:
 
 
 def _reduced(numerator: NDArray[Any], value: NDArray[Any], s: NDArray[Any]) -> tuple[Complex, Complex]:
-    """The equations ``value (s^2 + a s + b) = numerator coefficients`` less what the numerator's own unknowns explain."""
+    """Set up ``value (s^2 + a s + b) = numerator coefficients`` and project out the unknowns of the numerator."""
     basis, _ = np.linalg.qr(numerator)
     columns = np.column_stack([value, value * s, -value * s**2])
     left = columns - basis @ (basis.conj().T @ columns)

@@ -1,4 +1,4 @@
-"""The check of a bench: an ordinary run with silence, then a multisine from a thousandth of the largest voltage upwards."""
+"""Check of a bench: an ordinary run with silence, then a multisine, raised from a thousandth of the largest voltage."""
 
 import math
 from pathlib import Path
@@ -15,10 +15,10 @@ from rig.tick.safety.layout import EndReason
 
 __all__ = ["SEARCH", "check", "seen_in"]
 
-BAND = (0.4, 2.5)  # of the linear frequency
-LINES = 200.0  # up to the linear frequency
-ENOUGH = 0.999  # coherence of the worst channel
-CLEAR = 0.9999  # coherence of the best channel from which on a dead one will not show at a higher level either
+BAND = (0.4, 2.5)  # of the linear frequency: band of the multisine
+LINES = 200.0  # number of lines up to the linear frequency
+ENOUGH = 0.999  # coherence of the worst channel that suffices
+CLEAR = 0.9999  # coherence of the best channel above which a dead one will not appear at a higher level either
 DEAD = 0.1
 SILENT_S = 3.0
 SEARCH = LevelSearch(safe_share=0.1, least_rise=1.2, most_levels=5)
@@ -32,13 +32,13 @@ def check(
     named: str | None = None,
     reference: str | Path | None = None,
 ) -> Assessment:
-    """Check a bench, record it in ``recording``, and remember the result for arming unless the rig is virtual.
+    """Check a bench, record the check in ``recording``, and remember the result for arming unless the rig is virtual.
 
-    ``named`` is what the recorded plan calls the bench. ``reference`` is the recording of an earlier check. A check moves the
-    rig, gently, so it must be armed like a campaign.
+    ``named`` is the name of the bench in the recorded plan. ``reference`` is the recording of an earlier check. A check moves
+    the rig, gently, so it must be armed like a campaign.
 
-    Raises `rig.errors.ConfigurationError`, `rig.errors.RecordingError`, `rig.errors.DaqError` and `rig.errors.NotArmed`
-    where nothing could be checked. Faults of the rig are findings, not errors.
+    Raises `rig.errors.ConfigurationError`, `rig.errors.RecordingError`, `rig.errors.DaqError` or `rig.errors.NotArmed` if
+    nothing could be checked. Faults of the rig are findings, not errors.
     """
     name = named or str(bench.name if isinstance(bench, Bench) else bench)
     bench = bench if isinstance(bench, Bench) else load_bench(bench)
@@ -47,7 +47,7 @@ def check(
         if Path(reference).exists() and path.exists() and path.samefile(reference):
             raise RecordingError(f"{path}: is the reference that is read; choose another name")
         with Recording(reference) as known:
-            responses_in(known)  # refuses what is not a check before anything moves
+            responses_in(known)  # refuses a recording that is no check before anything moves
     series = MultisineSeries(bench, path, options or RunOptions(), PURPOSE)
     silent_s = SILENT_S
 
@@ -102,7 +102,7 @@ def _plan(bench: Bench, name: str, level_rms_v: float, silent_s: float) -> Multi
 
 
 def seen_in(bench: Bench, recorded: Recording) -> Seen:
-    """How the last multisine of a check was seen; with no room for another level where the run ended early."""
+    """Evaluate the last multisine of a check. If the run ended early, no higher level is allowed."""
     end = recorded.parts[-1].end
     found = responses_in(recorded)
     if found is None or end is None or end["reason"] != EndReason.COMPLETED.name.lower():
@@ -115,7 +115,7 @@ def seen_in(bench: Bench, recorded: Recording) -> Seen:
     lowest_hz = max(BAND[0] * bench.specimen.linear_frequency_hz, bench.limits.frequency_hz[0])
 
     def farthest_m(_: str, acceleration_m_s2: float) -> float:
-        """The displacement if all of the acceleration were at the lowest frequency."""
+        """Return the displacement if all of the acceleration were at the lowest frequency."""
         return acceleration_m_s2 / (2.0 * math.pi * lowest_hz) ** 2
 
     enough = bool(((coherence >= ENOUGH) | hopeless).all())

@@ -1,4 +1,4 @@
-"""Findings at 0 V: noise floor, offset, mains hum, channels that do not change or stand at the end of their range."""
+"""Findings at 0 V: noise floor, offset, mains hum, channels that do not change or are at the end of their range."""
 
 import math
 
@@ -22,7 +22,7 @@ Float = NDArray[np.float64]
 
 
 def silent_findings(bench: Bench, readings: Float) -> list[Finding]:
-    """Findings from ``readings`` [n, n_channels] in SI units at 0 V."""
+    """Return the findings from ``readings`` [n, n_channels] in SI units at 0 V."""
     out: list[Finding] = []
     for index, channel in enumerate(bench.channels):
         values = readings[:, index].astype(float)
@@ -59,7 +59,7 @@ def _of_channel(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
 
 
 def floor(channel: Channel) -> float:
-    """RMS that the bench expects of a channel at rest: declared noise and the converter's steps, in its unit."""
+    """RMS that the bench expects of a channel at rest, from its declared noise and the converter's steps, in its unit."""
     bit = channel.resolution_v / abs(channel.sensitivity_v_per_unit)
     return math.hypot(channel.noise_rms, bit / math.sqrt(12.0))
 
@@ -99,7 +99,7 @@ def _hum(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
 
 
 def hum(values: Float, mains_hz: float, sample_rate_hz: float) -> float:
-    """RMS of the mains' first three harmonics where they stand out of the noise, else 0; least squares over all samples."""
+    """RMS of the first three mains harmonics that stand out of the noise, by least squares over all samples; 0 if none does."""
     time = np.arange(values.size) / sample_rate_hz
     frequencies = [h * mains_hz for h in range(1, HUM_HARMONICS + 1) if h * mains_hz < 0.45 * sample_rate_hz]
     columns = [part(2.0 * math.pi * f * time) for f in frequencies for part in (np.cos, np.sin)]

@@ -1,4 +1,4 @@
-"""The command ``rig``: one file a command."""
+"""The command ``rig``, with one file per subcommand."""
 
 from rig.cli.app import app, main
 

@@ -1,4 +1,4 @@
-"""``rig analyse``: what can be known of a virtual bench without a test."""
+"""``rig analyse``: analyses of a virtual bench without a test."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -132,7 +132,7 @@ def forced_(
 def _show(
     bench: str, near_hz: float | None, analyse: "Callable[[Subject], Study]", figure: Path | None, json: bool
 ) -> None:
-    """Analyse, print, draw; exit status 1 where not everything that was asked for was found."""
+    """Analyse, print and draw; exit with status 1 if not everything requested was found."""
     from rig.analysis.study import check_ending, draw
     from rig.analysis.subject import subject_of
     from rig.text.console import print_json

@@ -1,4 +1,4 @@
-"""The command ``rig``. Exit status 0 only on success; errors are one line, with a traceback under ``--debug``."""
+"""The command ``rig``. It exits with status 0 only on success. Errors are one line, with a traceback under ``--debug``."""
 
 import io
 import os
@@ -61,7 +61,7 @@ app.command()(doctor)
 
 
 def main() -> None:
-    """Entry point of the command: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if stopped elsewhere."""
+    """Run the command and exit: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if interrupted elsewhere."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     say_what_is_imported()
@@ -102,7 +102,7 @@ def _complain(line: str, status: int) -> int:
 
 
 def _one_line(error: Exception) -> str:
-    """The error in one line; an error of other code is named with its type."""
+    """Return the error in one line. For an error from other code, include its type."""
     from identification.errors import IdentificationError
     from rig.errors import RigError
 

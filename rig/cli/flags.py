@@ -1,8 +1,8 @@
-"""The options of the command line, in the place of the fields that an error of the library names.
+"""Replace field names in error messages of the library by options of the command line.
 
-The library speaks to Python users: its messages name fields of a request in backticks, such as `` `band_hz` ``. A command's
-parameter has the name of the field that it fills (``no_`` before it where it turns it off, ``_`` behind it where Python has
-the name already), so the table from fields to options comes from the commands themselves.
+The library speaks to Python users: its messages name fields of a request in backticks, such as `` `band_hz` ``. Each parameter
+of a command has the name of the field that it fills, with the prefix ``no_`` if it turns the field off, and with the suffix
+``_`` if Python already uses the name. Therefore the table from fields to options is derived from the commands.
 """
 
 import re
@@ -15,7 +15,7 @@ __all__ = ["flags", "with_flags"]
 
 
 def flags(app: typer.Typer) -> dict[str, str]:
-    """Option by name of the field that it fills, over all commands."""
+    """Return the option for each field name, over all commands."""
     found: dict[str, str] = {}
     waiting: list[Any] = [get_command(app)]
     while waiting:
@@ -29,6 +29,6 @@ def flags(app: typer.Typer) -> dict[str, str]:
 
 
 def with_flags(message: str, app: typer.Typer) -> str:
-    """A message with the option in the place of each field."""
+    """Replace each field in a message by its option."""
     known = flags(app)
     return re.sub(r"`([a-z_]+)`", lambda field: known.get(field[1], field[0]), message)

@@ -1,4 +1,4 @@
-"""``rig identify``: from recordings to models."""
+"""``rig identify``: identify models from recordings."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``rig list``: what is shipped, and the parts of a virtual rig."""
+"""``rig list``: shipped benches, plans and specimens, and the parts of a virtual rig."""
 
 from json import dumps
 from typing import Annotated, Any

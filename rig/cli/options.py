@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options shared by several commands."""
 
 import contextlib
 import logging
@@ -17,7 +17,7 @@ Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]
 
 
 class _Notes(logging.Handler):
-    """Prints a line of the log as a note."""
+    """Prints log records as notes."""
 
     def emit(self, record: logging.LogRecord) -> None:
         with contextlib.suppress(OSError):  # the reader has closed the stream
@@ -25,14 +25,14 @@ class _Notes(logging.Handler):
 
 
 def say_what_is_imported() -> None:
-    """Print a note for each function of the user's own that a bench names, with the file that it comes from."""
+    """Print a note for each function of the user that a bench names, with the file that it comes from."""
     log = logging.getLogger("simulators.sites.functions")
     log.setLevel(logging.INFO)
     log.handlers = [_Notes()]
 
 
 def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> None:
-    """Refuse an output that is a folder, lies in no folder, is a source, or exists, unless ``overwrite``."""
+    """Refuse an output that is a folder, lies in no folder or is a source, and an existing file unless ``overwrite``."""
     from rig.errors import RecordingError
 
     if output.is_dir():
@@ -46,7 +46,7 @@ def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> Non
 
 
 def show_file(path: Path, json: bool) -> None:
-    """Print what is in a file."""
+    """Print the contents of a file."""
     from rig.models.files.files import understood
     from rig.show.summary import summarise
     from rig.show.tables import print_summary

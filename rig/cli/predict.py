@@ -1,4 +1,4 @@
-"""``rig predict``: from models to predictions."""
+"""``rig predict``: predict vibrations with models."""
 
 from pathlib import Path
 from typing import Annotated

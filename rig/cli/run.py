@@ -1,4 +1,4 @@
-"""``rig run`` and ``rig resume``: carry out a plan, and finish a run that was interrupted."""
+"""``rig run`` and ``rig resume``: carry out a plan, and finish an interrupted run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -71,7 +71,7 @@ def resume(
 
 
 def _carry(kind: str, options: "RunOptions", start: "Callable[[RunOptions], Recording]", json: bool) -> None:
-    """Run, show the points as they come and how it ended; exit status 1 where the plan was not completed."""
+    """Run, show each point and how the run ended; exit with status 1 if the plan was not completed."""
     from rig.campaigns.kinds import KINDS
     from rig.recording.reader import Recording
     from rig.show.summary import summarise_recording

@@ -1,4 +1,4 @@
-"""Options that ``rig run``, ``resume``, ``check`` and ``tune`` share, and the question before a bench is armed."""
+"""Options shared by ``rig run``, ``resume``, ``check`` and ``tune``, and the question before a bench is armed."""
 
 import inspect
 import sys
@@ -35,7 +35,7 @@ def of_a_recording(
     note: Notes = None,
     overwrite: Overwrite = False,
 ) -> "RunOptions":
-    """The options of a command that begins a recording."""
+    """Return the options of a command that begins a recording."""
     options = of_a_further_part(seed, realtime, arm, operator, specimen_serial, note)
     return replace(options, overwrite=overwrite)
 
@@ -48,7 +48,7 @@ def of_a_further_part(
     specimen_serial: SpecimenSerial = "",
     note: Notes = None,
 ) -> "RunOptions":
-    """The options of a command that adds a part to a recording."""
+    """Return the options of a command that adds a part to a recording."""
     from rig.arming.run_facts import About
     from rig.arming.run_options import RunOptions
 
@@ -57,7 +57,7 @@ def of_a_further_part(
 
 
 def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the options of ``build`` in place of its parameter ``options``, which receives what ``build`` returns."""
+    """Replace the parameter ``options`` of a command by those of ``build``; the command receives the result of ``build``."""
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         shared = inspect.signature(build).parameters
@@ -80,7 +80,7 @@ def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[.
 
 @contextmanager
 def shown(options: "RunOptions", columns: Any) -> "Iterator[RunOptions]":
-    """The options with a display of the run's points; ``columns`` are those of its kind of campaign."""
+    """Add a display of the run's points to the options; ``columns`` are those of its kind of campaign."""
     from rig.show.progress import RunProgress
 
     progress = RunProgress(columns)
@@ -91,7 +91,7 @@ def shown(options: "RunOptions", columns: Any) -> "Iterator[RunOptions]":
 
 
 def _arm_from(arm: bool) -> "Arm":
-    """True where the switch was given; else a question on the terminal, if there is one."""
+    """Return True if the switch was given; otherwise a function that asks on the terminal, or None without a terminal."""
     if arm:
         return True
     on_a_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stderr is not None and sys.stderr.isatty()
@@ -99,7 +99,7 @@ def _arm_from(arm: bool) -> "Arm":
 
 
 def ask(request: "ArmingRequest") -> bool:
-    """Show what is to move; whether the bench's name was typed."""
+    """Show what is going to move; return whether the bench's name was typed."""
     from rig.text.printable import printable
 
     for line in request.lines():

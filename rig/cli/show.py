@@ -1,4 +1,4 @@
-"""``rig show`` and ``rig plot``: what is in a file."""
+"""``rig show`` and ``rig plot``: show the contents of a file."""
 
 from pathlib import Path
 from typing import Annotated

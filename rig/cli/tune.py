@@ -74,7 +74,7 @@ def tune_(
 
 
 def _as_seen_from(bench: str, plan: Path) -> str:
-    """Name of the bench in the plan; a file by its path relative to the plan's folder."""
+    """Return the name of the bench in the plan; for a file, its path relative to the plan's folder."""
     if not bench.endswith(".toml") or Path(bench).is_absolute():
         return bench
     return Path(os.path.relpath(bench, plan.parent)).as_posix()

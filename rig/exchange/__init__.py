@@ -1,1 +1,1 @@
-"""Data to and from other programs: UFF (universal files), MAT and CSV."""
+"""Exchange of data with other programs: UFF (universal files), MAT and CSV."""

@@ -1,7 +1,7 @@
 """CSV files: two comment lines, a line of names, a line of units, one row of numbers per line.
 
-The comments hold the kind and, as JSON, everything that is not in the table. Numbers are written with as many digits
-as make them the same when they are read.
+The comments contain the kind and, as JSON, everything that is not in the table. Numbers are written with enough digits to be
+read back exactly.
 """
 
 import csv
@@ -24,7 +24,7 @@ _KIND, _OTHERS = "# vibrolock: ", "# others: "
 
 
 def write_csv(items: Sequence[Contents], path: Path) -> None:
-    """Write the one table; raises `RecordingError` where there are several."""
+    """Write the one table; raise `RecordingError` if there are several."""
     if len(items) > 1:
         titles = "; ".join(f"{number} ({item.kind}, {item.title})" for number, item in enumerate(items, 1))
         raise RecordingError(f"a CSV file holds one table, here are {len(items)}: choose by `item` one of {titles}")
@@ -39,7 +39,7 @@ def write_csv(items: Sequence[Contents], path: Path) -> None:
 
 
 def _others(item: Contents) -> dict[str, Any]:
-    """Everything that is not in the table, and the order in which its columns make arrays."""
+    """Return everything that is not in the table, and how its columns form arrays."""
     loose = {}
     for name, array in item.arrays.items():
         if name not in item.rows:
@@ -57,7 +57,10 @@ def _others(item: Contents) -> dict[str, Any]:
 
 
 def table_of_ours(path: Path) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
-    """Kind, arrays and attributes in a file that `write_csv` wrote; None for others; `ImportFailed` on damaged ones."""
+    """Return kind, arrays and attributes of a file that `write_csv` wrote; None for other files.
+
+    Raises `ImportFailed` if the file is damaged.
+    """
     lines = _lines(path)
     if not lines or not lines[0].startswith(_KIND):
         return None
@@ -94,10 +97,11 @@ def _lines(path: Path) -> list[str]:
 
 
 def read_csv(path: Path) -> dict[str, Any]:
-    """Columns of any CSV file by name: comma, semicolon or tab; a first line of names; lines with ``#`` are left out.
+    """Read the columns of any CSV file, by name.
 
-    Lines of units right after the names (texts, or a 1) are passed over. Raises `ImportFailed`, with the line, on
-    anything that is no number, on rows of unequal length, and on decimal commas.
+    Separators are comma, semicolon or tab. The first line contains the names. Lines that begin with ``#`` are skipped, and so
+    are lines of units right after the names (texts, or a 1). Raises `ImportFailed`, with the line, for anything that is not a
+    number, for rows of unequal length, and for decimal commas.
     """
     lines = [(number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#")]
     if len(lines) < 2:

@@ -1,4 +1,4 @@
-"""Reads the objects in a file of the bench and writes them for other programs."""
+"""Read the objects in a file of this program and write them for other programs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -30,25 +30,25 @@ from rig.text.contents import Contents
 __all__ = ["DATA", "export_file", "read_objects", "write_contents"]
 
 DATA = ("results", "time")
-"""Choices of what is taken from a recording."""
+"""Choices of data to take from a recording."""
 
 
 def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) -> list[Any]:
-    """The objects in a file of the bench: one, or several (levels of a multisine, sweeps, time data, modes with responses).
+    """Return the objects in a file: one or several (levels of a multisine, sweeps, time data, modes with responses).
 
     Parameters
     ----------
     path
         A recording, model or imported measurement.
     data
-        ``results`` (what `rig.measurements` makes of a recording) or ``time`` (the samples of its points).
+        ``results`` (measurements of a recording, see `rig.measurements`) or ``time`` (the samples of its points).
     points
-        Stored numbers, from 0, of the points whose samples are wanted; all that were recorded if empty.
+        Stored numbers, from 0, of the points whose samples are returned; if empty, of all recorded points.
 
     Raises
     ------
     RecordingError
-        If the file cannot be read, holds no such point or nothing of that kind.
+        If the file cannot be read, or does not contain such points or data.
     """
     if data not in DATA:
         raise ConfigurationError(f"`data` = {data!r}: allowed is {' or '.join(DATA)}")
@@ -69,7 +69,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
 
 
 def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:
-    """Samples of points in SI as they were recorded, with the output's voltage as the last channel."""
+    """Return the samples of points in SI units as recorded, with the output voltage as the last channel."""
     bench = bench_of_recording(recording)
     known = sorted({point.number for point in map(point_from, recording.points) if point.rows is not None})
     if unknown := sorted(set(points) - set(known)):
@@ -94,7 +94,7 @@ def export_file(
 ) -> list[Contents]:
     """Write the objects in ``source`` (see `read_objects`), or one of them by its number from 1, in another format.
 
-    Returns what was written. Raises `RecordingError` where it cannot be read or written; ``output`` is then as it was.
+    Returns the written contents. Raises `RecordingError` if reading or writing fails; ``output`` is then unchanged.
     """
     try:
         found = [taken_apart(value) for value in read_objects(source, data, points)]
@@ -113,7 +113,7 @@ def export_file(
 
 
 def write_contents(items: list[Contents], output: Path, format_: str) -> None:
-    """Write contents in a format, whole or not at all."""
+    """Write contents in a format. The file is written completely or not at all."""
     with whole_file(output) as part:
         try:
             _WRITERS[format_](items, part)

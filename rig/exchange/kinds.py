@@ -1,4 +1,4 @@
-"""The kinds of objects that are exchanged, each with its conversion to arrays and back."""
+"""Kinds of objects that are exchanged, each with its conversion to arrays and back."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -82,7 +82,7 @@ def _frequency_responses(responses: tuple[FrequencyResponse, ...]) -> Contents:
 
 @dataclass(frozen=True)
 class ExchangeKind:
-    """How objects of one type are taken apart and put together; ``name`` stands in exchanged files."""
+    """Conversion of one type of objects to arrays and back; ``name`` is the name of the kind in exchanged files."""
 
     name: str
     type: type
@@ -105,7 +105,7 @@ KINDS = (
 
 
 def taken_apart(value: Any) -> Contents:
-    """An object as arrays and attributes; raises `IdentificationError` for a type that is not exchanged."""
+    """Convert an object to arrays and attributes; raise `IdentificationError` for a type that is not exchanged."""
     if isinstance(value, Contents):
         return value
     for kind in KINDS:
@@ -116,7 +116,7 @@ def taken_apart(value: Any) -> Contents:
 
 
 def put_together(kind: str, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Any:
-    """Inverse of `taken_apart`; raises `IdentificationError` on an unknown kind and on what does not fit."""
+    """Convert the output of `taken_apart` back; raise `IdentificationError` for an unknown kind or data that does not fit."""
     for known in KINDS:
         if known.name == kind:
             try:

@@ -1,7 +1,7 @@
-"""MAT files of version 5, which MATLAB, Octave and SciPy read: one structure, or an array of them.
+"""MAT files of version 5, which MATLAB, Octave and SciPy read: one structure, or an array of structures.
 
-A structure holds the arrays by name, ``units`` of the same names, ``channels`` where there are any, and two texts:
-``vibrolock_kind``, and ``attributes_json`` with everything else, from which the file is read back as it was.
+A structure contains the arrays by name, ``units`` with the same names, ``channels`` if there are any, and two texts:
+``vibrolock_kind``, and ``attributes_json`` with everything else that is needed to read the file back unchanged.
 """
 
 import json
@@ -25,11 +25,11 @@ _PATIENCE_S, _SLOWEST_BYTES_S = 60.0, 5e6
 
 
 class ImportFailed(RigError):  # noqa: N818 (says what happened)
-    """A file of measurements cannot be read, or does not hold what its mapping says; the message names both."""
+    """A file of measurements cannot be read, or does not contain what its mapping says. The message names both."""
 
 
 def write_mat(items: Sequence[Contents], path: Path) -> None:
-    """Write, under the name of each kind, one structure or a 1 x n array of them; may raise anything SciPy does."""
+    """Write one structure, or a 1 x n array of them, under the name of each kind; may raise any error of SciPy."""
     from scipy.io import savemat
 
     kinds = dict.fromkeys(item.kind for item in items)
@@ -40,7 +40,7 @@ def write_mat(items: Sequence[Contents], path: Path) -> None:
 
 
 def _variable(structures: Sequence[Mapping[str, Any]]) -> Any:
-    """One structure as it is, several as an array."""
+    """Return a single structure unchanged, several as an array."""
     if len(structures) == 1:
         return structures[0]
     names = _names(structures)
@@ -68,12 +68,12 @@ def _structure(item: Contents) -> dict[str, Any]:
 
 
 def _text(unit: Any) -> Any:
-    """A unit as text, several as a cell array of the shape of what they belong to."""
+    """Return a unit as text, and several units as a cell array with the shape of their array."""
     return unit if isinstance(unit, str) else np.asarray(unit).astype(object)
 
 
 def _table(channels: Sequence[Mapping[str, str]]) -> Any:
-    """Channels as a structure array."""
+    """Return channels as a structure array."""
     table = np.empty(len(channels), dtype=[(key, object) for key in ("name", "role", "unit")])
     for row, channel in enumerate(channels):
         table[row] = (channel["name"], channel["role"], channel["unit"])
@@ -81,9 +81,10 @@ def _table(channels: Sequence[Mapping[str, str]]) -> Any:
 
 
 def read_mat(path: Path) -> dict[str, Any]:
-    """Everything in a MAT file (up to version 7) as nested dictionaries, lists and arrays; raises `ImportFailed`.
+    """Read a MAT file (up to version 7) as nested dictionaries, lists and arrays; raise `ImportFailed` if this fails.
 
-    SciPy's parser crashes on some damaged files. So a child process reads it, in 4 GiB, for at most 60 s and 1 s per 5 MB.
+    SciPy's parser crashes on some damaged files. Therefore a child process reads the file, with at most 4 GiB of memory, for at
+    most 60 s and 1 s per 5 MB.
     """
     if not path.is_file():
         raise ImportFailed(f"{path}: there is no such file")
@@ -100,7 +101,7 @@ def read_mat(path: Path) -> dict[str, Any]:
 
 
 def structures_of_ours(data: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
-    """Kind, arrays and attributes of every structure that `write_mat` wrote; raises `ImportFailed` on damaged ones."""
+    """Return kind, arrays and attributes of every structure that `write_mat` wrote; raise `ImportFailed` for damaged ones."""
     found = []
     for value in data.values():
         for entry in value if isinstance(value, list | np.ndarray) else [value]:

@@ -1,4 +1,4 @@
-"""A MAT file read by a child process: its values go into a folder, as one JSON document and one file of plain bytes."""
+"""Child process that reads a MAT file. It writes the values into a folder, as a JSON document and a file of raw bytes."""
 
 import json
 import sys
@@ -16,14 +16,14 @@ _PLAIN = "biufcUS"
 
 
 def write_values(value: Any, folder: Path) -> None:
-    """Write ``value`` into ``folder``; what is neither number, text nor a container of them becomes its type's name."""
+    """Write ``value`` into ``folder``; values other than numbers, texts and containers become the name of their type."""
     with (folder / _NUMBERS).open("wb") as numbers:
         tree = _taken_apart(value, numbers)
     (folder / _TREE).write_text(json.dumps(tree), encoding="ascii")
 
 
 def read_values(folder: Path) -> Any:
-    """What `write_values` wrote there."""
+    """Read back the value that `write_values` wrote."""
     with (folder / _NUMBERS).open("rb") as numbers:
         return _put_together(json.loads((folder / _TREE).read_text(encoding="ascii")), numbers)
 
@@ -91,7 +91,7 @@ def main(path: Path, folder: Path) -> str:
         return f"cannot be read ({error.strerror or error})"
     except MemoryError:
         return f"takes more than {MEMORY_BYTES / 2**30:g} GiB of memory, or is damaged"
-    except Exception as error:  # the parser fails on damaged bytes in many ways, of no common class
+    except Exception as error:  # the parser raises many unrelated exceptions on damaged bytes
         return f"is no MAT file, or a damaged one ({' '.join(str(error).split())})"
     return ""
 

@@ -1,4 +1,4 @@
-"""Nonlinear state-space models as they are exchanged: coefficient matrices under the names that PNLSS toolboxes give them."""
+"""Exchange of nonlinear state-space models: coefficient matrices under the names used by PNLSS toolboxes."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,18 +21,19 @@ _NAMES = {
     "state_range": "state_range",
     "input_range": "input_range",
 }
-"""Names of the arrays outside, and in files of ours."""
+"""Names of the arrays in exchanged files, with their names in this program's files."""
 
 
 def pnlss_parts(model: PnlssModel) -> Contents:
-    """A model by A to F, powers of the monomials (rows; states, then inputs), and what else there is.
+    """Convert a model to A to F, powers of the monomials (one row each; states, then inputs), and all other data.
 
-    ``n``, ``m``, ``p``: states, inputs, outputs; ``nx``, ``ny``: degrees that occur; ``fs``: sample rate; for readers only.
+    ``n``, ``m``, ``p``: numbers of states, inputs, outputs; ``nx``, ``ny``: degrees that occur; ``fs``: sample rate. These are
+    for readers only.
     """
     arrays, attributes = model.to_arrays()
     out: dict[str, Any] = {outside: np.asarray(arrays[name]) for outside, name in _NAMES.items()}
     for powers in ("xpowers", "ypowers"):
-        out[powers] = out[powers].astype(float)  # as MATLAB has its numbers
+        out[powers] = out[powers].astype(float)  # MATLAB's number type
     out |= {
         "n": np.array([float(model.states)]),
         "m": np.array([float(len(model.inputs))]),
@@ -47,7 +48,7 @@ def pnlss_parts(model: PnlssModel) -> Contents:
 
 
 def pnlss_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> PnlssModel:
-    """Inverse of `pnlss_parts`."""
+    """Convert the output of `pnlss_parts` back to a model."""
     inside = {name: np.asarray(arrays[outside]) for outside, name in _NAMES.items()}
     for name in ("state_features/exponents", "output_features/exponents"):
         inside[name] = inside[name].astype(np.int64)

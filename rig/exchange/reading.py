@@ -1,4 +1,4 @@
-"""Reading measurements and models from files of other programs."""
+"""Read measurements and models from files of other programs."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,13 +22,13 @@ __all__ = [
 ]
 
 FORMATS = {"mat": (".mat",), "uff": (".uff", ".unv", ".uf", ".bunv"), "csv": (".csv", ".txt")}
-"""Formats, and the endings by which they are known."""
+"""Formats with the suffixes that identify them."""
 
 _DEFAULT_KIND = "frequency-responses"
 
 
 def format_of(path: Path, given: str, option: str) -> str:
-    """A format as given, else by the ending of ``path``; raises `ConfigurationError` where that says nothing."""
+    """Return the given format, or else the one for the suffix of ``path``; raise `ConfigurationError` if it is unknown."""
     if given:
         if given not in FORMATS:
             raise ConfigurationError(f"{option} = {given!r}: allowed is {', '.join(FORMATS)}")
@@ -42,30 +42,30 @@ def format_of(path: Path, given: str, option: str) -> str:
 def import_file(
     path: Path, format_: str = "", mapping: Path | None = None, *, units: str = "", drive: str = "", item: int = 0
 ) -> Any:
-    """The measurement or model in a file.
+    """Read the measurement or model in a file.
 
     Parameters
     ----------
     path
         The file.
     format_
-        ``mat``, ``uff`` or ``csv``; by the ending of ``path`` if empty.
+        ``mat``, ``uff`` or ``csv``; by the suffix of ``path`` if empty.
     mapping
-        TOML file that says what is where; wanted unless this package wrote the file, or it is a universal file with
+        TOML file that describes the contents. Required unless this package wrote the file, or it is a universal file with
         frequency responses or modes.
     units
-        Universal files: ``labels``, ``file`` or ``si`` where labels and dataset 164 disagree or are missing.
+        For universal files: ``labels``, ``file`` or ``si`` if labels and dataset 164 disagree or are missing.
     drive
-        Universal files with modes: the degree of freedom where the force acts, such as ``1+Z``.
+        For universal files with modes: the degree of freedom at which the force acts, such as ``1+Z``.
     item
-        Which of several, from 1; 0 where there is one.
+        Number of the object if there are several, from 1; 0 if there is only one.
 
     Raises
     ------
     ConfigurationError
-        If the mapping cannot be read or holds a value that is not allowed.
+        If the mapping cannot be read or has a value that is not allowed.
     ImportFailed
-        If the file cannot be read or does not hold what the mapping says.
+        If the file cannot be read or does not contain what the mapping says.
     """
     from identification.errors import IdentificationError
 
@@ -82,13 +82,13 @@ def import_file(
 
 
 def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> "tuple[FrequencyResponse, ...]":
-    """Stepped-sine frequency responses in a MAT file (up to version 7), in SI; raises as `import_file`."""
+    """Read stepped-sine frequency responses from a MAT file (up to version 7), in SI; errors are as for `import_file`."""
     found: tuple[FrequencyResponse, ...] = import_file(Path(mat_path), "mat", Path(mapping_path))
     return found
 
 
 def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
-    """Model and reader of every kind of mapping."""
+    """Return model and reader of every kind of mapping."""
     import identification as i
 
     return {
@@ -102,7 +102,7 @@ def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
 
 
 def read_mapping(path: str | Path) -> Any:
-    """Read a mapping from TOML; raises `ConfigurationError` that names each wrong key and its value."""
+    """Read a mapping from TOML; raise `ConfigurationError` that names each wrong key and its value."""
     table = read_toml(Path(path))
     kind, known = table.get("kind", _DEFAULT_KIND), _mappings()
     if not isinstance(kind, str) or kind not in known:
@@ -111,7 +111,7 @@ def read_mapping(path: str | Path) -> Any:
 
 
 def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
-    """What a mapping makes of data; spectra become frequency responses."""
+    """Apply a mapping to data; spectra are converted to frequency responses."""
     mapping = read_mapping(mapping_path)
     _check_units(data, mapping)
     found = _mappings()[mapping.kind][1](data, mapping)
@@ -119,7 +119,7 @@ def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
 
 
 def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
-    """Refuse a mapping with units for a universal file: those of the file are converted to SI already."""
+    """Refuse units in a mapping that contradict those of a universal file, whose data is already converted to SI."""
     from identification.mapping.units import si_of
 
     for channel in getattr(mapping, "channels", ()):
@@ -131,7 +131,7 @@ def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
 
 
 def _response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str) -> "FrequencyResponseMatrix":
-    """Frequency responses of all motions to the force: with an instrument, or H1."""
+    """Return the frequency responses of all motions to the force, with an instrument or as H1."""
     from identification import best_linear_approximation
 
     if not instrument:
@@ -149,7 +149,7 @@ def _from_mat(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
     from rig.exchange.kinds import put_together
 
     if mapping is not None:
-        read_mapping(mapping)  # named before the file, which may be large
+        read_mapping(mapping)  # errors in the mapping are reported before the file is read, which may be large
         return _mapped(read_mat(path), mapping)
     ours = structures_of_ours(read_mat(path))
     if not ours:

@@ -1,4 +1,4 @@
-"""Samples over time of a recorded point, and how time data and sweeps are taken apart for other formats."""
+"""Samples over time of a recorded point, and conversion of time data and sweeps for other formats."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class TimeData:
     channels
         One per row of ``samples``.
     samples
-        float[n_channels, n], in the unit of each channel, SI; NaN where samples were lost on their way.
+        float[n_channels, n], in the SI unit of each channel; NaN where samples were lost in transfer.
     sample_rate_hz
         Samples per second.
     start_s
@@ -31,12 +31,12 @@ class TimeData:
     point
         Stored number of the point, from 0.
     specimen
-        Name of what was tested.
+        Name of the specimen.
 
     Raises
     ------
     IdentificationError
-        On shapes that do not agree, inf, or a rate that is not above zero.
+        If shapes do not agree, for inf, or for a rate that is not above zero.
     """
 
     channels: tuple[Channel, ...]
@@ -61,13 +61,13 @@ class TimeData:
 
 
 def _named(channels: Sequence[Channel]) -> tuple[Any, tuple[tuple[str, ...]], list[dict[str, str]]]:
-    """Units, labels and description of channels."""
+    """Return units, labels and description of channels."""
     units = np.array([channel.unit for channel in channels])
     return units, (tuple(channel.name for channel in channels),), [dict(vars(channel)) for channel in channels]
 
 
 def time_data_parts(data: TimeData) -> Contents:
-    """Samples with their instants."""
+    """Convert time data to samples with their instants."""
     units, labels, channels = _named(data.channels)
     attributes = {
         "channels": channels,
@@ -91,14 +91,14 @@ def time_data_parts(data: TimeData) -> Contents:
 
 
 def time_data_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> TimeData:
-    """Inverse of `time_data_parts`; KeyError or TypeError on what is missing or unknown."""
+    """Convert the output of `time_data_parts` back; raise KeyError or TypeError for missing or unknown entries."""
     rest = dict(attributes)
     channels = tuple(Channel(**channel) for channel in rest.pop("channels"))
     return TimeData(channels, np.asarray(arrays["samples"]), **rest)
 
 
 def transient_parts(transient: Transient) -> Contents:
-    """Fundamentals over time."""
+    """Convert a sweep to its fundamentals over time."""
     units, labels, channels = _named(transient.channels)
     return Contents(
         kind="sweep",
@@ -112,7 +112,7 @@ def transient_parts(transient: Transient) -> Contents:
 
 
 def transient_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Transient:
-    """Inverse of `transient_parts`; KeyError or TypeError on what is missing or unknown."""
+    """Convert the output of `transient_parts` back; raise KeyError or TypeError for missing or unknown entries."""
     channels = tuple(Channel(**channel) for channel in attributes["channels"])
     time_s, frequency_hz, fundamentals = (arrays[name] for name in ("time_s", "frequency_hz", "fundamentals"))
     return Transient(channels, time_s, frequency_hz, fundamentals, int(attributes["window_periods"]))

@@ -1,4 +1,4 @@
-"""Figure of a response-controlled test: quasi-linear responses level by level, and curves at constant force cut from them."""
+"""Figure of a response-controlled test: quasi-linear responses by level, and curves at constant force cut from them."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -24,9 +24,9 @@ _ROOM = 1.4
 def draw_force_surface(
     page: "Figure", responses: Sequence[FrequencyResponse], surface: ForceSurface | None, *, text: str = ""
 ) -> None:
-    """Receptance and lag of every level on the left, constant-force curves and the force over the displacement on the right.
+    """Draw receptance and lag of every level on the left; constant-force curves and the force over displacement on the right.
 
-    ``page`` is an empty figure, about 11 by 7 inches; without a ``surface`` its right half is left out.
+    ``page`` is an empty figure, about 11 by 7 inches. Without a ``surface`` the right half is left out.
     """
     from matplotlib import colormaps
 
@@ -55,12 +55,12 @@ def draw_force_surface(
 
 
 def draw_measured_surface(page: "Figure", measured: Any) -> None:
-    """Draw a force surface as its file holds it: ``measured`` has ``responses`` and ``surface``."""
+    """Draw a force surface from a file: ``measured`` has ``responses`` and ``surface``."""
     draw_force_surface(page, measured.responses, measured.surface)
 
 
 def _name(response: FrequencyResponse, levels: list[float], scale: float, unit: str) -> str | None:
-    """Of many levels the first and the last alone are named, the shades lie between."""
+    """Return the name of a level. Of many levels only the first and the last are named."""
     if len(levels) > _MOST_NAMED and response.level not in (levels[0], levels[-1]):
         return None
     return f"{scale * response.level:.4g} {unit}"
@@ -75,7 +75,7 @@ def _points(
 
 
 def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: Any) -> None:
-    """What the surface takes for the response of a level."""
+    """Draw the response of a level as fitted by the surface."""
     x = np.linspace(-1.0, 1.0, 81)
     frequency_hz = (fit.centre + x * fit.half_range) / (2.0 * np.pi)
     stiffness = np.polynomial.polynomial.polyval(x, fit.coefficients)
@@ -84,7 +84,7 @@ def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: Any) ->
 
 
 def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
-    """Amplitude over frequency at forces within the surface; unstable parts dotted."""
+    """Draw amplitude over frequency at forces within the surface; unstable parts are dotted."""
     from matplotlib import colormaps
 
     found = _within(surface)
@@ -103,7 +103,7 @@ def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> Non
 
 
 def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
-    """Curves at forces that the levels enclose from lag 30 to 150 deg, or, where they do not, at resonance."""
+    """Return curves at forces that the levels cover from lag 30 to 150 deg, or at least at resonance."""
     resonance = surface.at_lag(90.0).force_n
     try:
         lowest = max(float(surface.at_lag(lag).force_n[0]) for lag in (_SECTIONS_DEG[0], _SECTIONS_DEG[-1]))
@@ -116,13 +116,13 @@ def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
     for force in np.geomspace(1.02 * lowest, 0.98 * highest, _CURVES):
         try:
             out.append(surface.constant_force(float(f"{force:.2g}")))
-        except IdentificationError:  # rounded out of what was measured
+        except IdentificationError:  # rounding moved the force out of the measured range
             continue
     return out
 
 
 def _sections(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
-    """Force over displacement at three lags: every level a point."""
+    """Draw the force over displacement at three lags, with one point per level."""
     for lag, marker in zip(_SECTIONS_DEG, ("v", "o", "^"), strict=True):
         try:
             section = surface.at_lag(lag)

@@ -1,4 +1,4 @@
-"""Figure of a nonlinear mode: modal properties over the amplitude, and what the force was made of."""
+"""Figure of a nonlinear mode: modal properties over the amplitude, and the harmonics of the force."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ __all__ = ["draw_mode", "draw_properties"]
 
 
 def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
-    """Draw a model."""
+    """Draw a nonlinear mode."""
     shapes, purities = np.isfinite(mode.mac).any(), np.isfinite(mode.force_purity).any()
     axes = page.subplots(2, 3 if shapes or purities else 2)
     draw_properties(axes[0, 0], axes[0, 1], mode)
@@ -31,7 +31,7 @@ def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
 
 
 def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
-    """One minus the MAC on a logarithmic axis: what is close to one would be a line at the top."""
+    """Draw one minus the MAC on a logarithmic axis; a MAC close to one would be a line at the top."""
     if not np.isfinite(mode.mac).any():
         say_why_empty(axis, "MAC needs mode shapes")
         return
@@ -45,7 +45,7 @@ def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
 
 
 def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
-    """Share of the fundamental in force and motion, with its 95 % interval."""
+    """Draw the share of the fundamental in force and motion, with its 95 % interval."""
     if not np.isfinite(mode.force_purity).any():
         say_why_empty(axis, "purity needs harmonics")
         return
@@ -59,7 +59,7 @@ def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
 
 
 def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = MAIN) -> None:
-    """Modal frequency and damping over the amplitude, with their 95 % intervals."""
+    """Draw modal frequency and damping over the amplitude, with their 95 % intervals."""
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
     error: dict[str, Any] = {"fmt": "o-", "ms": 4, "color": colour, "capsize": 2, "elinewidth": 0.8}
@@ -89,7 +89,7 @@ def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: st
 
 
 def _keep_small_changes_small(axis: "Axes") -> None:
-    """Let the axis span a fifth of its middle at the least, so that scatter does not look like a trend."""
+    """Let the axis span at least a fifth of its middle value, so that scatter does not look like a trend."""
     low, high = axis.get_ylim()
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.1 * abs(low + high))
     axis.set_ylim(max(0.0, middle - half), middle + half)

@@ -1,4 +1,4 @@
-"""What all figures share: colours, fonts, grid, and how finely a trace is drawn."""
+"""Style shared by all figures: colours, fonts, grid, and resolution of traces."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -40,31 +40,31 @@ TRACE_BINS = 1200
 
 
 def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
-    """Amplitudes in millimetres or micrometres, whichever reads well."""
+    """Convert amplitudes to millimetres or micrometres, whichever reads better; also return the unit."""
     if amplitude_m.size and np.nanmax(amplitude_m) < 5e-4:
         return amplitude_m * 1e6, "µm"
     return amplitude_m * 1e3, "mm"
 
 
 def say_why_empty(axis: "Axes", text: str) -> None:
-    """Why a panel is empty."""
+    """Write into a panel why it is empty."""
     axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED)
     axis.set(xticks=[], yticks=[])
 
 
 def title(page: "Figure", text: str) -> None:
-    """Title at the top left; none where there is no text."""
+    """Write a title at the top left, unless the text is empty."""
     if text:
         page.suptitle(text, fontsize=11, x=0.01, ha="left")
 
 
 def unit_text(unit: str) -> str:
-    """A unit as it stands at an axis."""
+    """Return a unit as written at an axis."""
     return {"m/s2": "m/s²", "m/s^2": "m/s²"}.get(unit, unit)
 
 
 def plain_log(axis: "Axes") -> None:
-    """Plain numbers at a logarithmic axis of errors, a few of them in between where it spans little."""
+    """Label a logarithmic axis of errors with plain numbers, with some intermediate ones if it spans little."""
     from matplotlib.ticker import LogLocator, StrMethodFormatter
 
     low, high = axis.get_ylim()

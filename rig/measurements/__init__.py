@@ -1,4 +1,4 @@
-"""Recordings as measurements in memory, and as experiments for nonlinear state-space models."""
+"""Read recordings as measurements in memory, and as experiments for nonlinear state-space models."""
 
 from rig.measurements.measurements import (
     STEPPED,

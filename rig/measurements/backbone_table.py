@@ -1,4 +1,4 @@
-"""A backbone as a table, one row a point, and back."""
+"""Convert a backbone to a table with one row per point, and back."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ __all__ = ["backbone_from", "backbone_parts"]
 
 
 def backbone_parts(backbone: Backbone) -> Contents:
-    """Arrays over the points; what follows from the others (force, amplitude, lag) is there for the reader."""
+    """Return the arrays over the points, including derived quantities (force, amplitude, lag) for the reader."""
     points, channels = backbone.points, backbone.channels
     arrays: dict[str, Any] = {
         "frequency_hz": backbone.frequency_hz,
@@ -54,7 +54,7 @@ def backbone_parts(backbone: Backbone) -> Contents:
 
 
 def backbone_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Backbone:
-    """Inverse of `backbone_parts`; `IdentificationError`, KeyError or TypeError on what does not fit."""
+    """Convert the output of `backbone_parts` back; raise `IdentificationError`, KeyError or TypeError if it does not fit."""
     channels = tuple(Channel(**channel) for channel in attributes["channels"])
     count = len(arrays["frequency_hz"])
     warnings = attributes.get("warnings") or [()] * count
@@ -79,5 +79,5 @@ def backbone_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> B
 
 
 def _known(values: Any, row: int) -> Any:
-    """A row of values, or None where there is none or it is NaN."""
+    """Return a row of values; None if there are no values or the row is NaN."""
     return None if values is None or np.all(np.isnan(values[row])) else values[row]

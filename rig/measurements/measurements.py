@@ -1,4 +1,4 @@
-"""Recordings as measurements in memory, the form that `identification` takes."""
+"""Read recordings as measurements in memory, in the form that `identification` takes."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -41,63 +41,63 @@ STEPPED = kinds_that_yield(FrequencyResponse)
 
 
 def backbone(recording: Recording) -> Backbone:
-    """The accepted points of a backbone recording that its plan asks for, in the order of the plan.
+    """Return the accepted points of a backbone recording that belong to the current plan, in the order of the plan.
 
-    Of a continuous backbone the means of up and down, which know nothing of what lay between the two (`continuous_backbones`).
-
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    For a continuous backbone these are the means of up and down, without the differences between them (see
+    `continuous_backbones`). Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if
+    there is no point.
     """
     return cast(Backbone, _measured(recording, Backbone))
 
 
 def continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
-    """The accepted points of a continuous backbone, one per repeat, with what was found on the way up and on the way down.
+    """Return the accepted points of a continuous backbone, one backbone per repeat, with the results of the ways up and down.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no point.
     """
     return cast(tuple[ContinuousBackbone, ...], _measured(recording, ContinuousBackbone))
 
 
 def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a stepped-sine, stepped-phase or response-controlled recording: fundamentals of force and drive.
+    """Return the fundamentals of force and drive of a stepped-sine, stepped-phase or response-controlled recording.
 
-    One response per level and pass, in the order of measurement, which for stepped phase is that along the branch. Raises
-    `RecordingError` for a recording of another kind, `identification.IdentificationError` without any point.
+    There is one response per level and pass, with its accepted points in the order of measurement; for stepped phase this is
+    the order along the branch. Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if
+    there is no point.
     """
     return cast(tuple[FrequencyResponse, ...], _measured(recording, FrequencyResponse))
 
 
 def dwell_course(recording: Recording) -> DwellCourse:
-    """Frequency, damping, amplitude and force of every accepted mean of a dwell, over cycles and time.
+    """Return frequency, damping, amplitude and force of every accepted mean of a dwell, over cycles and time.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any mean.
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no mean.
     """
     return cast(DwellCourse, _measured(recording, DwellCourse))
 
 
 def force_surface(recording: Recording) -> ForceSurface:
-    """The force over frequency and displacement, from the levels of a response-controlled or stepped-sine recording.
+    """Return the force over frequency and displacement, from the levels of a response-controlled or stepped-sine recording.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` for levels other
-    than held displacements, and for fewer than three.
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if the levels are not held
+    displacements or if there are fewer than three.
     """
     return surface_of(frequency_responses(recording))
 
 
 def sweeps(recording: Recording) -> dict[int, Transient]:
-    """Fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
+    """Return the fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
 
     The output is channel ``voltage``.
-
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any sweep.
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no sweep.
     """
     return cast(dict[int, Transient], _measured(recording, Transient))
 
 
 def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
-    """Spectra of every accepted realisation, by level (V RMS); the output is channel ``voltage``.
+    """Return the spectra of every accepted realisation, by level (V RMS). The output is channel ``voltage``.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no realisation.
     """
     return cast(dict[float, PeriodicSpectra], _measured(recording, PeriodicSpectra))
 
@@ -105,16 +105,16 @@ def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
 def response_matrices(
     recording: Recording, *, estimator: Estimator = "instrument"
 ) -> dict[float, FrequencyResponseMatrix]:
-    """Frequency responses from the force to every motion, by level (V RMS), with their covariance.
+    """Return the frequency responses from the force to every motion, by level (V RMS), with their covariance.
 
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` without any realisation.
+    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no realisation.
     """
     found = _measured(recording, FrequencyResponseMatrix, estimator=estimator)
     return cast(dict[float, FrequencyResponseMatrix], found)
 
 
 def load_backbone(path: Path) -> Backbone:
-    """`backbone` of a file."""
+    """Return the `backbone` in a file."""
     with Recording(path) as recording:
         return backbone(recording)
 

@@ -1,4 +1,4 @@
-"""Points of a plan that a model knows nothing of, said in one line."""
+"""Summarise in one line the points of a plan that a model does not include."""
 
 from collections import Counter
 
@@ -12,7 +12,10 @@ _NOT_REACHED = "the recording ended before it"
 
 
 def points_left_out(recording: Recording) -> tuple[str, ...]:
-    """One note with how many points of the plan were not accepted, at which levels, and the first reason; none if all were."""
+    """Return one note on the points of the plan that were not accepted; an empty tuple if all were.
+
+    The note has their number, their levels, and the first reason.
+    """
     plan = plan_from(recording.configuration["plan"], "plan of the recording")
     targets = plan.targets()
     points = {point.number: point for point in points_of(recording)}

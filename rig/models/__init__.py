@@ -1,1 +1,1 @@
-"""Models, predictions and imported measurements: their files, and how they come from recordings."""
+"""Models, predictions and imported measurements: their files, and their identification from recordings."""

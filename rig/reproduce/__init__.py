@@ -1,1 +1,1 @@
-"""The campaign of the paper on a virtual rig: recordings, models of all levels, error tables, predictions against the truth."""
+"""Reproduction of the paper's campaign on a virtual rig: recordings, models at all levels, error tables, predictions."""

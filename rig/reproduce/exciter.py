@@ -1,4 +1,4 @@
-"""The exciter of a study, identified from its own multisine."""
+"""Exciter model of a study, identified from a separate multisine."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ __all__ = ["exciter_of"]
 
 
 def exciter_of(options: Options, say: Callable[[str], None]) -> Exciter:
-    """What drives the specimen, to be coupled to models whose input is the force."""
+    """Identify the exciter that is coupled to models whose input is the force."""
     with Recording(recorded(options, options.specimen.exciter, say)) as recording:
         measured = next(iter(spectra(recording).values()))
         rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])

@@ -1,4 +1,4 @@
-"""Figures of a study: errors by training set, steady responses with the truth, sweeps."""
+"""Figures of a study: errors by training set, steady responses with the true ones, sweeps."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ _SEED = 0
 
 
 def draw_study(study: Study) -> None:
-    """Write ``errors.png``, ``steady.png`` and ``sweeps.png``, those that there is something for."""
+    """Write ``errors.png``, and ``steady.png`` and ``sweeps.png`` if there are such results."""
     _write(study, "errors", _errors, (9.0, 3.8))
     if study.steady:
         _write(study, "steady", _steady, (9.0, 6.4))
@@ -45,7 +45,7 @@ def _write(study: Study, name: str, draw: Callable[["Figure", Study], None], siz
 
 
 def _errors(page: "Figure", study: Study) -> None:
-    """Every test as a dot: a panel per training set, a column per test level; what is unbounded is counted on top."""
+    """Draw every test as a dot: one panel per training set, one column per test level; count unbounded tests at the top."""
     table = study.table
     axes = page.subplots(1, len(table.training_sets), sharey=True, squeeze=False)[0]
     random = np.random.default_rng(_SEED)
@@ -72,7 +72,10 @@ def _errors(page: "Figure", study: Study) -> None:
 
 
 def _steady(page: "Figure", study: Study) -> None:
-    """A row for what is held, a column per force: selected models, and the rig; of a pure sine its peak alone."""
+    """Draw selected models and the rig: one row per held quantity, one column per force.
+
+    For a pure sine, the rig is shown by its backbone and its peak.
+    """
     forces = study.options.specimen.forces_n
     rows = list(dict.fromkeys(truth.held for truth in study.truths))
     axes = page.subplots(len(rows), len(forces), squeeze=False)
@@ -102,7 +105,7 @@ def _steady(page: "Figure", study: Study) -> None:
 
 
 def _curve(axis: Any, one: Steady, colour: Any) -> None:
-    """Branch by branch: nothing is known between them."""
+    """Draw each branch separately, because nothing is known between branches."""
     assert one.prediction is not None
     amplitude = 1e3 * one.prediction.amplitude_m()
     for branch in np.unique(one.prediction.branch):
@@ -112,7 +115,7 @@ def _curve(axis: Any, one: Steady, colour: Any) -> None:
 
 
 def _sweeps(page: "Figure", study: Study) -> None:
-    """One panel per sweep: envelopes over the frequency of the plan."""
+    """Draw one panel per sweep with the envelopes over the frequency of the plan."""
     names = list(dict.fromkeys(one.sweep for one in study.sweeps))
     axes = page.subplots(len(names), 1, squeeze=False)[:, 0]
     colours = _colours(study)
@@ -136,7 +139,7 @@ def _sweeps(page: "Figure", study: Study) -> None:
 
 
 def _around(axis: Any, truth: Truth, wide: Truth, band_hz: tuple[float, float]) -> None:
-    """The resonance, as wide as that of ``wide``, and what models make of it next to it, within the band."""
+    """Set the axes to the resonance, with the width of the resonance in ``wide`` and some margin, within the band."""
     responses = wide.responses
     near = responses.frequency_hz[responses.amplitude_m > 0.15 * responses.amplitude_m.max()]
     margin = 0.5 * np.ptp(near)
@@ -145,7 +148,7 @@ def _around(axis: Any, truth: Truth, wide: Truth, band_hz: tuple[float, float]) 
 
 
 def _few_numbers(value: float, _: int) -> str:
-    """Twos and fives between powers of ten."""
+    """Label only twos and fives between powers of ten."""
     return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 

@@ -1,4 +1,4 @@
-"""The folder of a study: what is in it is taken up, and nothing else is mixed with it."""
+"""Folder of a study. Existing results are reused, and results of other settings are refused."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ __all__ = ["prepare", "write_json"]
 
 
 def prepare(options: Options) -> None:
-    """Make the folders; `RecordingError` where one holds a study of other settings, or cannot be made."""
+    """Create the folders; raise `RecordingError` if one contains a study with other settings, or cannot be created."""
     try:
         options.recordings.mkdir(parents=True, exist_ok=True)
         options.models_folder.mkdir(parents=True, exist_ok=True)
@@ -23,7 +23,7 @@ def prepare(options: Options) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a document whole or not at all; `RecordingError` where it cannot be."""
+    """Write a document completely or not at all; raise `RecordingError` if it cannot be written."""
     new = path.with_name(path.name + ".new")
     try:
         new.write_text(json.dumps(value, indent=1), encoding="utf-8")
@@ -33,7 +33,7 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def _same(path: Path, settings: dict[str, Any]) -> None:
-    """Keep the settings, or refuse others than those that are kept."""
+    """Store the settings, or refuse them if other settings are stored already."""
     settings = json.loads(json.dumps(settings))
     if not path.exists():
         write_json(path, settings)

@@ -1,4 +1,4 @@
-"""The models of a study: identified once, each kept as it comes."""
+"""Models of a study. Each is identified once and stored as soon as it is finished."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,8 @@ from rig.reproduce.options import Options
 __all__ = ["Models", "identify_all"]
 
 _CHOOSES = 3
-"""Every third of the experiments beside the multisines is not fitted and chooses the iterate with those that do."""
+"""Every third of the experiments besides the multisines is not fitted; together with the held-out multisines it chooses the
+iterate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +34,14 @@ class Models:
     """All models of a study."""
 
     jobs: tuple[ModelJob, ...]
-    """What each was identified from."""
+    """Data from which each model was identified."""
     fits: Mapping[str, PnlssFit]
-    """By name."""
+    """Fits by name of the model."""
     failures: Mapping[str, str]
-    """Reasons of those that could not be identified, by name."""
+    """Why models could not be identified, by name of the model."""
 
     def times(self) -> list[dict[str, Any]]:
-        """Per training set: number of models, seconds and iterations of their fits over time."""
+        """Return for each training set: the number of models, and the times and iterations of their fits."""
         found = []
         for training_set in dict.fromkeys(job.training_set for job in self.jobs):
             fits = [self.fits[j.name] for j in self.jobs if j.training_set == training_set and j.name in self.fits]
@@ -68,7 +69,7 @@ def identify_all(
     beside: Sequence[Experiment],
     say: Callable[[str], None],
 ) -> Models:
-    """Identify what is not in the folder yet. `KeyboardInterrupt` leaves there what was finished."""
+    """Identify the models that are not in the folder yet. After `KeyboardInterrupt`, the finished models are in the folder."""
     jobs = realisation_combinations(
         levels,
         models=options.counts,
@@ -86,7 +87,7 @@ def identify_all(
         _identify,
         states=options.model_states,
         degrees=() if options.saturating else specimen.degrees,
-        # The voltage acts on the states alone; monomials of outputs fit no better, and extrapolate far worse.
+        # The voltage acts on the states alone; monomials of the outputs fit no better, and extrapolate far worse.
         output_degrees=() if options.input == "voltage" or options.saturating else specimen.degrees,
         saturating=options.saturating,
         band_hz=specimen.excited_hz,
@@ -107,7 +108,7 @@ def identify_all(
 
 
 def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment], **how: Any) -> PnlssFit:
-    """One model; a fit that Ctrl-C has cut short is none."""
+    """Identify one model; raise `KeyboardInterrupt` if Ctrl-C has cut the fit short."""
     fit: PnlssFit = identify_pnlss(training, validation=validation, **how)
     if fit.interrupted:
         raise KeyboardInterrupt

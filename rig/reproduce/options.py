@@ -1,4 +1,4 @@
-"""What a study is asked for, and where in its folder everything is."""
+"""Options of a study, and the places of all files in its folder."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,50 +13,51 @@ from rig.reproduce.specimens import Specimen
 __all__ = ["INPUTS", "PAPER", "PARTS", "Options"]
 
 PAPER = "paper"
-"""In place of a number of models: as many as the paper has."""
+"""Value of ``models`` that selects the numbers of models in the paper."""
 _SATURATING = 60
-"""Iterations that saturating features need at least: their weights begin at random."""
+"""Fewest iterations with saturating features, because their weights begin at random."""
 INPUTS = ("force", "voltage")
 PARTS = ("steady", "sweeps")
-"""What a study can do without."""
+"""Parts of a study that can be left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """A study of one specimen."""
+    """Options of a study of one specimen."""
 
     specimen: Specimen
-    """What the paper did with it."""
+    """The specimen, with the settings of the paper."""
     bench: Bench
     """The virtual bench that is tested, without scatter."""
     folder: Path
-    """Where everything is kept."""
+    """Folder for all files."""
     models: int | str = 5
-    """Models of each training set, or ``paper``."""
+    """Number of models of each training set, or ``paper``."""
     scatter: float = 0.0
-    """Relative standard deviation of modal frequencies from run to run; above 0 each realisation is a run of its own."""
+    """Relative standard deviation of modal frequencies from run to run; above 0 each realisation is a separate run."""
     input: str = "force"
-    """What goes into the models."""
+    """Input of the models: ``force`` or ``voltage``."""
     with_backbone: bool = False
-    """Whether points of a backbone are fitted beside the multisines."""
+    """Whether points of a backbone are fitted together with the multisines."""
     saturating: int = 0
-    """Number of saturating features of each equation, in place of the monomials."""
+    """Number of saturating features of each equation, which replace the monomials."""
     states: int | None = None
-    """States of the models; None for the paper's number."""
+    """Number of states of the models; None for that of the paper."""
     realisations: int | None = None
-    """Realisations of each level that a model is fitted to, at most; None for all but the two that choose and test."""
+    """Largest number of realisations of each level to which a model is fitted; None for all but the two for validation and
+    test."""
     iterations: int | None = None
-    """Iterations of a fit, at most; None for the usual number."""
+    """Largest number of iterations of a fit; None for the default."""
     levels: int | None = None
-    """How many of the specimen's levels, from the lowest; None for all."""
+    """Number of the specimen's levels to use, from the lowest; None for all."""
     channel: str = "drive"
-    """Output whose errors the tables have."""
+    """Output whose errors are listed in the tables."""
     jobs: int = 1
-    """Models that are identified at the same time."""
+    """Number of models that are identified in parallel."""
     seed: int = 0
     """Seed of noise, scatter and phases."""
     without: frozenset[str] = frozenset()
-    """What is left out."""
+    """Parts that are left out."""
 
     def __post_init__(self) -> None:
         if self.bench.driver.name != "virtual":
@@ -83,12 +84,12 @@ class Options:
 
     @property
     def plans(self) -> dict[str, str]:
-        """Multisine plans by level, those that are used."""
+        """Multisine plans of the levels used, by level."""
         return dict(list(self.specimen.levels.items())[: self.levels])
 
     @property
     def counts(self) -> int | Mapping[str, int]:
-        """Models of every training set."""
+        """Number of models of every training set."""
         if isinstance(self.models, int):
             return self.models
         sets = (*self.plans, *(("mixed",) if self.mixed else ()))
@@ -96,27 +97,27 @@ class Options:
 
     @property
     def mixed(self) -> bool:
-        """Whether there is a set of all levels: of one alone there is none."""
+        """Whether there is a training set of all levels, which needs more than one level."""
         return len(self.plans) > 1
 
     @property
     def model_states(self) -> int:
-        """States of the models."""
+        """Number of states of the models."""
         return self.specimen.states if self.states is None else self.states
 
     @property
     def fit_settings(self) -> FitSettings:
-        """Of every fit."""
+        """Settings of every fit."""
         of = self.specimen
         usual = max(of.iterations, _SATURATING) if self.saturating else of.iterations
         most = usual if self.iterations is None else self.iterations
-        # From random weights, steps of a part of the samples end in poor places: 7 % in place of 1 % at the same level.
+        # From random weights, steps with a part of the samples end in poor minima: 7 % instead of 1 % at the same level.
         every = 1 if self.saturating else of.every
         return FitSettings(iterations=most, patience=of.patience, every=every)
 
     @property
     def variant(self) -> str:
-        """What tells these models from others of the same recordings: the name of their folder."""
+        """Name of the models' folder, which distinguishes them from other models of the same recordings."""
         backbone = "-backbone" if self.with_backbone else ""
         saturating = f"-tanh{self.saturating}" if self.saturating else ""
         states = f"-n{self.model_states}" if self.model_states != self.specimen.states else ""
@@ -134,12 +135,12 @@ class Options:
         return self.folder / self.variant / "models"
 
     def result(self, name: str) -> Path:
-        """A file of results."""
+        """Return the path of a result file."""
         return self.folder / self.variant / name
 
     @property
     def of_the_recordings(self) -> dict[str, Any]:
-        """What may not change while the recordings stay."""
+        """Settings that must not change while the recordings are kept."""
         return {
             "specimen": self.specimen.name,
             "bench": self.bench.model_dump(mode="json"),
@@ -149,5 +150,5 @@ class Options:
 
     @property
     def of_the_models(self) -> dict[str, Any]:
-        """What may not change while the models stay; their number may."""
+        """Settings that must not change while the models are kept. The number of models may change."""
         return {"variant": self.variant, "iterations": self.fit_settings.iterations, "levels": list(self.plans)}

@@ -1,4 +1,4 @@
-"""The recordings of a study: made once, taken up where they were interrupted."""
+"""Recordings of a study. Each is made once, and resumed where it was interrupted."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,12 +21,12 @@ from rig.show.progress import RunProgress
 __all__ = ["multisines", "recorded", "segments", "training_data"]
 
 _REDRAWN = 20
-"""Times that the phases of a realisation are drawn anew, where its peaks are beyond the bench's limits."""
+"""Largest number of new draws of a realisation's phases if its peaks are beyond the bench's limits."""
 _STOPPED = "stop_requested"
 
 
 def multisines(options: Options, say: Callable[[str], None]) -> dict[str, tuple[Experiment, ...]]:
-    """All realisations by level."""
+    """Return all realisations by level."""
     found: dict[str, tuple[Experiment, ...]] = {}
     for level, name in options.plans.items():
         plan = _multisine(options, name)
@@ -40,12 +40,12 @@ def multisines(options: Options, say: Callable[[str], None]) -> dict[str, tuple[
 
 
 def segments(options: Options, say: Callable[[str], None]) -> tuple[Experiment, ...]:
-    """Points of the backbone, to be fitted beside multisines."""
+    """Return the points of the backbone that are fitted together with multisines."""
     return training_data(options, recorded(options, options.specimen.backbone, say))
 
 
 def recorded(options: Options, name: str, say: Callable[[str], None]) -> Path:
-    """The recording of a shipped plan, one run with a seed of its own."""
+    """Record a shipped plan in one run with a separate seed; return the path of the recording."""
     path = options.recordings / f"{name}.h5"
     if not path.exists():
         say(f"{name}: recording")
@@ -55,7 +55,7 @@ def recorded(options: Options, name: str, say: Callable[[str], None]) -> Path:
 
 
 def _own_run(options: Options, name: str, plan: MultisinePlan, index: int) -> Path:
-    """One realisation as a run with a seed of its own: the specimen then is another one."""
+    """Record one realisation as a run with a separate seed. With scatter, each run has another specimen."""
     path = options.recordings / f"{name}-{index:02d}.h5"
     seed = _seed(options, name) + 1 + index
     for draw in range(_REDRAWN):
@@ -70,7 +70,10 @@ def _own_run(options: Options, name: str, plan: MultisinePlan, index: int) -> Pa
 
 
 def _make(plan: Plan, bench: Bench, path: Path, seed: int, *, quiet: bool = False) -> bool:
-    """Record, finish, or leave what is complete; whether it is. `KeyboardInterrupt` where the user stopped it."""
+    """Record or resume a run, or leave a complete one; return whether it is complete.
+
+    Raises `KeyboardInterrupt` if the user stopped it.
+    """
     if path.exists() and not journal_path(path).exists():
         with Recording(path) as recording:
             if recording.complete:
@@ -78,7 +81,7 @@ def _make(plan: Plan, bench: Bench, path: Path, seed: int, *, quiet: bool = Fals
     shown = RunProgress(KINDS[plan.kind].columns)
     watcher: Progress = Silent() if quiet else shown
     try:
-        if path.exists() or journal_path(path).exists():  # tripped levels are tried again: these rigs are virtual
+        if path.exists() or journal_path(path).exists():  # tripped levels may be tried again, as these rigs are virtual
             recording = take_up(path, RunOptions(progress=watcher), retry_tripped=True)
         else:
             recording = carry_out(plan, bench, path, RunOptions(seed=seed, progress=watcher))
@@ -93,7 +96,7 @@ def _make(plan: Plan, bench: Bench, path: Path, seed: int, *, quiet: bool = Fals
 
 
 def training_data(options: Options, path: Path, *, given: str | None = None) -> tuple[Experiment, ...]:
-    """Experiments of a recording, as the models of this study want them, or with another input ``given``."""
+    """Return the experiments of a recording in the form that the models of this study need, or with another input ``given``."""
     by = options.input if given is None else given
     outputs = (*(("force",) if by == "voltage" else ()), *options.specimen.outputs)
     with Recording(path) as recording:
@@ -107,7 +110,7 @@ def _multisine(options: Options, name: str) -> MultisinePlan:
 
 
 def _bench(options: Options) -> Bench:
-    """The bench, scattering if that was asked for."""
+    """Return the bench, with scatter if that was requested."""
     if not options.scatter:
         return options.bench
     driver = options.bench.driver
@@ -118,7 +121,7 @@ def _bench(options: Options) -> Bench:
 
 
 def _seed(options: Options, name: str) -> int:
-    """A seed for every plan, from that of the study; the thousand after it are for its runs."""
+    """Return the seed of a plan, derived from that of the study; the next thousand seeds are for single runs of the plan."""
     specimen = options.specimen
     names = [*specimen.levels.values(), specimen.backbone, specimen.exciter, *specimen.sweeps]
     return options.seed * 1_000_000 + 1000 * names.index(name)

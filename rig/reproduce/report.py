@@ -1,4 +1,4 @@
-"""A study as text, and as files: the table as JSON and CSV."""
+"""Report of a study as text, and its tables as JSON and CSV files."""
 
 import csv
 import io
@@ -33,7 +33,7 @@ _ERROR_COLUMNS = (
 
 
 def write_tables(study: Study) -> None:
-    """``table.json`` with everything, ``errors.csv`` with the error tables; `RecordingError` where they cannot be written."""
+    """Write ``table.json`` with everything and ``errors.csv`` with the error tables; raise `RecordingError` if this fails."""
     summary = study.summary()
     write_json(study.options.result("table.json"), _plain(summary))
     text = io.StringIO()
@@ -50,7 +50,7 @@ def write_tables(study: Study) -> None:
 
 
 def say_study(study: Study) -> None:
-    """Print what a person wants to read."""
+    """Print the results for a person."""
     options = study.options
     scatter = f", {100 * options.scatter:g} % scatter from run to run" if options.scatter else ""
     print(f"{options.specimen.name}, models {options.variant}{scatter}")
@@ -66,7 +66,7 @@ def say_study(study: Study) -> None:
 
 
 def _say_variants(study: Study) -> None:
-    """What each remedy that needs no further fit buys, over all models."""
+    """Print the errors of the variants that need no further fit, over all models."""
     print("what else the fits offer, all models:")
     rows = []
     for name, table in study.tables.items():
@@ -145,7 +145,7 @@ def _say_sweeps(study: Study) -> None:
 
 
 def _say_others(options: Options) -> None:
-    """The same errors of other kinds of models of these recordings, as far as they are in the folder."""
+    """Print the same errors for other kinds of models of these recordings, if they are in the folder."""
     main = next(iter(VARIANTS))
     rows = []
     for path in sorted(options.folder.glob("*/table.json")):
@@ -170,7 +170,7 @@ def _say_others(options: Options) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """The same with null for numbers that do not exist."""
+    """Return the value with null for numbers that are not finite."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""What the paper tested and how it identified it, and what stands for that here."""
+"""Specimens of the paper, with its identification settings and the shipped plans that correspond to its tests."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,37 +13,37 @@ class Specimen:
     """A specimen of Scheel et al. with the shipped plans of its campaign."""
 
     name: str
-    """Name of its bench, and the folder of its plans."""
+    """Name of the specimen's bench and of the folder of its plans."""
     levels: Mapping[str, str]
     """Multisine plans by level (force, RMS), lowest first."""
     paper_models: Mapping[str, int]
-    """Number of models that the paper identified, by training set."""
+    """Number of models identified in the paper, by training set."""
     states: int
-    """States of the paper's models."""
+    """Number of states of the paper's models."""
     degrees: tuple[int, ...]
-    """Degrees of their monomials, in states and outputs."""
+    """Degrees of the monomials, in states and outputs."""
     rate_hz: float
-    """Sample rate of the models."""
+    """Sample rate of the models, Hz."""
     excited_hz: tuple[float, float]
-    """Band of the multisines. The force has distortion beyond it, which is no excitation for a linear start."""
+    """Band of the multisines, Hz. Beyond it the force contains only distortion, which cannot be used for the linear start."""
     outputs: tuple[str, ...]
     """Motions that the models have as outputs, the drive point first."""
     band_hz: tuple[float, float]
-    """Frequencies between which steady responses are followed."""
+    """Frequency range of steady responses, Hz."""
     forces_n: tuple[float, ...]
-    """Forces of steady predictions, peak."""
+    """Forces of steady predictions, N peak."""
     sweeps: tuple[str, ...]
     """Sweep plans."""
     iterations: int
-    """Of a fit, at most."""
+    """Largest number of iterations of a fit."""
     patience: int
     """Iterations without a smaller validation error after which a fit ends."""
     every: int = 1
-    """One of so many samples makes the Hessian of a step."""
+    """Every how many samples one is used for the Hessian of a step."""
     backbone: str = "backbone-fine"
-    """Plan of the backbone whose points can be trained on beside the multisines."""
+    """Plan of the backbone whose points can be used for training together with the multisines."""
     exciter: str = "exciter"
-    """Plan for the exciter model, with which a constant force is one that an exciter makes."""
+    """Plan of the multisine for the exciter model, which predicts a constant force as an exciter makes it."""
 
 
 SPECIMENS = {
@@ -55,7 +55,7 @@ SPECIMENS = {
         degrees=(2, 3),
         rate_hz=800.0,
         excited_hz=(15.0, 35.0),
-        # The paper has two accelerometers; with the true drive point for one of them an exciter can be coupled.
+        # The paper has two accelerometers. One of them is replaced by the true drive point, so that an exciter can be coupled.
         outputs=("drive", "acc_magnet"),
         band_hz=(22.0, 27.0),
         forces_n=(0.25, 0.55),
@@ -74,18 +74,18 @@ SPECIMENS = {
         outputs=("drive", "acc_left", "acc_right"),  # the paper has one more
         band_hz=(138.0, 158.0),
         forces_n=(2.0, 5.0, 15.0),
-        # Validation errors are least after 5 to 15 iterations; what comes later fits the training data alone.
+        # Validation errors are smallest after 5 to 15 iterations; later iterations fit the training data alone.
         iterations=30,
         patience=10,
         every=8,
         sweeps=("sweep-1", "sweep-2"),
     ),
 }
-"""By the name that ``rig reproduce`` takes."""
+"""Specimens by the name that ``rig reproduce`` takes."""
 
 
 def specimen_of(name: str) -> Specimen:
-    """A specimen by name; `ConfigurationError` for any other."""
+    """Return a specimen by name; raise `ConfigurationError` for an unknown name."""
     if name not in SPECIMENS:
         raise ConfigurationError(f"specimen {name!r}: allowed is {', '.join(SPECIMENS)}")
     return SPECIMENS[name]

@@ -1,4 +1,4 @@
-"""Steady peaks that the selected models predict, beside those of the virtual rig itself."""
+"""Steady peaks predicted by the selected models, compared with those of the virtual rig itself."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -22,26 +22,26 @@ __all__ = ["Steady", "steady"]
 
 @dataclass(frozen=True, eq=False)
 class Steady:
-    """One predicted response with the truth that it is held against."""
+    """One predicted response with the true response of the rig."""
 
     training_set: str
-    """Of the model."""
+    """Training set of the model."""
     model: str
-    """Its name."""
+    """Name of the model."""
     truth: Truth
-    """What the rig does."""
+    """True response of the rig."""
     prediction: SteadyPrediction | None
-    """None where there is none."""
+    """Predicted response; None if there is none."""
     reason: str
-    """Why not."""
+    """Why there is no prediction."""
 
     @property
     def complete(self) -> bool:
-        """Whether the response goes from one end of the band to the other: else its largest amplitude may be no peak."""
+        """Whether the response covers the whole band. Otherwise its largest amplitude may not be a peak."""
         return self.prediction is not None and self.prediction.complete
 
     def row(self) -> dict[str, Any]:
-        """Numbers for tables and JSON."""
+        """Return the numbers for tables and JSON."""
         head = {
             "training_set": self.training_set,
             "model": self.model,
@@ -78,11 +78,11 @@ class Steady:
 def steady(
     options: Options, models: Mapping[str, tuple[str, PnlssModel]], say: Callable[[str], None]
 ) -> tuple[list[Steady], tuple[Truth, ...]]:
-    """Predictions of the selected models (by training set), and what the rig does.
+    """Return the predictions of the selected models (by training set), and the true responses of the rig.
 
-    A force-input model answers a pure sine, as in the paper, and with the identified exciter coupled a constant fundamental. A
-    voltage-input model has its exciter inside: it answers a constant voltage, and a constant fundamental of the force that
-    it has among its outputs.
+    A force-input model predicts the response to a pure sine, as in the paper, and with the identified exciter that at constant
+    fundamental. A voltage-input model contains its exciter: it predicts the response at constant voltage, and at a constant
+    fundamental of the force, which is among its outputs.
     """
     known = truths(options)
     exciter = exciter_of(options, say) if options.input == "force" else None

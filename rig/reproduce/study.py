@@ -1,4 +1,4 @@
-"""`rig reproduce`: record, identify, test, predict, one after the other, all of it kept in a folder."""
+"""`rig reproduce`: record, identify, test and predict in sequence, and keep all results in a folder."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ VARIANTS: dict[str, Callable[[PnlssFit], PnlssModel | None]] = {
     "chosen, monomials bounded": lambda fit: fit.model.bounded(),
     "linear start": lambda fit: fit.linear,
 }
-"""What a fit offers without another one, by what it is called in tables; the first is the model."""
+"""Models that a single fit offers, by their name in tables. The first is the identified model itself."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,7 +29,7 @@ class Study:
     """All results of a study."""
 
     options: Options
-    """What was asked for."""
+    """Options of the study."""
     models: Models
     """All models."""
     tables: Mapping[str, ErrorTable]
@@ -37,17 +37,17 @@ class Study:
     steady: Sequence[Steady] = ()
     """Steady predictions of the selected models."""
     truths: Sequence[Truth] = ()
-    """What the rig does."""
+    """True responses of the rig."""
     sweeps: Sequence[SweepResult] = ()
     """Sweeps simulated by the selected models."""
 
     @property
     def table(self) -> ErrorTable:
-        """That of the models themselves."""
+        """Error table of the identified models themselves."""
         return self.tables[next(iter(VARIANTS))]
 
     def summary(self) -> dict[str, Any]:
-        """Everything in one JSON-able dictionary."""
+        """Return everything in one JSON-able dictionary."""
         options = self.options
         return {
             "kind": "reproduction",
@@ -71,11 +71,11 @@ class Study:
 
 
 def reproduce(options: Options, say: Callable[[str], None]) -> Study:
-    """Carry out a study, or what is missing of it in its folder.
+    """Carry out a study, or the parts of it that are missing in its folder.
 
-    ``say`` is given a line for everything that is begun or finished. Raises `rig.errors.RigError` where something cannot be
-    recorded or written, `identification.IdentificationError` where no model can be identified, `KeyboardInterrupt` after
-    Ctrl-C: the same call takes the folder up again.
+    ``say`` receives a line for everything that begins or is finished. Raises `rig.errors.RigError` if something cannot be
+    recorded or written, `identification.IdentificationError` if no model can be identified, and `KeyboardInterrupt` after
+    Ctrl-C. The same call then resumes the study in its folder.
     """
     prepare(options)
     levels = multisines(options, say)

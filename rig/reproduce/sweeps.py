@@ -1,4 +1,4 @@
-"""Sweeps that the selected models simulate from force or voltage as measured, beside the recorded ones."""
+"""Sweeps simulated by the selected models from measured force or voltage, compared with the recorded ones."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,40 +19,40 @@ __all__ = ["COUPLED", "SweepResult", "simulated_sweeps"]
 
 COUPLED = "voltage, exciter coupled"
 _LOWEST = 0.8
-"""Of the lowest frequency of a sweep: from there on the exciter's reaction is exact."""
+"""Part of the lowest frequency of a sweep above which the exciter's reaction is exact."""
 
 _BINS = 400
 
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """One recorded sweep as one model simulates it."""
+    """One recorded sweep as simulated by one model."""
 
     sweep: str
-    """Name of its plan."""
+    """Name of the sweep's plan."""
     training_set: str
-    """Of the model."""
+    """Training set of the model."""
     model: str
-    """Its name."""
+    """Name of the model."""
     given: str
-    """What it is simulated from: the measured ``force`` or ``voltage``, or the voltage with the exciter coupled."""
+    """Excitation of the simulation: the measured ``force`` or ``voltage``, or the voltage with the exciter coupled."""
     seconds: NDArray[np.float64]
-    """Middles of the bins [n] in which envelopes are taken, from the beginning of the sweep."""
+    """Centres of the bins [n] in which envelopes are taken, from the beginning of the sweep, s."""
     frequency_hz: NDArray[np.float64]
-    """Frequency that the plan has there [n]."""
+    """Frequency of the plan at these times [n], Hz."""
     measured: NDArray[np.float64]
-    """Largest magnitude of the drive channel in each bin [n]."""
+    """Largest recorded magnitude of the drive channel in each bin [n]."""
     simulated: NDArray[np.float64]
-    """The same of the simulation [n]; NaN from where it is unbounded."""
+    """Largest simulated magnitude of the drive channel in each bin [n]; NaN after the simulation became unbounded."""
     rms_error: float
     """Relative RMS error over the sweep; inf if unbounded."""
     range_use: float
     """Largest state or input over the largest in the training data."""
     unbounded_at_s: float | None
-    """When the simulation left all bounds, 0 if before the sweep began; None if it did not."""
+    """Time at which the simulation became unbounded, 0 if before the sweep began; None if it stayed bounded."""
 
     def row(self) -> dict[str, Any]:
-        """Numbers for tables and JSON."""
+        """Return the numbers for tables and JSON."""
         bounded = self.unbounded_at_s is None
         top, here = int(np.argmax(self.measured)), int(np.argmax(self.simulated)) if bounded else 0
         return {
@@ -74,7 +74,10 @@ class SweepResult:
 def simulated_sweeps(
     options: Options, models: Mapping[str, tuple[str, PnlssModel]], say: Callable[[str], None]
 ) -> list[SweepResult]:
-    """Every sweep of the specimen by every selected model, from what goes into it; force-input models from the voltage too."""
+    """Simulate every sweep of the specimen with every selected model, from the measured input of the model.
+
+    Force-input models are also simulated from the voltage, with the exciter coupled.
+    """
     found = []
     exciter = exciter_of(options, say) if options.input == "force" else None
     for sweep in options.specimen.sweeps:
@@ -113,7 +116,7 @@ def _simulated(
     )
     least = int(
         np.ceil(experiment.sample_rate_hz / min(plan.start_hz, plan.stop_hz))
-    )  # a period, or an envelope is none
+    )  # an envelope needs at least one period
     width = max(least, there.size // _BINS)
     seconds = (np.arange(there.size // width) + 0.5) * width / experiment.sample_rate_hz
     swept = max(0.0, experiment.counted / experiment.sample_rate_hz - plan.duration_s)
@@ -134,5 +137,5 @@ def _simulated(
 
 
 def _largest(values: NDArray[np.float64], width: int) -> NDArray[np.float64]:
-    """Largest magnitude in bins of so many values."""
+    """Return the largest magnitude in bins of ``width`` values."""
     return np.asarray(np.abs(values[: values.size // width * width]).reshape(-1, width).max(axis=1))

@@ -1,4 +1,4 @@
-"""Steady vibrations of the virtual rig itself, which predictions are held against."""
+"""Steady vibrations of the virtual rig itself, with which predictions are compared."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -25,24 +25,25 @@ _FREQUENCIES = 81
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The rig's resonance at one level of what is held."""
+    """Resonance of the rig at one level of the held quantity."""
 
     held: Held
-    """``pure-sine`` and ``fundamental`` of a force, with the harmonics that the exciter makes; ``voltage`` of a sine of it."""
+    """Held quantity: ``pure-sine`` (force without harmonics), ``fundamental`` (of a force with the exciter's harmonics) or
+    ``voltage`` (a sine)."""
     level: float
-    """Peak of what is held, N or V."""
+    """Peak of the held quantity, N or V."""
     force_n: float
-    """Force of the campaign that it belongs to: of a voltage, that which the rig has at resonance under it."""
+    """Force of the campaign to which the level belongs. For a voltage, it is the rig's force at resonance at this voltage."""
     responses: PeriodicResponses
-    """Through resonance; of a pure sine the backbone up to this force."""
+    """Responses through resonance; for a pure sine, the backbone up to this force."""
     amplitude_m: float
-    """Largest amplitude of the drive point."""
+    """Largest amplitude of the drive point, m."""
     frequency_hz: float
-    """Where."""
+    """Frequency of the largest amplitude, Hz."""
 
     @classmethod
     def of(cls, held: Held, level: float, force_n: float, responses: PeriodicResponses) -> "Truth":
-        """With the largest amplitude among the responses."""
+        """Create the truth, with the largest amplitude among the responses."""
         top = int(np.argmax(responses.amplitude_m))
         return cls(
             held,
@@ -55,12 +56,15 @@ class Truth:
 
     @property
     def text(self) -> str:
-        """The level, for tables."""
+        """Level as text for tables."""
         return f"{self.level:.3g} {'V' if self.held == 'voltage' else 'N'}"
 
 
 def truths(options: Options) -> tuple[Truth, ...]:
-    """What models of this input can be asked: force by force, the structure alone or the rig, and voltages."""
+    """Return the true responses that models with this input can predict.
+
+    For each force these are the responses to a pure sine or at a voltage, and the response at constant fundamental.
+    """
     rig = subject_of(options.bench).rig
     return tuple(one for force_n in options.specimen.forces_n for one in _at(options, rig, force_n))
 
@@ -68,7 +72,7 @@ def truths(options: Options) -> tuple[Truth, ...]:
 def _at(options: Options, rig: VirtualRig, force_n: float) -> tuple[Truth, ...]:
     held = Truth.of("fundamental", force_n, force_n, constant_force_response(rig, force_n, _NEAR_RESONANCE))
     if options.input == "force":
-        # Lightly damped: the largest amplitude is that at phase resonance.
+        # With light damping the largest amplitude is that at phase resonance.
         forces = np.linspace(0.1, 1.0, 10) * force_n
         sine = phase_resonance_backbone(rig, forces_n=forces, excitation="pure-sine")
         return Truth.of("pure-sine", force_n, force_n, sine), held

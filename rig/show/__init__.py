@@ -1,1 +1,1 @@
-"""What is in a file: as numbers, as tables, as a figure."""
+"""Show the contents of a file as numbers, as tables or as a figure."""

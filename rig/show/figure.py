@@ -1,4 +1,4 @@
-"""Figures of recordings, models and imported measurements. Every figure states specimen, units and what was left out."""
+"""Figures of recordings, models and imported measurements. Every figure states specimen, units and omitted data."""
 
 from pathlib import Path
 from pkgutil import resolve_name
@@ -17,11 +17,10 @@ __all__ = ["plot"]
 
 
 def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
-    """Draw what is in ``source`` into ``figure`` (png, pdf or svg by its ending).
+    """Draw the contents of ``source`` into ``figure`` (png, pdf or svg, by its suffix).
 
-    With ``lateness`` it is how punctual the loop of a recording was.
-
-    Raises `RecordingError` where the file cannot be read or the figure not be written.
+    With ``lateness``, draw the timing of the recording's control loop instead. Raises `RecordingError` if the file cannot be
+    read or the figure cannot be written.
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure

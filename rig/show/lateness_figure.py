@@ -1,4 +1,4 @@
-"""Figure of how punctual a loop by the wall clock was: histograms of wake-up, execution and response."""
+"""Figure of the timing of a wall-clock loop: histograms of wake-up, execution and response times."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -19,9 +19,10 @@ COLOURS = {"wake_up": MAIN, "execution": "#4f8f4f", "response": SECOND}
 
 
 def draw_lateness(page: "Figure", recording: Recording) -> None:
-    """Blocks by time, and the share of blocks that took longer; all parts together, the deadline dashed.
+    """Draw the number of blocks by time, and the share of blocks that took longer.
 
-    Raises `RecordingError` where no loop of the recording ran by the clock.
+    All parts are taken together; the deadline is dashed. Raises `RecordingError` if no loop of the recording ran by the wall
+    clock.
     """
     loops = [part.end["loop"] for part in recording.parts if part.end is not None and "histograms" in part.end["loop"]]
     if not loops:
@@ -48,7 +49,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
 
 
 def together(histograms: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
-    """Upper edges, us, in rising order and how many blocks each holds, of several histograms."""
+    """Add up several histograms; return the upper edges, us, in rising order, and the number of blocks of each bin."""
     edges = np.concatenate([np.asarray(one["upper_edge_us"], float) for one in histograms])
     counts = np.concatenate([np.asarray(one["count"], float) for one in histograms])
     found, place = np.unique(edges, return_inverse=True)
@@ -56,7 +57,7 @@ def together(histograms: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.nd
 
 
 def exceedance(counts: np.ndarray) -> np.ndarray:
-    """Share of all that lies beyond each bin; NaN, which is not drawn, where nothing does."""
+    """Share of all blocks that lie beyond each bin; NaN, which is not drawn, if none does."""
     share = 1.0 - np.cumsum(counts) / counts.sum()
     return np.where(share > 0.5 / counts.sum(), share, np.nan)
 

@@ -1,4 +1,4 @@
-"""What is recorded of a loop by the wall clock, as a person reads it."""
+"""Print the recorded timing of a wall-clock loop."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,19 +8,19 @@ from rig.text.console import number, print_table
 __all__ = ["PACED", "TIMES", "print_loop"]
 
 PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep": "in lockstep with the device"}
-"""What a recorded pacing is called."""
+"""Printed name of each recorded pacing."""
 
 TIMES = {"wake_up": "wake-up", "execution": "execution", "response": "response"}
-"""The times that are counted of every block, and what they are called."""
+"""Times that are measured for every block, with their printed names."""
 
 GRANTED = ("scheduling", "memory", "timer_slack", "processor", "garbage_collector")
 SHARES = {"p50": "p50", "p99": "p99", "p99_9": "p99.9", "largest": "largest"}
 
 
 def print_loop(loop: Mapping[str, Any], counters: Mapping[str, int]) -> None:
-    """Pacing, what the machine granted, lateness, overruns, lost samples, round trips; nothing where no clock paced the loop.
+    """Print pacing, real-time settings granted by the machine, lateness, overruns, lost samples and round trips.
 
-    ``loop`` and ``counters`` are those of a part's end.
+    Nothing is printed if no clock paced the loop. ``loop`` and ``counters`` are those in the end record of a part.
     """
     said = loop.get("real_time")
     if not said:

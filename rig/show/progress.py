@@ -1,4 +1,4 @@
-"""Progress on the terminal: of a run point by point, of a fit iteration by iteration; quiet lines without a terminal."""
+"""Progress on the terminal: points of a run, iterations of a fit. Without a terminal, only plain lines are written."""
 
 import contextlib
 import sys
@@ -23,13 +23,13 @@ LOCK_WORDS = ("searching", "acquiring", "locked", "lost")
 
 
 def _in_a_line(column: "Column", point: Point[Any]) -> str:
-    """A quantity of a point with its unit; its heading is left out where the unit already identifies it."""
+    """Format a quantity of a point with its unit. The heading is left out where the unit already identifies the quantity."""
     text = f"{number(value_of(point, column.key), column.pattern, column.scale):>8} {column.unit}".rstrip()
     return text if column.plain else f"{column.heading} {text}"
 
 
 class RunProgress:
-    """Writes a line for each point, and on a terminal a status line below that follows the loop."""
+    """Writes a line for each point and, on a terminal, a status line below that follows the loop."""
 
     def __init__(self, columns: "Sequence[Column]" = ()) -> None:
         self._columns = columns
@@ -37,9 +37,9 @@ class RunProgress:
         self._finished = 0
 
     def point(self, point: Point[Any], number_done: int, total: int) -> None:
-        """Print the point's line."""
+        """Print the line of a point."""
         self._finished = number_done
-        of = f"/{total}" if point.number < total else ""  # a changed plan numbers on behind those before it
+        of = f"/{total}" if point.number < total else ""  # a changed plan continues the numbering of earlier plans
         parts = [f"point {point.number + 1:>3}{of}  {point.level:>7.4g} {point.level_unit}"]
         if point.evaluated:
             shown = [c for c in self._columns if c.in_line and not (c.optional and value_of(point, c.key) is None)]
@@ -51,7 +51,7 @@ class RunProgress:
         self._print("  ".join(parts))
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
-        """Renew the status line."""
+        """Update the status line."""
         if not self._terminal:
             return
         last = rows[-1]
@@ -63,7 +63,7 @@ class RunProgress:
         )
 
     def remark(self, text: str) -> None:
-        """Print what the driver has to say about the bench."""
+        """Print a remark of the driver on the bench."""
         self._print(f"note: {text}")
 
     def close(self) -> None:
@@ -72,7 +72,7 @@ class RunProgress:
             self._status("\r\x1b[2K")
 
     def _status(self, text: str) -> None:
-        with contextlib.suppress(OSError):  # whoever read this has gone; the run goes on
+        with contextlib.suppress(OSError):  # the reader of the output has gone; the run continues
             sys.stderr.write(text)
             sys.stderr.flush()
 
@@ -83,9 +83,9 @@ class RunProgress:
 
 
 class FitLines:
-    """Follows a fit: a status line on a terminal, elsewhere a line every tenth iteration, or after ten seconds without one.
+    """Shows the progress of a fit: a status line on a terminal, otherwise a line per ten iterations or ten seconds.
 
-    ``check`` is called at every iteration and may raise, to end the fit.
+    ``check`` is called at every iteration and may raise an error to end the fit.
     """
 
     _EVERY, _LONGEST_S = 10, 10.0
@@ -98,7 +98,7 @@ class FitLines:
         self._said_s = 0.0
 
     def __call__(self, at: "FitProgress") -> None:
-        """Say where the fit is, and which iteration is the best so far."""
+        """Show the current iteration of the fit, and the best one so far."""
         self._check()
         judged = at.training_error if at.validation_error != at.validation_error else at.validation_error
         if at.stage != self._stage:

@@ -1,4 +1,4 @@
-"""What is in a file, as one JSON-able dictionary: the answer of ``rig show``."""
+"""Contents of a file as one JSON-able dictionary: the output of ``rig show``."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -21,7 +21,7 @@ from rig.recording.reader import Recording
 __all__ = ["summarise", "summarise_recording"]
 
 BULKY = {one.name for one in fields(Spectrum)}
-"""What a point holds and a summary leaves in the file."""
+"""Fields of a point that a summary omits."""
 
 QUALITY = (
     "settled",
@@ -37,7 +37,7 @@ QUALITY = (
 
 
 def summarise(path: Path) -> dict[str, Any]:
-    """What a recording, an imported measurement or a model holds; `RecordingError` where it is none of them."""
+    """Summarise a recording, an imported measurement or a model; raise `RecordingError` if the file is none of these."""
     kind = kind_of(path)
     if kind in KINDS:
         found = load(path)
@@ -50,7 +50,10 @@ def summarise(path: Path) -> dict[str, Any]:
 
 
 def summarise_recording(recording: Recording) -> dict[str, Any]:
-    """Points with their quality, statistics of the loop, how each part ended; points and parts count from 0, as in the file."""
+    """Summarise points with their quality, loop statistics, and the end of each part.
+
+    Points and parts count from 0, as in the file.
+    """
     bench = recording.configuration["bench"]
     plan = plan_from(recording.configuration["plan"], "plan of the recording")
     changed = _changes(recording)
@@ -95,14 +98,14 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
 
 
 def _changes(recording: Recording) -> dict[int, list[str]]:
-    """Keys in which the plan was changed, by the number of the part."""
+    """Return the changed keys of the plan, by the number of the part."""
     plans = [plan_from(dict(said.plan), "plan of the recording").model_dump() for said in recording.plans]
     pairs = zip(recording.plans[1:], plans, plans[1:], strict=False)
     return {said.part: changed_keys(before, after) for said, before, after in pairs}
 
 
 def _shown(point: dict[str, Any], kind: str) -> dict[str, Any]:
-    """The stored form of a point without its harmonics; what a failed one does not have is None."""
+    """Return the stored form of a point without its harmonics. Keys that a failed point lacks are None."""
     expected = dict.fromkeys([*(column.key for column in CAMPAIGNS[kind].columns), *QUALITY])
     return {**expected, **{key: value for key, value in point.items() if key not in BULKY}}
 
@@ -112,7 +115,7 @@ def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, An
     busy, wall = sum(loop["busy_s"] for loop in loops), sum(loop["wall_s"] for loop in loops)
     samples = sum(loop["samples"] for loop in loops)
     return {
-        "samples": max(rows, samples),  # of a dwell not every row is stored; of a killed part only its rows are known
+        "samples": max(rows, samples),  # not all rows of a dwell are stored; of a killed part only rows are known
         "sample_rate_hz": rate_hz,
         "overruns": sum(loop["overruns"] for loop in loops),
         "periods": sum(loop["periods"] for loop in loops),

@@ -1,4 +1,4 @@
-"""Summaries as a person reads them: one line on how a run ended, tables of recordings, models and measurements."""
+"""Print summaries for a person: how a run ended, tables of recordings, models and measurements."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ __all__ = ["print_summary", "say_how_it_ended"]
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
-    """How a run ended, what it made, how fast it was, and what was counted on the way."""
+    """Print how a run ended, its results, its speed, and the warnings counted on the way."""
     summary = printable_strings(summary)
     path = Path(printable(str(path)))
     loop = summary["loop"]
@@ -47,7 +47,7 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 
 
 def print_summary(summary: dict[str, Any]) -> None:
-    """What `rig.show.summary.summarise` found in a file, whoever has written it."""
+    """Print the summary of a file, as returned by `rig.show.summary.summarise`."""
     summary = printable_strings(summary)
     if summary["integrity"] != VERIFIED:
         print(summary["integrity"])
@@ -85,13 +85,13 @@ def print_summary(summary: dict[str, Any]) -> None:
 
 
 def _print_advice(part: Mapping[str, Any]) -> None:
-    """After a trip: what it most likely was, and what comes first."""
+    """After a trip, print the most likely cause and what to do first."""
     if part.get("likely_cause"):
         print(f"  likely cause: {part['likely_cause']}\n  what to do: {part['what_to_do']}")
 
 
 def _print_drift(drift: dict[str, Any] | None) -> None:
-    """What has changed from the first point to its repetition at the end."""
+    """Print the changes from the first point to its repetition at the end."""
     if drift is None:
         return
     told = [
@@ -102,7 +102,7 @@ def _print_drift(drift: dict[str, Any] | None) -> None:
 
 
 def _print_about(about: dict[str, Any]) -> None:
-    """Who ran a part on what, where anything was said of it or something physical has moved."""
+    """Print operator, specimen and device of a part if anything was noted or a physical rig has moved."""
     armed = about.get("armed", {})
     told = any(about.get(key) for key in ("specimen_serial", "notes", "remarks"))
     if not told and armed.get("how", "virtual") == "virtual" and about.get("operator") == user_name():
@@ -119,7 +119,7 @@ def _print_about(about: dict[str, Any]) -> None:
 
 
 def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
-    """A table of points, then their warnings; points are counted from 1."""
+    """Print a table of points, then their warnings. Points are counted from 1."""
     result: type[Any] = CAMPAIGNS[kind].result
     points = [point_from({key: value for key, value in one.items() if value is not None}, result) for one in tables]
     columns = [

@@ -1,4 +1,4 @@
-"""Tuning a rig by itself: a low-level multisine, the plant, gains with their margins, and a plan that uses them."""
+"""Automatic tuning of a rig: a low-level multisine, the plant, gains with their margins, and a plan that uses them."""
 
 from rig.tuning.plant import TuningError
 from rig.tuning.tuning import Tuning, TuningRequest, tune

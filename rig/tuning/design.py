@@ -1,4 +1,4 @@
-"""Gains for a measured plant: the quickest of a few that keep a bound on the sensitivity."""
+"""Design gains for a measured plant: of a few candidates, the quickest that keep a bound on the sensitivity."""
 
 import math
 from dataclasses import dataclass, replace
@@ -28,10 +28,10 @@ from rig.tuning.plant import TuningError, largest_outside
 __all__ = ["Chosen", "LawName", "choose", "gains_of"]
 
 LawName = Literal["frequency-error", "phase"]
-DAMPINGS = (1.0, 2.0, 4.0)  # what the damping becomes over the levels, times that of the linear test
-LOW_PASSES = (5.0, 7.0, 10.0, 14.0, 20.0)  # parts of the frequency
+DAMPINGS = (1.0, 2.0, 4.0)  # damping at higher levels, as multiples of the damping in the linear test
+LOW_PASSES = (5.0, 7.0, 10.0, 14.0, 20.0)  # candidates: resonance frequency divided by these
 SHARES = (1.0 / 8.0, 1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0)  # of the low-pass: gain of the frequency-error loop
-PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| with which gains are chosen: with the damping measured, and with others
+PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| allowed for chosen gains, at the measured damping and at other dampings
 OUTSIDE = 0.5  # largest gain of the response loop at other modes
 FORCE_SHARES = (1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0, 1.0 / 36.0, 1.0 / 50.0, 1.0 / 100.0)  # of the low-pass
 PHASE_PEAK = 1.6
@@ -42,36 +42,36 @@ class Chosen:
     """Chosen gains, and the loops that they give."""
 
     law: LawName
-    """Which law of frequency: ``frequency-error`` (with complex response control) or ``phase`` (levels in volts)."""
+    """Frequency law: ``frequency-error`` (with complex response control) or ``phase`` (levels in volts)."""
     low_pass_rad_s: float
-    """w_LP."""
+    """Low-pass w_LP, rad/s."""
     share: float
     """Gain of the frequency-error loop over w_LP; 0 for the phase law."""
     force_share: float
-    """Gain over w_LP with which a force may be held through the response; 0 for the phase law."""
+    """Gain over w_LP with which the loop may hold a force through the response; 0 for the phase law."""
     design: Design
-    """Loops with the plant as measured."""
+    """Loops for the plant as measured."""
     others: tuple[Design, ...]
-    """Loops with two and four times the plant's damping."""
+    """Loops for two and four times the plant's damping."""
     closed_form: HippoldGains
-    """Closed form of Hippold et al. for the same low-pass, for comparison."""
+    """Gains by the closed form of Hippold et al. for the same low-pass, for comparison."""
     outside: tuple[float, float]
-    """Largest gain of the response loop at the measured lines beyond the model's band, and where (Hz)."""
+    """Largest gain of the response loop at the measured lines beyond the model's band, and its frequency (Hz)."""
     why: str
     """How the low-pass and the gains were chosen."""
 
     @property
     def sensitivity_peak(self) -> float:
-        """Largest max |S| of all loops over all dampings."""
+        """Largest max |S| of all loops at all dampings."""
         return max(_peak(design) for design in (self.design, *self.others))
 
 
 def choose(
     plant: PlantModel, responses: FrequencyResponseMatrix, law: str, largest_low_pass_rad_s: float, noise: str
 ) -> Chosen:
-    """The gains for a plant; ``noise`` says in words what bounds the low-pass.
+    """Choose the gains for a plant; ``noise`` says in words what bounds the low-pass.
 
-    Raises `TuningError`, with the numbers, if no gains suit.
+    Raises `TuningError`, with the numbers, if no gains are suitable.
     """
     omega = plant.lock_frequency_rad_s()
     allowed = [w for w in (omega / part for part in LOW_PASSES) if w <= 1.001 * largest_low_pass_rad_s]
@@ -131,19 +131,19 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
 
 
 def _force_share(plant: PlantModel, w: float, share: float) -> float:
-    """Largest of the tried gains of a force loop around both laws that may rise by half before the loop is unstable."""
+    """Return the largest candidate gain of a force loop around both laws that stays stable when it rises by half."""
     loops = ((part, _loop(plant, plant, w, share, 1.5 * part)) for part in FORCE_SHARES)
     return next((part for part, loop in loops if unstable_poles(loop) == 0), FORCE_SHARES[-1])
 
 
 def _loop(plant: PlantModel, measured: PlantModel, w: float, share: float, force_share: float = 0.0) -> ControlLoop:
-    """Both laws around ``plant``, with gains designed for the ``measured`` one."""
+    """Return the loop of both laws around ``plant``, with gains designed for the ``measured`` plant."""
     response = complex_response_law(measured, w, smoothing_rad_s=w, force_share=force_share)
     return ControlLoop(plant, w, frequency_error_law(w, share=share), response)
 
 
 def _quick_peak(loop: ControlLoop) -> float:
-    """Largest max |S| of both loops; infinite where they are unstable."""
+    """Largest max |S| of both loops; infinite if they are unstable."""
     if unstable_poles(loop):
         return math.inf
     omega = frequencies_for(loop.plant, 600)
@@ -160,9 +160,9 @@ def _peak(design: Design) -> float:
 
 
 def _beyond(loop: ControlLoop, responses: FrequencyResponseMatrix) -> tuple[float, float]:
-    """Largest gain of the response loop on the responses as measured, beyond the band of the plant's model.
+    """Largest gain of the response loop, computed from the measured responses beyond the band of the plant model.
 
-    What of the response moves at another frequency f stands in the demodulated response at ``f - f_lock``.
+    Motion at another frequency f appears in the demodulated response at ``f - f_lock``.
     """
     law, plant = loop.amplitude_law, loop.plant
     if not isinstance(law, ComplexResponseLaw):
@@ -174,7 +174,7 @@ def _beyond(loop: ControlLoop, responses: FrequencyResponseMatrix) -> tuple[floa
 
 
 def gains_of(chosen: Chosen) -> dict[str, float | tuple[float, float]]:
-    """Keys of ``[controller]`` that were designed, with their values."""
+    """Return the designed keys of ``[controller]`` with their values."""
     loop = chosen.design.loop
     law = loop.frequency_law
     if isinstance(law, PhaseLaw):

@@ -1,4 +1,4 @@
-"""Figure of a tuning: the plant as measured and as modelled, Bode plots of the loops, step responses."""
+"""Figure of a tuning: measured and modelled plant, Bode plots of the loops, step responses."""
 
 import math
 from pathlib import Path
@@ -21,7 +21,7 @@ DASHES = ("-", "--", ":")
 
 
 def check_figure(figure: Path, overwrite: bool) -> None:
-    """Raise `RecordingError`, before anything moves, for a figure that could not be written."""
+    """Raise `RecordingError`, before anything moves, if a figure could not be written."""
     if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
     if figure.is_dir():
@@ -33,7 +33,7 @@ def check_figure(figure: Path, overwrite: bool) -> None:
 
 
 def draw_tuning(tuning: "Tuning", figure: Path) -> None:
-    """Write the figure (png, pdf or svg by its ending)."""
+    """Write the figure (png, pdf or svg, by its suffix)."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -78,7 +78,7 @@ def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
 
 
 def _draw_bode(size: "Axes", phase: "Axes", designs: tuple[Design, ...]) -> None:
-    """Open loops over the frequency of a slow change, against that of the vibration."""
+    """Draw the open loops over the frequency of a slow change, relative to the vibration frequency."""
     for line, design in zip(DASHES, designs, strict=False):
         share = design.omega_rad_s / design.loop.omega_rad_s
         loops = [(design.frequency_loop_gain, MAIN, "frequency loop")]
@@ -111,7 +111,7 @@ def _draw_frequency_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
 
 
 def _draw_level_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
-    """Response and lag after a step to a level 30 % higher."""
+    """Draw response and lag after a step to a level 30 % higher."""
     drawn = 0.0
     lag = axis.twinx()
     for line, design in zip(DASHES, designs, strict=False):
@@ -132,7 +132,7 @@ def _draw_level_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
 
 
 def _unbroken(degrees: np.ndarray) -> np.ndarray:
-    """Angles without the line that a wrapped one would be joined by."""
+    """Replace an angle by NaN where it wraps, so that no line is drawn there."""
     out = degrees.copy()
     out[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
     return out

@@ -1,4 +1,4 @@
-"""Levels and low-pass of the proposed test: from the lowest force that noise allows to a part of the limits."""
+"""Choose levels and low-pass of the proposed test, from the lowest force that noise allows to a part of the limits."""
 
 import math
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ RAISED = 3.0  # factor by which the lowest force may be raised
 
 
 def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float) -> tuple[float, float, str]:
-    """Largest low-pass (rad/s), the lowest force (N) at which the lag can be measured with it, and why.
+    """Return the largest low-pass (rad/s), the lowest force (N) at which the lag can be measured with it, and the reason.
 
     At that force the standard deviation of the lag is `LAG_STD_DEG`. If at most `RAISED` times the wanted force is needed, the
     force is raised and the low-pass is kept, because a slow low-pass costs time at every level.
@@ -54,16 +54,16 @@ BITS = 2.0  # amplitude of the force at the lowest level, in least significant b
 
 @dataclass(frozen=True)
 class LevelChoice:
-    """Levels of the drive point's displacement, and why these."""
+    """Levels of the drive point's displacement, and the reason for them."""
 
     levels_m: tuple[float, ...]
     """Levels, m peak."""
     needed_v: tuple[float, ...]
-    """Voltage of each on the linear plant, V peak."""
+    """Voltage of each level on the linear plant, V peak."""
     forces_n: tuple[float, ...]
-    """Force of each on the linear plant, N peak."""
+    """Force of each level on the linear plant, N peak."""
     why: str
-    """What bounds them."""
+    """What bounds the levels."""
 
 
 def needed_v(plant: PlantModel, level_m: float) -> float:
@@ -78,9 +78,9 @@ def needed_n(plant: PlantModel, level_m: float) -> float:
 
 
 def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tuple[float, str]:
-    """Largest displacement of the drive point (m peak) within the bench's limits on the linear plant, and which limit ends it.
+    """Return the drive point's largest displacement on the linear plant within the bench's limits, and the first limit met.
 
-    ``ratios`` are displacements of channels per displacement of the drive point, by name.
+    The displacement is in m peak. ``ratios`` are displacements of channels per displacement of the drive point, by name.
     """
     limits, omega = bench.limits, plant.lock_frequency_rad_s()
     name, ratio = max(ratios.items(), key=lambda entry: entry[1], default=("", 1.0))
@@ -96,7 +96,7 @@ def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tup
 
 
 def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
-    """Lowest useful force: a part of the highest one, but at least some bits of the converter."""
+    """Lowest useful force: a part of the highest force, but at least a few bits of the converter."""
     force = next(channel for channel in bench.channels if channel.role == "force")
     bit = force.resolution_v / abs(force.sensitivity_v_per_unit)
     return max(needed_n(plant, highest_m) / SPAN, BITS * bit)
@@ -112,9 +112,9 @@ def choose_levels(
     to_m: float | None = None,
     points: int = 8,
 ) -> LevelChoice:
-    """Levels in equal ratios, from the lowest force above noise to a third of what the limits allow.
+    """Choose levels in equal ratios, from the lowest force above noise to a third of what the limits allow.
 
-    ``ratios`` as for `reach_m`. Raises `ConfigurationError` for a level beyond what the bench reaches.
+    ``ratios`` are as for `reach_m`. Raises `ConfigurationError` for a level that the bench cannot reach.
     """
     reach, limit = reach_m(bench, plant, ratios)
     highest = PART * reach if to_m is None else to_m
@@ -143,5 +143,5 @@ def choose_levels(
 
 
 def significant(value: float, digits: int = 5) -> float:
-    """A number rounded to some significant digits."""
+    """Round a number to some significant digits."""
     return value if value == 0.0 or not math.isfinite(value) else float(f"{value:.{digits}g}")

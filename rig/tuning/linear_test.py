@@ -1,6 +1,6 @@
-"""The low-level multisine of a tuning: from a safe voltage upwards until the responses stand out of the noise.
+"""The low-level multisine of a tuning, raised from a safe voltage until the responses stand out of the noise.
 
-All of it goes through the ordinary runner into one recording, level by level a change of its plan.
+All levels go through the ordinary runner into one recording; each further level is a change of the plan.
 """
 
 import math
@@ -21,11 +21,11 @@ from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage
 __all__ = ["LinearTest", "measure"]
 
 BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could excite lie inside
-LINES = 400.0  # lines up to the linear frequency while the level is sought
+LINES = 400.0  # number of lines up to the linear frequency while the level is searched for
 LINES_A_BANDWIDTH = 4.0
 ENOUGH = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
 AUDIBLE = 0.9  # coherence that a level chosen by the user must reach at least
-CREST = 4.0  # peak over RMS of a multisine's response, at most
+CREST = 4.0  # largest expected ratio of peak to RMS of a multisine's response
 SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)
 
 
@@ -40,13 +40,13 @@ class LinearTest:
     lead_samples: float
     """Samples from an output to its effect in the inputs: block, queue and filters of the device."""
     coherence: tuple[float, float]
-    """Median over the band around the mode, of force and drive with the voltage, one period each."""
+    """Coherence of force and drive with the voltage for one period, median over the band around the mode."""
     distortion: float
-    """Ratio of the nonlinear to the linear part of the force response, median over that band; 0 if noise hides it."""
+    """Ratio of the nonlinear to the linear part of the force response, median over the same band; 0 if noise hides it."""
     force_density: float
-    """One-sided density of the force's noise near the mode, N^2/Hz."""
+    """One-sided noise density of the force near the mode, N^2/Hz."""
     acceleration_density: float
-    """The same of the drive acceleration, (m/s^2)^2/Hz."""
+    """One-sided noise density of the drive acceleration near the mode, (m/s^2)^2/Hz."""
     levels_tried_v: tuple[float, ...]
     """All levels that were played in the search, V RMS."""
 
@@ -57,13 +57,13 @@ def measure(
     damping_of: Callable[[FrequencyResponseMatrix, float], float],
     level_rms_v: float | None = None,
 ) -> LinearTest:
-    """Raise the level until the coherence suffices, then measure with lines as close as the damping asks for.
+    """Raise the level until the coherence suffices, then measure with a line spacing that the damping requires.
 
-    ``bench_name`` is what the recorded plan calls the bench. ``damping_of`` returns the damping ratio from coarse responses
-    and the samples from an output to the input that shows it. With ``level_rms_v`` there is no search.
+    ``bench_name`` is the name of the bench in the recorded plan. ``damping_of`` returns the damping ratio from coarse responses
+    and the number of samples between an output and the input that responds to it. With ``level_rms_v`` there is no search.
 
-    Raises `TuningError` where a run was stopped or no level within half of the bench's limits suffices,
-    `ConfigurationError` for a level beyond the limits.
+    Raises `TuningError` if a run was stopped or no level within half of the bench's limits suffices, `ConfigurationError` for a
+    level beyond the limits.
     """
     bench, runs = series.bench, _Runs(series, bench_name)
     if level_rms_v is None:
@@ -96,22 +96,22 @@ def measure(
 
 
 class _Runs:
-    """The multisines of a tuning, and what the last one has measured."""
+    """The multisines of a tuning, and the measurements of the last one."""
 
     measured: PeriodicSpectra
-    """Spectra."""
+    """Spectra of the last multisine."""
     rows: np.ndarray
-    """Its telemetry rows."""
+    """Telemetry rows of the last multisine."""
     lead_samples: float
-    """Lead of the device."""
+    """Lead of the device, samples."""
     coherence: tuple[float, float]
-    """Coherence of force and drive at the last level that was listened to."""
+    """Coherence of force and drive at the last coarse level."""
 
     def __init__(self, series: MultisineSeries, bench_name: str) -> None:
         self.series, self.bench, self.name = series, series.bench, bench_name
 
     def at(self, level_rms_v: float, resolution_hz: float, realisations: int) -> PeriodicSpectra:
-        """Play a level; its spectra."""
+        """Play a level and return its spectra."""
         lowest, highest = (part * self.bench.specimen.linear_frequency_hz for part in BAND)
         allowed = self.bench.limits.frequency_hz
         plan = MultisinePlan(
@@ -134,7 +134,7 @@ class _Runs:
         return self.measured
 
     def listen(self, level_rms_v: float) -> Seen:
-        """Play a level with coarse lines; how its responses stood out of the noise."""
+        """Play a level with coarse lines, and evaluate how its responses stand out of the noise."""
         self.at(level_rms_v, _coarse(self.bench), 1)
         self.coherence = coherence_of(self.bench, self.measured)
         least = min(self.coherence)
@@ -143,7 +143,7 @@ class _Runs:
         return Seen(least >= ENOUGH, share, max(1.3 * noise, 1.5))
 
     def _moved_m(self, name: str, _: float) -> float:
-        """Peak displacement of a channel, from its spectrum."""
+        """Return the peak displacement of a channel, from its spectrum."""
         amplitude = self.measured.amplitude[self.measured.index(name)]
         moved = amplitude / (2.0 * np.pi * self.measured.frequency_hz) ** 2
         return CREST * float(np.sqrt(0.5 * np.sum(moved**2)))
@@ -172,7 +172,7 @@ def _coarse(bench: Bench) -> float:
 
 
 def _on_samples(bench: Bench, resolution_hz: float) -> float:
-    """The resolution nearest to that wanted whose period is a whole number of samples."""
+    """Return the resolution nearest to the wanted one whose period is a whole number of samples."""
     samples = round(bench.sample_rate_hz / resolution_hz)
     if samples < 2:
         raise ConfigurationError(f"specimen.linear_frequency_hz: too high for {bench.sample_rate_hz:g} samples/s")

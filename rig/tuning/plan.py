@@ -1,4 +1,4 @@
-"""The plan that a tuning writes: TOML with a comment on the origin of each number."""
+"""The plan that a tuning writes: TOML with comments on the origin of each number."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from rig.tuning.levels import LevelChoice, significant
 
 __all__ = ["plan_text"]
 
-WINDOW = 0.1  # of the frequency, either way
+WINDOW = 0.1  # of the frequency, on either side
 HARMONICS = 5
 RAMP_PERIODS = 10
 SHORTEST_TIME_OUT = 600
@@ -29,7 +29,7 @@ def plan_text(
     levels: LevelChoice,
     recording: Path,
 ) -> str:
-    """A backbone plan for a bench, as TOML; ``ratios`` are those of response channels to the drive point, as measured."""
+    """Return a backbone plan as TOML; ``ratios`` are the measured ratios of response channels to the drive point."""
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     volts = chosen.law == "phase"
     settling = chosen.design.settling.longest
@@ -130,5 +130,5 @@ def _comment(text: str) -> list[str]:
 
 
 def _line(key: str, value: Any) -> str:
-    """A key with a text, a number or a list of numbers."""
+    """Return a TOML line: a key with a text, a number or a list of numbers."""
     return f"{key} = {json.dumps(value)}"

@@ -1,4 +1,4 @@
-"""From the spectra of the linear test to the plant, and how the plant differs from the bench's facts."""
+"""Fit the plant to the spectra of the linear test, and compare it with the bench's facts."""
 
 import math
 from collections.abc import Sequence
@@ -28,16 +28,16 @@ __all__ = [
 
 
 class TuningError(RigError):
-    """A rig cannot be tuned: its test shows no mode, or no gains suit it. The message has the numbers."""
+    """A rig cannot be tuned: its test shows no mode, or no gains are suitable. The message contains the numbers."""
 
 
 Real = NDArray[np.float64]
 
-FIT_BAND = (0.6, 1.6)  # of the linear frequency: that of the plant's model
+FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
 
 
 def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
-    """Median coherence of force and drive with the voltage around the mode, of one period."""
+    """Coherence of force and drive with the voltage for one period, median over the band around the mode."""
     around = near(bench, measured.frequency_hz) & measured.excited
     out = []
     for role in ("force", "drive"):
@@ -50,19 +50,22 @@ def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]
 
 
 def voltage_responses(bench: Bench, measured: PeriodicSpectra) -> FrequencyResponseMatrix:
-    """Force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
+    """Return force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
     names = [c.name for role in ("force", "drive", "response") for c in bench.channels if c.role == role]
     return best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
 
 
 def near(bench: Bench, frequency_hz: Real) -> NDArray[np.bool_]:
-    """Which lines lie in the band of the plant's model."""
+    """Return which lines lie in the band of the plant model."""
     linear = bench.specimen.linear_frequency_hz
     return np.asarray((frequency_hz > FIT_BAND[0] * linear) & (frequency_hz < FIT_BAND[1] * linear))
 
 
 def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
-    """One-sided noise densities: a line of resolution d carries the power S d, half the square of its peak amplitude."""
+    """Return the one-sided noise densities of force and drive acceleration near the mode.
+
+    A line of resolution d carries the power S d, half the square of its peak amplitude.
+    """
     around = near(bench, measured.frequency_hz)
     step = float(np.diff(measured.frequency_hz).mean())
     rows = [measured.index(next(c.name for c in bench.channels if c.role == role)) for role in ("force", "drive")]
@@ -73,16 +76,15 @@ def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
 ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
 WORTH_SAYING_HZ = 0.005
 WORTH_SAYING_SHAPE = 0.05
-TOLD = 3.0  # standard errors from which on the motion of a channel counts as measured
+TOLD = 3.0  # standard errors above which the motion of a channel counts as measured
 TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-error law
 
 
 def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float) -> PlantModel:
-    """The plant fitted to force and drive acceleration per volt around the bench's linear frequency.
+    """Fit the plant to force and drive acceleration per volt around the bench's linear frequency.
 
-    ``lead_samples`` from an output to its effect in the inputs are those of the run that measured the responses.
-
-    Raises `TuningError` where they show no mode of the structure.
+    ``lead_samples`` is the number of samples between an output and its effect in the inputs, in the run that measured the
+    responses. Raises `TuningError` if they show no mode of the structure.
     """
     linear = bench.specimen.linear_frequency_hz
     frequency = responses.frequency_hz
@@ -105,10 +107,10 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: flo
 
 
 def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
-    """Displacement of each response channel per displacement of the drive point at resonance, by name.
+    """Return the displacement of each response channel per displacement of the drive point at resonance, by name.
 
-    Least squares of the channel's response to that of the drive point, over the lines within a bandwidth of the mode. A
-    channel that does not stand out of the noise is left out.
+    Each ratio is a least-squares fit of the channel's response to that of the drive point, over the lines within a bandwidth of
+    the mode. A channel that does not stand out of the noise is left out.
     """
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     frequency = responses.frequency_hz
@@ -126,9 +128,9 @@ def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> di
 
 
 def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
-    """Differences between the bench's facts and the measurement, one line each.
+    """Return the differences between the bench's facts and the measurement, one line each.
 
-    Raises `TuningError` where the mode lies so far from the bench's linear frequency that it may be another one.
+    Raises `TuningError` if the mode lies so far from the bench's linear frequency that it may be another one.
     """
     facts, out = bench.specimen, []
     measured_hz = plant.frequency_rad_s / (2.0 * math.pi)
@@ -166,7 +168,7 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
 def largest_outside(
     responses: FrequencyResponseMatrix, plant: PlantModel, gains: Sequence[complex] | np.ndarray
 ) -> tuple[float, float]:
-    """Largest magnitude of ``gains`` [n lines] outside the band of the plant's model, and its frequency (Hz); 0 if none."""
+    """Largest magnitude of ``gains`` [n lines] outside the band of the plant model, and its frequency (Hz); 0 if none."""
     frequency = responses.frequency_hz
     outside = (frequency < plant.band_hz[0]) | (frequency > plant.band_hz[1])
     if not outside.any():
@@ -177,9 +179,9 @@ def largest_outside(
 
 
 def mass_ratios(bench: Bench, responses: FrequencyResponseMatrix, plant: PlantModel) -> tuple[float, float]:
-    """Smallest and largest mass ratio mu that models of this band and of all measured lines find.
+    """Smallest and largest mass ratio mu from the fits to this band and to all measured lines.
 
-    Near one mode the exciter's moving mass is hard to separate from its spring: if the two differ, the ratio is not identified.
+    Near one mode the exciter's moving mass is hard to separate from its spring: if the two ratios differ, mu is not identified.
     """
     try:
         wide = PlantModel.from_frequency_responses(

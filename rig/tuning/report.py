@@ -1,4 +1,4 @@
-"""What a tuning has found, as one dictionary and as lines for the terminal."""
+"""Report of a tuning, as one dictionary and as lines for the terminal."""
 
 import math
 from typing import Any
@@ -12,7 +12,7 @@ __all__ = ["lines", "summary"]
 
 
 def summary(tuning: Tuning) -> dict[str, Any]:
-    """Test, plant, gains, margins, levels and notes; for JSON."""
+    """Return test, plant, gains, margins, levels and notes as a dictionary for JSON."""
     plant, chosen, test = tuning.plant, tuning.chosen, tuning.test
     low, high = mass_ratios(tuning.bench, test.responses, plant)
     facts = tuning.bench.specimen
@@ -86,7 +86,7 @@ def _margins(found: Margins) -> dict[str, float]:
 
 
 def lines(found: dict[str, Any]) -> list[str]:
-    """Lines of text from a `summary`."""
+    """Return lines of text for a `summary`."""
     test, plant, levels = found["test"], found["plant"], found["levels_m"]
     low, high = plant["mass_ratio"]
     shape = plant["bench_drive_mode_shape"]

@@ -1,4 +1,4 @@
-"""From nothing but a bench to gains, margins, levels, and a plan."""
+"""Tune a rig: from a bench alone to gains, margins, levels and a plan."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,12 +20,12 @@ from rig.tuning.plant import compared_with_bench, measured_ratios, plant_of
 __all__ = ["Tuning", "TuningRequest", "tune"]
 
 PURPOSE = "tuning"
-NONLINEAR = 0.005  # distortion beside the linear response of the force
+NONLINEAR = 0.005  # distortion relative to the linear response of the force
 
 
 @dataclass(frozen=True, kw_only=True)
 class TuningRequest:
-    """What a tuning is asked for.
+    """Options of a tuning.
 
     Raises `ConfigurationError` for values that are not allowed.
     """
@@ -35,9 +35,9 @@ class TuningRequest:
     law: str = "frequency-error"
     """Frequency law: ``frequency-error`` (with complex response control, levels in m) or ``phase`` (levels in V)."""
     from_m: float | None = None
-    """Lowest level of the plan, m peak at the drive point; from the noise if None."""
+    """Lowest level of the plan, m peak at the drive point; determined by the noise if None."""
     to_m: float | None = None
-    """Highest level of the plan, m peak at the drive point; from the limits if None."""
+    """Highest level of the plan, m peak at the drive point; determined by the limits if None."""
     points: int = 8
     """Number of levels."""
 
@@ -72,19 +72,19 @@ class Tuning:
     test: LinearTest
     """The linear test."""
     recording: Path
-    """Its recording."""
+    """Recording of the linear test."""
     plant: PlantModel
     """The plant near the mode."""
     response_ratios: dict[str, float]
     """Measured displacement of each response channel per displacement of the drive point at resonance, by name."""
     chosen: Chosen
-    """The gains."""
+    """The chosen gains."""
     levels: LevelChoice
-    """The levels."""
+    """The chosen levels."""
     notes: tuple[str, ...]
     """Notes for the user, one line each."""
     plan_toml: str
-    """The plan."""
+    """The plan as TOML."""
 
     @property
     def plan(self) -> BackbonePlan:
@@ -107,11 +107,10 @@ def tune(
 ) -> Tuning:
     """Measure the plant with a low-level multisine, recorded in ``recording``, and design a backbone test for it.
 
-    ``named`` is what the plan calls the bench.
+    ``named`` is the name of the bench in the plan.
 
-    Raises `rig.tuning.plant.TuningError` where the rig is unsuited, with the numbers,
-    `rig.errors.ConfigurationError` for what the bench does not allow, `rig.errors.RecordingError` for a recording that
-    cannot be written.
+    Raises `rig.tuning.plant.TuningError`, with the numbers, if the rig is unsuitable, `rig.errors.ConfigurationError` for
+    requests that the bench does not allow, `rig.errors.RecordingError` for a recording that cannot be written.
     """
     name = str(bench.name if isinstance(bench, Bench) else bench)
     bench = bench if isinstance(bench, Bench) else load_bench(bench)
@@ -150,7 +149,7 @@ def tune(
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:
-    """Notes on what may differ from the linear plant."""
+    """Return notes on possible deviations from the linear plant."""
     out = []
     if test.distortion > NONLINEAR:
         out.append(

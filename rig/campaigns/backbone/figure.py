@@ -1,4 +1,4 @@
-"""Figure of a backbone: modal properties over the amplitude, and the course of the loop."""
+"""Figure of a backbone: modal properties over the amplitude, and the history of the control loop."""
 
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ __all__ = ["draw"]
 
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw frequency and damping over the amplitude, and the loop over time."""
+    """Draw frequency and damping over the amplitude, and the history of the control loop."""
     axes = page.subplots(2, 2)
     try:
         mode: NonlinearMode | None = nonlinear_mode(recorded_backbone(recording))

@@ -1,4 +1,4 @@
-"""The backbone campaign: step through levels at phase resonance, settle, record whole periods at each."""
+"""The backbone campaign: step through levels at phase resonance; settle and record whole periods at each level."""
 
 from dataclasses import replace
 from typing import Literal
@@ -17,9 +17,9 @@ __all__ = ["BackbonePlan"]
 class BackbonePlan(SettledPlan):
     """Phase-resonant vibrations at a series of levels.
 
-    The levels are amplitudes of the output voltage (``levels_v``, the paper's way), or of force or response, held by the
-    controller's loops. Every point is approached by a half-cosine ramp, settled by the
-    rule in ``settle``, and recorded over whole periods.
+    The levels are amplitudes of the output voltage (``levels_v``, as in the paper), or of force or response, which the control
+    loops then hold. Every point is approached by a half-cosine ramp, settled by the rule in ``settle``, and recorded over whole
+    periods.
     """
 
     kind: Literal["backbone"] = "backbone"
@@ -27,31 +27,32 @@ class BackbonePlan(SettledPlan):
     direction: Literal["up", "down", "up-down"] = "up"
     """Order of the levels."""
     repeat_first: bool = False
-    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
+    """Whether the first point is measured again at the end to reveal a drift of the specimen. The repeated point enters no
+    result."""
     ramp_periods: float = Field(20.0, ge=1, le=1e5)
     """Length of the ramp between two levels, periods."""
     record_periods: int = Field(50, ge=4, le=1_000_000)
     """Periods that are recorded and evaluated at each level."""
     evaluation: Literal["settled", "slow-flow"] = "settled"
-    """Whether a point is settled and then recorded, or taken from the ramp to it and what follows, by the slow flow: nothing is
-    waited for."""
+    """How a point is evaluated. ``settled``: wait until the vibration has settled, then record. ``slow-flow``: evaluate the
+    ramp to the point and the time at the point by the slow flow, without waiting for a steady state."""
     accepted_frequency_std: float = Field(1e-3, gt=0, le=1)
-    """Largest standard error of the modal frequency, relative, with which a point of the slow flow is accepted."""
+    """Largest relative standard error of the modal frequency with which a slow-flow point is accepted."""
     accepted_damping_std: float = Field(0.1, gt=0, le=1)
-    """Largest standard error of the damping, relative, with which a point of the slow flow is accepted."""
+    """Largest relative standard error of the damping with which a slow-flow point is accepted."""
 
     @property
     def counts(self) -> dict[str, int]:
-        """Levels, ways and repeats."""
+        """Numbers of levels, directions and repeats."""
         return {**super().counts, "direction": 2 if self.direction == "up-down" else 1}
 
     @property
     def evaluates_approach(self) -> bool:
-        """Whether the ramp is evaluated with the rest: by the slow flow."""
+        """Whether the ramp is evaluated together with the time at the point, as the slow flow does."""
         return self.evaluation == "slow-flow"
 
     def targets(self) -> tuple[Target, ...]:
-        """All points in the order of measurement."""
+        """Return all points in the order of measurement."""
         rising = sorted(self.levels)
         falling = rising[::-1]
         passes: dict[str, list[tuple[float, Literal["up", "down"]]]] = {
@@ -70,10 +71,10 @@ class BackbonePlan(SettledPlan):
         return with_first_repeated(targets) if self.repeat_first else targets
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that measure all points but those ``done`` already.
+        """Return the segments that measure all points except those in ``done``.
 
-        A point whose predecessor is done is approached from its predecessor's level, so that it is reached from the
-        recorded direction.
+        A point whose predecessor is done is approached from the predecessor's level, so that the direction of approach is the
+        recorded one.
         """
         failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
         targets = self.targets()
@@ -103,13 +104,16 @@ class BackbonePlan(SettledPlan):
             self._check_slow_flow(bench)
 
     def _short_point(self, target: Target, failure: OnFailure, first: bool) -> list[Segment]:
-        """The ramp to a point and the time at it, both evaluated; before the first the lock is gained at its level."""
+        """Return the ramp to a point and the time at the point, both evaluated.
+
+        Before the first point, gain the lock at its level.
+        """
         number, level = target.number, target.level
         geometric = self.levels_key != "levels_v"
         ramp = Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, geometric=geometric)
-        waits = SegmentKind.START if self.levels_key == "levels_v" else SegmentKind.HOLD  # others have had their start
+        waits = SegmentKind.START if self.levels_key == "levels_v" else SegmentKind.HOLD  # the others started before
         out = [replace(ramp, point=-1), replace(ramp, kind=waits, point=-1, periods=self._hold_periods)]
-        # A ramp from a level to itself: judged by what it shows, not by the settle rule.
+        # A ramp from a level to the same level: the point is judged by its slow flow, not by the settle rule.
         held = replace(ramp, kind=SegmentKind.LEVEL_SWEEP, periods=self.record_periods)
         return [*(out if first else ()), ramp, held]
 
@@ -119,7 +123,7 @@ class BackbonePlan(SettledPlan):
 
     @staticmethod
     def _approach(targets: tuple[Target, ...], target: Target) -> float | None:
-        """Level to come from: the one before, where that lies on the same way; None to come from rest."""
+        """Return the level from which a point is approached: the previous one if it is on the correct side; None: from rest."""
         if target.number == 0:
             return None
         before = targets[target.number - 1]

@@ -1,4 +1,4 @@
-"""The points of a backbone: what they hold, how they come from recorded rows, and how they make a backbone in memory."""
+"""Points of a backbone: their contents, their evaluation from recorded rows, and the backbone made of them."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -67,23 +67,23 @@ BACKBONE_COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class ShortPointResult:
-    """What a short point has beside the rest. Points that are settled have none."""
+    """Results of a point evaluated by the slow flow, in addition to those of every point. Settled points have none of these."""
 
     growth_1_s: float
     """Relative rate at which the amplitude still changed, 1/s."""
     measured_force_n: float
-    """Fundamental of the force as it was, N."""
+    """Fundamental of the force as measured, N."""
     periods_in_all: float
-    """Periods of the ramp and of what follows."""
+    """Periods of the ramp and of the time at the point, together."""
 
 
 def measure_backbone_point(
     bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[ShortPointResult]:
-    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment.
+    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment.
 
-    A point whose fundamental is too far from the wanted phase is kept and not accepted. The rows of a short point begin with
-    the ramp to it.
+    A point whose fundamental is too far from the wanted phase is kept but not accepted. For a slow-flow point, the rows begin
+    with the ramp to the point.
     """
     if plan.evaluation == "slow-flow":
         return _short_point(bench, plan, target, rows)
@@ -100,7 +100,7 @@ def measure_backbone_point(
 
 
 def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> Point[ShortPointResult]:
-    """A point from the ramp to it and what follows, settled or not."""
+    """Evaluate a point from its ramp and the time at the point, whether or not the vibration settled."""
     try:
         flow = recorded_flow(bench, rows, plan.harmonics)
         found = short_point(flow, start_s=_arrival_s(flow))
@@ -137,14 +137,14 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndar
 
 
 def _arrival_s(flow: SlowFlow) -> float:
-    """When the amplitude came near to where it ended, for good."""
+    """Time from which the amplitude stays near its final value, s."""
     away = np.abs(np.log(flow.amplitude_m / flow.amplitude_m[-1])) > NEAR
     last = int(np.flatnonzero(away)[-1]) + 1 if away.any() else 0
     return float(flow.time_s[min(last, flow.time_s.size - 1)])
 
 
 def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, alien: float) -> str:
-    """Why a point of the slow flow is not accepted; empty where it is."""
+    """Return why a slow-flow point is not accepted; an empty string if it is accepted."""
     frequency = found.modal_frequency_std_hz / found.modal_frequency_hz
     damping = found.damping_ratio_std / abs(found.damping_ratio)
     return first_of(
@@ -163,7 +163,7 @@ def backbone_of(
     drive_mode_shape: float | None,
     phase_lag_target_deg: float,
 ) -> Backbone:
-    """The accepted points of a recording as measurements; raises `IdentificationError` where there is none."""
+    """Return the accepted points of a recording as a backbone; raise `IdentificationError` if no point was accepted."""
     accepted = [point for point in of_the_result(points) if point.accepted]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
@@ -179,7 +179,7 @@ def backbone_of(
 
 
 def recorded_backbone(recording: Recording) -> Backbone:
-    """The accepted points that the plan asks for, in the order of the plan."""
+    """Return the accepted points of the current plan as a backbone, in the order of the plan."""
     bench = bench_of_recording(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
     return backbone_of(

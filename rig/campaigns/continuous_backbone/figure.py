@@ -1,4 +1,4 @@
-"""Figure of a continuous backbone: what was found on the way up and on the way down, their mean, and its 95 % band."""
+"""Figure of a continuous backbone: the results of the way up and of the way down, their mean, and its 95 % band."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,7 +22,7 @@ Measured = Point[ContinuousBackboneResult]
 
 
 class _Quantity(NamedTuple):
-    """A modal property as it is drawn."""
+    """How one modal property is drawn."""
 
     label: str
     scale: float
@@ -50,7 +50,7 @@ _QUANTITIES = (
 
 
 class _Way(NamedTuple):
-    """A way as it is drawn."""
+    """How one way (up or down) is drawn."""
 
     name: str
     colour: str
@@ -62,7 +62,7 @@ _WAYS = (_Way("up", SECOND, "^", lambda found: found.up), _Way("down", "#4f9d69"
 
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw both ways, their differences from the mean, and the loop over time."""
+    """Draw the results of both ways, their differences from the mean, and the history of the control loop."""
     page.set_size_inches(9.0, 9.6)
     axes = page.subplots(3, 2)
     points = points_of(recording, ContinuousBackboneResult)
@@ -73,9 +73,9 @@ def draw(page: "Figure", recording: Recording) -> None:
 
 
 def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
-    """Draw modal frequency and damping over the amplitude into two axes; points are those of a recording.
+    """Draw the modal frequency and damping of a recording's points over the amplitude, into two axes.
 
-    A level that was passed on one way only is drawn there, and in grey where the mean would be.
+    A level that was passed on one way only is drawn on that way, and its value is marked in grey as not accepted.
     """
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
         for some, scale_m, said in _repeats(axis, points, quantity.label):
@@ -103,7 +103,7 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
 
 
 def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
-    """Draw how far up and down lie from their mean, in per cent of it, with the mean's 95 % band."""
+    """Draw the differences of both ways from their mean, in per cent of the mean, with the 95 % band of the mean."""
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
         for some, scale_m, _said in _repeats(axis, points, f"from the mean {quantity.label.split(',')[0]}, %"):
             both = [point for point in some if all(way.of(result_of(point)) is not None for way in _WAYS)]
@@ -116,12 +116,12 @@ def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None
 
 
 def _values(points: Sequence[Measured], of: Callable[[Modal], float | None], scale: float = 1.0) -> np.ndarray:
-    """float[n]: a modal property of every point; NaN where there is none."""
+    """Return a modal property of every point, float[n]; NaN where the point has none."""
     return scale * np.array([np.nan if point.modal is None else of(point.modal) for point in points], float)
 
 
 def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[tuple[list[Measured], float, bool]]:
-    """Measured points of each repeat in the order of amplitude, the scale of amplitudes, whether it is the first."""
+    """Yield for each repeat: measured points by rising amplitude, the amplitude scale, and whether it is the first repeat."""
     measured = [point for point in points if point.vibration is not None]
     if not measured:
         say_why_empty(axis, "no level was passed")

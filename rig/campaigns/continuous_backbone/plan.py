@@ -1,4 +1,4 @@
-"""The continuous backbone: the response level goes up and down without ever waiting, and every instant is a measurement."""
+"""The continuous backbone campaign: ramp the response level up and down without waiting, and evaluate every instant."""
 
 from typing import Literal, Self
 
@@ -16,11 +16,12 @@ __all__ = ["ContinuousBackbonePlan"]
 
 
 class ContinuousBackbonePlan(LockedPlan):
-    """Phase-resonant vibrations whose level is ramped up and down; nothing settles.
+    """Phase-resonant vibrations whose level is ramped up and down without settling.
 
-    From ``start_v`` the response's loop takes over and goes to the lowest level, where the lock has ``lock_periods`` to be
-    gained. Then the level goes up to the highest and down again, by its logarithm, in ``sweep_periods`` each way. The slow flow
-    gives modal frequency and damping at every instant; results are means of up and down at the levels that are given.
+    From ``start_v`` the response loop takes over and goes to the lowest level, where the lock has ``lock_periods`` to be
+    gained. Then the level rises to the highest and falls again, each way in ``sweep_periods`` and linearly in the logarithm of
+    the level. The slow flow gives modal frequency and damping at every instant. The results at the given levels are means of
+    the way up and the way down.
     """
 
     kind: Literal["continuous-backbone"] = "continuous-backbone"
@@ -28,23 +29,26 @@ class ContinuousBackbonePlan(LockedPlan):
     ramp_periods: float = Field(10.0, ge=1, le=1e5)
     """Length of the ramp to the lowest level, periods."""
     lock_periods: float = Field(10.0, ge=0, le=1e5)
-    """Time at the lowest level before the way up, for the lock to be gained, periods."""
+    """Time at the lowest level before the way up, in which the lock is gained, periods."""
     sweep_periods: float = Field(ge=10, le=1e6)
-    """Length of the way up, and of the way down, periods."""
+    """Length of each of the two ways, up and down, periods."""
     end_periods: float = Field(0.0, ge=0, le=1e5)
-    """Time at the lowest level after the way down: noise counts most there, periods."""
+    """Time at the lowest level after the way down, periods. The signal is weakest there, so noise matters most."""
     margin: float = Field(0.05, gt=0, le=1)
-    """How far the level goes beyond the lowest and highest of ``levels_m``, relative."""
+    """Relative margin by which the ramps pass below the lowest and above the highest of ``levels_m``."""
     bandwidth: float = Field(0.08, gt=0, le=1)
-    """Half width, in the logarithm of the amplitude, of what is taken together for one level."""
+    """Half width of the band of amplitudes that are evaluated together for one level, in the logarithm of the amplitude."""
     accepted_alien_force: float = Field(0.25, gt=0, le=1)
-    """As of every plan under a lock, but wider: what swings while the lock is gained stands beside the harmonics."""
+    """As for every plan under a phase lock, but with a wider default: oscillations while the lock is gained lie beside the
+    harmonics."""
     accepted_detuning: float = Field(0.03, gt=0, le=1)
-    """Largest distance of the momentary frequency from the resonance found, relative; beyond, the lock is lost."""
+    """Largest relative distance of the instantaneous frequency from the identified resonance; beyond it the lock counts as
+    lost."""
     accepted_frequency_std: float = Field(1e-3, gt=0, le=1)
-    """Largest standard error of the modal frequency, relative, with which a point is accepted."""
+    """Largest relative standard error of the modal frequency with which a point is accepted."""
     accepted_damping_std: float = Field(0.1, gt=0, le=1)
-    """Largest standard error of the damping, relative, with which a point is accepted; up less down is part of it."""
+    """Largest relative standard error of the damping with which a point is accepted. It includes the difference of up and down.
+    """
 
     @model_validator(mode="after")
     def _in_metres(self) -> Self:
@@ -53,18 +57,18 @@ class ContinuousBackbonePlan(LockedPlan):
         return self
 
     def targets(self) -> tuple[Target, ...]:
-        """The levels of every repeat, rising."""
+        """Return the levels of every repeat, rising."""
         pairs = ((repeat, level) for repeat in range(1, self.repeats + 1) for level in sorted(self.levels))
         return tuple(Target(number=n, level=level, repeat=repeat) for n, (repeat, level) in enumerate(pairs))
 
     def together(self, number: int) -> frozenset[int]:
-        """All levels of one repeat."""
+        """Return the numbers of all levels of the same repeat."""
         count = len(self.levels)
         first = number // count * count
         return frozenset(range(first, first + count))
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments of every repeat that is not ``done`` in full: up and down over the levels it lacks."""
+        """Return the segments of every repeat that is not completely ``done``: up and down over its missing levels."""
         failure = OnFailure[self.on_failure.upper()]
         targets, count = self.targets(), len(self.levels)
         out = self.start_segments()
@@ -73,7 +77,7 @@ class ContinuousBackbonePlan(LockedPlan):
             if not left:
                 continue
             low, high = left[0].level / (1.0 + self.margin), left[-1].level * (1.0 + self.margin)
-            # The ways up and down bear different numbers: should the first fail, the second is not passed over with it.
+            # The ways up and down have different point numbers: if the way up fails, the way down is not skipped with it.
             up, down = left[0].number, left[-1].number
             out.append(Segment(SegmentKind.RAMP, up, low, self.ramp_periods, failure, geometric=True))
             if self.lock_periods > 0.0:

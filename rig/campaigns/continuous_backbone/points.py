@@ -1,4 +1,4 @@
-"""The points of a continuous backbone: what they hold, how they come from rows of ramps, and continuous backbones in memory."""
+"""Points of a continuous backbone: their contents, their evaluation from rows of ramps, and the backbones made of them."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -66,7 +66,7 @@ CONTINUOUS_BACKBONE_COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class OneWay:
-    """What was found at a level on one way."""
+    """Modal properties identified at a level from one way."""
 
     modal_frequency_hz: float
     """Modal frequency, Hz."""
@@ -84,14 +84,14 @@ class OneWay:
 
 @dataclass(frozen=True, kw_only=True)
 class ContinuousBackboneResult:
-    """What a point of a continuous backbone has beside the rest, which is the mean of the ways."""
+    """Results at one level in addition to those of every point. The common results of the point are means of both ways."""
 
     periods_of_both_ways: float
-    """Periods of both ways."""
+    """Length of both ways together, periods."""
     up: OneWay | None = None
-    """The way up; None where it did not pass the level."""
+    """Results of the way up; None if it did not pass the level."""
     down: OneWay | None = None
-    """The way down; None where it did not pass the level."""
+    """Results of the way down; None if it did not pass the level."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +101,11 @@ class _Together:
     covered: tuple[str, ...]
     """Names of these ways."""
     found: ContinuousBackbone
-    """What was found; a single way stands in both places."""
+    """The identified backbone. If there was a single way, it is used in both places."""
     flow: SlowFlow
     """The slow flow of both ways."""
     missing: str
-    """Why a way is missing; empty where none is."""
+    """Why a way is missing; empty if none is."""
 
 
 def measure_continuous_backbone(
@@ -116,10 +116,10 @@ def measure_continuous_backbone(
     passages: Sequence[Passage],
     ended: str,
 ) -> list[Point[ContinuousBackboneResult]]:
-    """The points at all levels of a way up and a way down; ``ended`` says why the output was brought down, if it was.
+    """Evaluate all levels of a way up and a way down; ``ended`` is the reason why the output was brought down, or empty.
 
-    A level that was passed on one way only has what was found there, and is not accepted; one that was not passed at all has
-    failed.
+    A level that was passed on one way only gets the results of that way and is not accepted. A level that was not passed at all
+    has failed.
     """
     try:
         flow = recorded_flow(bench, rows, plan.harmonics, plan.plant)
@@ -138,7 +138,7 @@ def _measured(
     ways: Mapping[str, Way],
     rows: np.ndarray,
 ) -> dict[int, Point[ContinuousBackboneResult]]:
-    """Points by number: from both ways, from one, or failed."""
+    """Return the points by number: evaluated from both ways, from one way, or failed."""
     groups: dict[tuple[str, ...], list[Target]] = {}
     for target in targets:
         covered = tuple(name for name in WAYS if ways[name].covers(target.level))
@@ -165,7 +165,7 @@ def _measured(
 
 
 def _together(reasons: Mapping[str, str]) -> str:
-    """Reasons by way, in one line; one that both share is said once."""
+    """Join the reasons of the ways into one line. A reason that both ways share is given once."""
     if len(reasons) == 2 and len(set(reasons.values())) == 1:
         return next(iter(reasons.values()))
     return "; ".join(f"way {name}: {why}" for name, why in reasons.items())
@@ -183,14 +183,14 @@ def _point(
     index: int,
     pieces: Sequence[np.ndarray],
 ) -> Point[ContinuousBackboneResult]:
-    """One level, the ``index``-th of those evaluated together: the mean of the ways, and how well it is known.
+    """Evaluate one level, the ``index``-th of those evaluated together: mean of the ways, with standard errors.
 
-    ``pieces`` are the rows near the level, way by way.
+    ``pieces`` are the rows near the level, one array per way.
     """
     covered, found = together.covered, together.found
     mode, vibration = found.nonlinear_mode(), found.backbone.points[index]
     frequency, damping = float(mode.modal_frequency_hz[index]), float(mode.damping_ratio[index])
-    # A single way stands in both places: its noise does not average out.
+    # A single way is used in both places, so its noise does not average out.
     single = math.sqrt(2.0) if len(covered) == 1 else 1.0
     frequency_std = single * float(mode.modal_frequency_std_hz[index])
     damping_std = single * float(mode.damping_ratio_std[index])
@@ -204,7 +204,7 @@ def _point(
         )
     )
     near = np.abs(np.log(together.flow.amplitude_m / target.level)) < plan.bandwidth
-    # The lag itself swings while the level is ramped; this is the one that a settled vibration so far off would have.
+    # The lag oscillates while the level is ramped. Report the lag that a settled vibration at this detuning would have.
     lags = np.degrees(np.arctan((together.flow.frequency_hz[near] / frequency - 1.0) / abs(damping)))
     ways = {name: _one_way(found, WAYS.index(name) if len(covered) == 2 else 0, index) for name in covered}
     rows = np.concatenate(pieces)
@@ -229,7 +229,7 @@ def _point(
 
 
 def _one_way(found: ContinuousBackbone, way: int, index: int) -> OneWay:
-    """What one way gave at a level."""
+    """Return the results of one way at a level."""
     return OneWay(
         modal_frequency_hz=float(found.modal_frequency_hz[way, index]),
         damping_ratio=float(found.damping_ratio[way, index]),
@@ -246,7 +246,7 @@ def continuous_backbones_of(
     specimen: str,
     drive_mode_shape: float | None,
 ) -> tuple[ContinuousBackbone, ...]:
-    """The accepted points of a recording, one continuous backbone per repeat; raises `IdentificationError` without any."""
+    """Return the accepted points as one continuous backbone per repeat; raise `IdentificationError` if there are none."""
     kinds = channels_from(channels)
     repeats: dict[int, list[Point[ContinuousBackboneResult]]] = {}
     for point in points:
@@ -277,7 +277,7 @@ def _from_points(
 
 
 def _both_ways(point: Point[ContinuousBackboneResult]) -> tuple[OneWay, OneWay]:
-    """What was found on the ways up and down past an accepted level."""
+    """Return the results of the ways up and down at an accepted level."""
     result = result_of(point)
     if result.up is None or result.down is None:
         raise RecordingError(f"{point_name(point.number)}: is accepted, but holds one way only")
@@ -285,7 +285,7 @@ def _both_ways(point: Point[ContinuousBackboneResult]) -> tuple[OneWay, OneWay]:
 
 
 def recorded_continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
-    """The accepted points, one backbone per repeat, with what was found on the way up and on the way down."""
+    """Return the accepted points as one backbone per repeat, with the results of the way up and of the way down."""
     specimen = bench_of_recording(recording).specimen
     return continuous_backbones_of(
         points_of(recording, ContinuousBackboneResult), recording.channels, specimen.name, specimen.drive_mode_shape
@@ -293,7 +293,7 @@ def recorded_continuous_backbones(recording: Recording) -> tuple[ContinuousBackb
 
 
 def recorded_mean_backbone(recording: Recording) -> Backbone:
-    """The means of up and down of all repeats, which know nothing of what lay between the two."""
+    """Return the means of up and down of all repeats as one backbone, without the differences between up and down."""
     passes = recorded_continuous_backbones(recording)
     points = [point for one in passes for point in one.backbone.points]
     repeats = [number for number, one in enumerate(passes, 1) for _ in one.backbone.points]

@@ -1,4 +1,4 @@
-"""The ways up and down of a continuous backbone: which instants of them are good, and what was near a level."""
+"""The ways up and down of a continuous backbone: select their usable instants, and the rows near a level."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,13 +23,13 @@ PIECE_PERIODS = FEWEST_PERIODS + 6.0
 
 @dataclass(frozen=True)
 class Way:
-    """What is good of one way: instants of the flow (None: nothing), and why there is no more of it."""
+    """The usable instants of one way (None: there are none), and why the way contains no more of them."""
 
     flow: SlowFlow | None
     why: str
 
     def covers(self, level_m: float) -> bool:
-        """Whether an amplitude was passed."""
+        """Whether the way passed an amplitude."""
         if self.flow is None:
             return False
         return bool(self.flow.amplitude_m.min() <= level_m <= self.flow.amplitude_m.max())
@@ -43,12 +43,12 @@ def both_ways(
     flow: SlowFlow,
     ended: str,
 ) -> dict[str, Way]:
-    """The good instants of the ways up and down: from the time at the lowest level on, and to that at the end."""
+    """Return the usable instants of each way: up with the time at the lowest level before it, down with the time after it."""
     middle = flow.time_s * bench.sample_rate_hz
     bad = flagged(bench, rows, flow)
     detuning = np.abs(flow.frequency_hz / flow.modal_frequency_hz - 1.0)
     bad["the lock was lost"] = ~(detuning <= plan.accepted_detuning)
-    # An amplitude that is kept low spoils no waveform: what was reached is good.
+    # An output at its voltage limit keeps the amplitude low but the waveform intact: the instants reached are usable.
     good = ~np.any([at for reason, at in bad.items() if reason != AT_VOLTAGE_LIMIT], axis=0)
     turn = turning_point(passages)
     turn = rows.size if turn is None else turn
@@ -68,9 +68,9 @@ def both_ways(
 
 
 def turning_point(passages: Sequence[Passage]) -> int | None:
-    """Number of the first row of the way down, which leads back to the level that the way up began with; None without one.
+    """Return the first row of the way down, which returns to the level at which the way up began; None if there is no way down.
 
-    What is left of a plan may lie anywhere among its levels: the passages themselves say which is the lowest.
+    The remaining levels of a plan may be any of its levels. Therefore the lowest level is taken from the passages.
     """
     lowest = min((p.level for p in passages), default=0.0)
     return next((p.first for p in passages if p.kind is SegmentKind.LEVEL_SWEEP and p.level == lowest), None)
@@ -86,7 +86,7 @@ def _why(passages: Sequence[Passage], ended: str) -> str:
 
 
 def rows_near(bench: Bench, rows: np.ndarray, way: Way, level_m: float) -> np.ndarray:
-    """The rows of some 20 periods about the instant at which a way came nearest to an amplitude."""
+    """Return the rows of some 20 periods around the instant at which a way came nearest to an amplitude."""
     if way.flow is None:
         return rows[:0]
     nearest = int(np.argmin(np.abs(np.log(way.flow.amplitude_m / level_m))))

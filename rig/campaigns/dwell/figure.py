@@ -20,7 +20,7 @@ NEAR = 0.2  # of a limit, from which on it is drawn: further away it would hide 
 
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw the accepted means over the cycles; limits are dashed, means that were not accepted are marked below."""
+    """Draw the accepted means over the cycles. Limits are dashed; means that were not accepted are marked at the bottom."""
     course, plan = recorded_course(recording), recording.configuration["plan"]
     axes: Any = page.subplots(2, 2, sharex=True)
     held = "levels_m" if plan.get("levels_m") else ""
@@ -47,7 +47,7 @@ def draw(page: "Figure", recording: Recording) -> None:
 
 
 def _limits(axis: "Axes", values: np.ndarray, plan: dict[str, Any], watched: str) -> None:
-    """The limits on the side to which the quantity has gone."""
+    """Draw the alarm and abort limits on the side to which the quantity has changed."""
     if not watched or not np.isfinite(values[0]):
         return
     sign = -1.0 if np.nanmean(values) < values[0] else 1.0

@@ -1,4 +1,4 @@
-"""The dwell campaign: phase resonance is tracked at one level for a time or a number of cycles."""
+"""The dwell campaign: track phase resonance at one level for a given time or number of cycles."""
 
 from typing import Literal, Self
 
@@ -15,50 +15,52 @@ from rig.tick.sequencer.segments import Segment
 __all__ = ["DriftLimits", "DwellPlan"]
 
 FEWEST_PERIODS = 10
-"""Periods of a mean, from which frequency and damping can be told."""
+"""Fewest periods of a mean from which frequency and damping can be identified."""
 
 
 class DriftLimits(Configured):
-    """Relative changes from the first mean, of either sign; a quantity without a limit is not watched."""
+    """Limits on relative changes from the first mean, of either sign. A quantity without a limit is not monitored."""
 
     frequency: float | None = Field(None, gt=0, le=1)
     """Relative change of the modal frequency."""
     damping: float | None = Field(None, gt=0, le=100)
     """Relative change of the damping ratio."""
     amplitude: float | None = Field(None, gt=0, le=100)
-    """Relative change of the displacement amplitude of the drive point; of the force, where the displacement is held."""
+    """Relative change of the displacement amplitude at the drive point; if the displacement is held, of the force."""
 
 
 class DwellPlan(SettledPlan):
     """One level held at phase resonance while the specimen ages, as in a fatigue test.
 
-    The vibration is settled once. From then on it is evaluated without a gap in means of ``mean_s``, each a point of the
-    recording: frequency, damping and amplitude over the cycles. Rows are stored in full for every ``record_every``-th mean, the
-    first and the last; in between one row in ``telemetry_s`` is stored, so that a test of ten hours stays small.
+    The vibration is settled once. From then on it is evaluated without a gap in means over ``mean_s``. Each mean is a point of
+    the recording: frequency, damping and amplitude over the cycles. All rows are stored for every ``record_every``-th mean, the
+    first and the last. For the other means one row every ``telemetry_s`` is stored, so that the file of a ten-hour test stays
+    small.
     """
 
     kind: Literal["dwell"] = "dwell"
     """Kind of campaign."""
     cycles: int | None = Field(None, ge=FEWEST_PERIODS, le=10**12)
-    """Number of cycles at the level; this or ``duration_s``."""
+    """Number of cycles at the level. Give either this or ``duration_s``."""
     duration_s: float | None = Field(None, gt=0, le=1e7)
-    """Time at the level, s; this or ``cycles``."""
+    """Time at the level, s. Give either this or ``cycles``."""
     mean_s: float = Field(10.0, gt=0, le=3600)
-    """Length of a mean, s. With ``cycles`` it is the whole periods of ``controller.centre_frequency_hz`` in that time."""
+    """Length of a mean, s. With ``cycles``, a mean has the nearest whole number of periods of
+    ``controller.centre_frequency_hz``."""
     record_every: int = Field(60, ge=1, le=10_000)
-    """Of how many means the rows of one are stored in full."""
+    """Interval, in means, at which all rows of a mean are stored."""
     telemetry_s: float = Field(0.1, gt=0, le=60)
-    """Time from one stored row to the next where rows are not stored in full, s."""
+    """Time between stored rows in means of which not all rows are stored, s."""
     ramp_periods: float = Field(40.0, ge=1, le=1e5)
     """Length of the ramp to the level, periods."""
     alarm: DriftLimits = DriftLimits()
-    """Changes from the first mean that are warned of; the test goes on."""
+    """Changes from the first mean that cause a warning. The test goes on."""
     abort: DriftLimits = DriftLimits()
     """Changes from the first mean at which the output is ramped down and the test ends."""
     accepted_level_error: float = Field(0.01, gt=0, le=1)
-    """Largest relative error of a held force or displacement over a mean with which it is accepted."""
+    """Largest relative error of a held force or displacement over a mean with which the mean is accepted."""
     repeats: Literal[1] = 1
-    """A specimen ages once."""
+    """Always 1: a specimen ages only once."""
 
     @model_validator(mode="after")
     def _one_length(self) -> Self:
@@ -78,27 +80,27 @@ class DwellPlan(SettledPlan):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Means, by the key that says for how long."""
+        """Number of means, under the key that gives the length of the test."""
         return {"cycles" if self.cycles is not None else "duration_s": self.n_means}
 
     @property
     def mean_periods(self) -> int:
-        """Periods of a mean, where the length is given in cycles."""
+        """Periods of a mean if the length of the test is given in cycles."""
         return max(FEWEST_PERIODS, round(self.mean_s * self.controller.centre_frequency_hz))
 
     @property
     def n_means(self) -> int:
-        """Number of means; what is left over lengthens or shortens the last by up to a half."""
+        """Number of means. The remainder of the test lengthens or shortens the last mean by up to half a mean."""
         whole = self.mean_s if self.duration_s is not None else float(self.mean_periods)
         length = self.duration_s if self.duration_s is not None else float(self.cycles or 0)
         return max(1, int(min(1e9, length / whole) + 0.5))
 
     def targets(self) -> tuple[Target, ...]:
-        """All means in their order."""
+        """Return all means in order."""
         return tuple(Target(number=number, level=self.levels[0]) for number in range(self.n_means))
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """Start, ramp and settling, then one record after the other for all means that are not ``done``."""
+        """Return start, ramp and settling, followed by one record for every mean that is not in ``done``."""
         failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
         left = [target for target in self.targets() if target.number not in done]
         if not left:
@@ -120,12 +122,12 @@ class DwellPlan(SettledPlan):
         return tuple(out)
 
     def row_stride(self, number: int, sample_rate_hz: float) -> int:
-        """1 for the means that are stored in full."""
+        """Return 1 if all rows of a mean are stored; otherwise the number of rows per stored row."""
         full = number % self.record_every == 0 or number == self.n_means - 1
         return 1 if full else max(1, round(self.telemetry_s * sample_rate_hz))
 
     def check(self, bench: Bench) -> None:
-        """Refuse, before anything moves, what the bench cannot do, and a limit on a damping that it cannot tell."""
+        """Refuse, before anything moves, what the bench cannot do, and damping limits if the damping cannot be determined."""
         super().check(bench)
         for name, limits in (("alarm", self.alarm), ("abort", self.abort)):
             if limits.damping is not None and bench.specimen.drive_mode_shape is None:

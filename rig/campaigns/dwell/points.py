@@ -1,4 +1,4 @@
-"""The means of a dwell: what they hold, how they come from recorded rows, and which changes raise an alarm or end the test."""
+"""Means of a dwell: their contents, their evaluation from recorded rows, and changes that raise an alarm or end the test."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -51,53 +51,53 @@ class Length:
     """Length of a mean."""
 
     cycles_in_mean: float
-    """Cycles."""
+    """Length in cycles."""
     seconds_in_mean: float
-    """Seconds."""
+    """Length in seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeldLevel:
-    """What was held over a mean."""
+    """The held quantity, evaluated over a mean."""
 
     force_rms_n: float
-    """RMS of the force's samples without their mean, with all their harmonics, N."""
+    """RMS of the force samples without their mean value, all harmonics included, N."""
     level_error: float | None
-    """Relative deviation of what a loop held from its level; None with levels in volts."""
+    """Relative deviation of the held quantity from its level; None with levels in volts."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Changes:
-    """Relative changes from the first accepted mean; None where one of the two means has no such quantity."""
+    """Relative changes from the first accepted mean; None where one of the two means lacks the quantity."""
 
     frequency_change: float | None
-    """Of the modal frequency."""
+    """Relative change of the modal frequency."""
     damping_change: float | None
-    """Of the damping ratio."""
+    """Relative change of the damping ratio."""
     amplitude_change: float | None
-    """Of the displacement amplitude of the drive point; of the force, where the displacement is held."""
+    """Relative change of the displacement amplitude at the drive point; if the displacement is held, of the force."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DwellResult:
-    """What a mean has beside what all points have."""
+    """Results of a mean in addition to those of every point."""
 
     cycles: float | None = None
-    """Cycles since the first mean began, at the middle of this one."""
+    """Cycles from the beginning of the first mean to the middle of this one."""
     time_s: float | None = None
-    """Seconds since the first mean began, at the middle of this one."""
+    """Seconds from the beginning of the first mean to the middle of this one."""
     length: Length | None = field(default=None, metadata=PART)
-    """Its length; None where nothing was recorded."""
+    """Length of the mean; None if nothing was recorded."""
     held: HeldLevel | None = field(default=None, metadata=PART)
-    """What was held; None where nothing was evaluated."""
+    """The held quantity; None if nothing was evaluated."""
     changes: Changes | None = field(default=None, metadata=PART)
-    """Changes from the first accepted mean; None where it was not accepted."""
+    """Changes from the first accepted mean; None if this mean was not accepted."""
 
 
 def measure_mean(
     bench: Bench, plan: DwellPlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[DwellResult]:
-    """Frequency, damping and amplitude of one mean, with its quality; its whole periods are evaluated."""
+    """Evaluate frequency, damping and amplitude of one mean over its whole periods, with its quality."""
     turned = np.unwrap(rows["theta_rad"].astype(float))
     cycles = float(turned[-1] - turned[0]) / (2.0 * math.pi) * rows.size / max(1, rows.size - 1)
     length = Length(cycles_in_mean=cycles, seconds_in_mean=rows.size / bench.sample_rate_hz)
@@ -119,10 +119,11 @@ def measure_mean(
 def watch_drift(
     plan: DwellPlan, known: Sequence[Point[DwellResult]], point: Point[DwellResult]
 ) -> tuple[Point[DwellResult], str]:
-    """The point with cycles and time at its middle and its changes from the first accepted mean; and why the test ends, if so.
+    """Complete a mean by cycles, time and changes; also return why the test ends, or an empty string.
 
-    Cycles and seconds count from the first mean, over all parts of a recording. Those of a mean that failed count too; the
-    ramp and the settling at the beginning of a part do not.
+    The changes are relative to the first accepted mean. Cycles and seconds refer to the middle of the mean and count from the
+    first mean, over all parts of a recording. Failed means count too; the ramp and the settling at the beginning of a part do
+    not.
     """
     cycles = sum(map(_cycles, known)) + 0.5 * _cycles_in_mean(point)
     seconds = sum(map(_seconds, known)) + 0.5 * _seconds(point)
@@ -147,7 +148,7 @@ def watch_drift(
 
 
 def _watched(plan: DwellPlan, point: Point[DwellResult]) -> dict[str, float | None]:
-    """Quantities of a mean, by the name of their limits in the plan; of force and displacement the one that is not held."""
+    """Return the monitored quantities of a mean, keyed as in the limits. Of force and displacement, it is the one not held."""
     modal, vibration = point.modal, point.vibration
     amplitude = None if vibration is None else vibration.force_n if plan.level_unit == "m" else vibration.amplitude_m
     return {
@@ -158,7 +159,7 @@ def _watched(plan: DwellPlan, point: Point[DwellResult]) -> dict[str, float | No
 
 
 def _cycles(point: Point[DwellResult]) -> float:
-    """Cycles that a mean has added: those of its record, or those until it failed."""
+    """Return the cycles that a mean has added: those of its record or, if it failed, those until it failed."""
     length = None if point.result is None else point.result.length
     return (point.settle_periods or 0.0) if length is None else length.cycles_in_mean
 
@@ -176,7 +177,7 @@ def _change(first: float | None, now: float | None) -> float | None:
 
 
 def _beyond(plan: DwellPlan, name: str, changes: Mapping[str, float | None]) -> Iterator[str]:
-    """A sentence for each change beyond its limit in the table ``name`` of the plan."""
+    """Yield a sentence for each change beyond its limit in the plan's table ``name``."""
     limits = getattr(plan, name)
     for quantity, change in changes.items():
         limit = getattr(limits, quantity)
@@ -190,18 +191,18 @@ def _beyond(plan: DwellPlan, name: str, changes: Mapping[str, float | None]) -> 
 
 @dataclass(frozen=True, eq=False)
 class DwellCourse:
-    """How a specimen aged: float64[n] over the accepted means, at their middle."""
+    """Ageing of a specimen: float64[n] arrays over the accepted means, each value at the middle of its mean."""
 
     cycles: NDArray[np.float64]
     """Cycles since the first mean began."""
     time_s: NDArray[np.float64]
-    """Seconds since the first mean began, settling at the beginning of further parts left out."""
+    """Seconds since the first mean began, without the settling at the beginning of later parts."""
     frequency_hz: NDArray[np.float64]
     """Frequency at which the phase was held."""
     modal_frequency_hz: NDArray[np.float64]
-    """The same without the phase error that was left."""
+    """Frequency at exact phase resonance: the held frequency corrected for the remaining phase error."""
     damping_ratio: NDArray[np.float64]
-    """Modal damping ratio; NaN where the bench knows no mode shape."""
+    """Modal damping ratio; NaN if the bench has no mode shape of the drive point."""
     amplitude_m: NDArray[np.float64]
     """Displacement amplitude of the drive point, m."""
     force_n: NDArray[np.float64]
@@ -211,7 +212,7 @@ class DwellCourse:
 
 
 def recorded_course(recording: Recording) -> DwellCourse:
-    """The accepted means of a recording; raises `identification.IdentificationError` without any."""
+    """Return the accepted means of a recording; raise `identification.IdentificationError` if there are none."""
     points = accepted_points(recording, DwellResult)
     vibrations = [vibration_of(point) for point in points]
     results, modal = [point.result for point in points], [point.modal for point in points]
@@ -234,7 +235,7 @@ def _table(recording: Recording) -> Contents:
 
 
 def _column(values: Iterable[float | None]) -> NDArray[np.float64]:
-    """NaN where there is no value."""
+    """Return the values as an array, with NaN for None."""
     return np.array([np.nan if value is None else value for value in values], float)
 
 

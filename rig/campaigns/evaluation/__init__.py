@@ -1,1 +1,1 @@
-"""From the recorded rows of a point to its result and its quality: what several kinds of campaigns share."""
+"""Evaluate the recorded rows of a point: results and quality, shared by several kinds of campaigns."""

@@ -1,6 +1,6 @@
-"""Whether a recorded point is accepted.
+"""Decide whether a recorded point is accepted.
 
-An objection is a line that says why a point is not accepted; it is empty where there is nothing to object to.
+An objection is a line that says why a point is not accepted. It is empty if there is no objection.
 """
 
 from collections.abc import Iterable
@@ -37,19 +37,19 @@ FAILING = 0.25  # of the largest motion: noise of a sensor is far below, and one
 
 
 def first_of(objections: Iterable[str]) -> str:
-    """The first that is not empty."""
+    """Return the first objection that is not empty."""
     return next((objection for objection in objections if objection), "")
 
 
 def phase_objection(error_deg: float, accepted_deg: float) -> str:
-    """That the recorded fundamental is too far from the wanted phase."""
+    """Object if the recorded fundamental is too far from the wanted phase."""
     if abs(error_deg) <= accepted_deg:
         return ""
     return f"phase error {error_deg:.2f} deg, accepted up to {accepted_deg:g} deg"
 
 
 def level_error(law: AmplitudeLaw, level: float, vibration: PeriodicVibration, force_rms_n: float) -> float | None:
-    """Relative error of what was held over the record; None where the level is a voltage, which nothing holds."""
+    """Relative error of the held quantity over the record; None if the level is a voltage, which no loop holds."""
     measured = {
         AmplitudeLaw.FORCE: vibration.force_n,
         AmplitudeLaw.FORCE_RMS: force_rms_n,
@@ -59,7 +59,7 @@ def level_error(law: AmplitudeLaw, level: float, vibration: PeriodicVibration, f
 
 
 def level_objection(law: AmplitudeLaw, error: float | None, accepted: float) -> str:
-    """That force or displacement is not what was asked for."""
+    """Object if the held force or displacement is too far from its level."""
     if error is None or abs(error) <= accepted:
         return ""
     held = "displacement" if law is AmplitudeLaw.RESPONSE else "force"
@@ -67,7 +67,7 @@ def level_objection(law: AmplitudeLaw, error: float | None, accepted: float) -> 
 
 
 def alien_objection(alien: float, accepted: float) -> str:
-    """That much of the force is neither a harmonic nor noise; nothing where that is not known (NaN)."""
+    """Object if too much of the force is neither a harmonic nor noise. If that part is unknown (NaN), there is no objection."""
     if not alien > accepted:
         return ""
     return (
@@ -77,7 +77,7 @@ def alien_objection(alien: float, accepted: float) -> str:
 
 
 def hunting_objection(scatter: float, accepted: float) -> str:
-    """That the frequency scatters from period to period."""
+    """Object if the frequency scatters too much from period to period."""
     if scatter <= accepted:
         return ""
     return (
@@ -87,7 +87,10 @@ def hunting_objection(scatter: float, accepted: float) -> str:
 
 
 def drift_objection(bench: Bench, vibration: PeriodicVibration, accepted: float) -> str:
-    """That force or drive changes over the record, or a response by a good part of the largest motion: its sensor fails."""
+    """Object if force or drive drifts over the record, or a response drifts by a large part of the largest motion.
+
+    A response that drifts that much while the drive does not has a failing sensor.
+    """
     if vibration.drift is None:
         return ""
     drifts, sizes = np.abs(vibration.drift), np.abs(vibration.harmonics[:, 1])
@@ -107,7 +110,7 @@ def drift_objection(bench: Bench, vibration: PeriodicVibration, accepted: float)
 
 
 def std_objection(frequency: float, accepted_frequency: float, damping: float, accepted_damping: float) -> str:
-    """That the relative standard errors of modal frequency or damping are too large."""
+    """Object if the relative standard error of modal frequency or damping is too large."""
     for name, std, accepted in (
         ("modal frequency", frequency, accepted_frequency),
         ("damping", damping, accepted_damping),
@@ -120,9 +123,9 @@ def std_objection(frequency: float, accepted_frequency: float, damping: float, a
 def settled_point(
     plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, level: str = ""
 ) -> Point[Any]:
-    """A point that was settled and then recorded at a held lag, accepted or not; ``level`` is the objection to what was held.
+    """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level.
 
-    All campaigns that settle and record at a held lag judge their points here.
+    All campaigns that settle and record at a held lag use this function.
     """
     scatter, alien = frequency_scatter(rows["theta_rad"]), alien_force(bench, [rows])
     reason = first_of(
@@ -151,5 +154,5 @@ def settled_point(
 
 
 def with_settling(point: Point[Any], settling: np.void) -> Point[Any]:
-    """The point with what its settle segment came to, from the outcome record of that segment."""
+    """Add the settling time and the amplitude drift to a point, from the outcome record of its settle segment."""
     return replace(point, settle_periods=float(settling["periods"]), amplitude_drift=float(settling["drift"]))

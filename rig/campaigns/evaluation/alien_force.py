@@ -1,4 +1,4 @@
-"""What of a force is neither a harmonic nor noise: another mode that the loop has woken, or a loop that swings."""
+"""The part of a force that is neither a harmonic nor noise, caused by another excited mode or an oscillating control loop."""
 
 import math
 from collections.abc import Sequence
@@ -18,12 +18,11 @@ WINDOW = (0.35875, -0.48829, 0.14128, -0.01168)  # Blackman-Harris: side lobes 9
 
 
 def alien_force(bench: Bench, pieces: Sequence[np.ndarray]) -> float:
-    """Part of the force's RMS, in rows of whole records or pieces of one, that is no harmonic and stands out of noise.
+    """Part of the force's RMS that is no harmonic and stands out of the noise; from whole records or pieces of one record.
 
-    Counted are the lines of the spectrum between the harmonics of the output's frequency that are 15 times the noise there;
-    noise is the median of all that is there. So force sensors may be as noisy as they like, and harmonics beyond those that
-    are evaluated are no strangers. Within ``MAIN_LOBE`` bins of a harmonic nothing is seen. NaN where every piece is shorter
-    than `FEWEST_PERIODS`.
+    The spectral lines between the harmonics of the output frequency count if they exceed 15 times the noise, which is the
+    median of all lines between harmonics. Therefore neither a noisy force sensor nor harmonics beyond the evaluated ones count.
+    Lines within ``MAIN_LOBE`` bins of a harmonic are ignored. Returns NaN if every piece is shorter than `FEWEST_PERIODS`.
     """
     spectra = [found for rows in pieces if (found := _spectrum(bench, rows)) is not None]
     if not spectra:
@@ -37,7 +36,10 @@ def alien_force(bench: Bench, pieces: Sequence[np.ndarray]) -> float:
 
 
 def _spectrum(bench: Bench, rows: np.ndarray) -> tuple[np.ndarray, Any] | None:
-    """Power of the force in bins from half the frequency on, and which of them lie between harmonics; None: too short."""
+    """Return the force's power in bins from half the output frequency, and a mask of bins between harmonics.
+
+    Returns None if the rows are too short.
+    """
     if rows.size < 2:
         return None
     theta = np.unwrap(rows["theta_rad"].astype(float))

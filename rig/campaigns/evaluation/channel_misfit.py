@@ -1,4 +1,4 @@
-"""What of a point does not fit, as a sentence: which channel, what was seen, what was expected and by what, where to look."""
+"""Describe in a sentence which channel of a point does not fit, against which expectation, and where to look for the cause."""
 
 from collections.abc import Sequence
 from enum import Enum
@@ -10,7 +10,7 @@ ALIKE = 1.5  # channels that are off by the same factor, to this, share one caus
 
 
 class Seen(Enum):
-    """By what something was expected."""
+    """Source of an expectation."""
 
     SHAPES = "by the mode shapes of the bench"
     BEFORE = "by the points before"
@@ -19,29 +19,29 @@ class Seen(Enum):
 
 
 class Misfit(NamedTuple):
-    """One channel against what is expected of it."""
+    """Comparison of one channel with its expected value."""
 
     channel: str
-    """Its name."""
+    """Name of the channel."""
     seen: float
-    """Its size over that of the drive channel; below 0 where it moves the other way than expected."""
+    """Amplitude over that of the drive channel; negative if the channel moves opposite to the expected direction."""
     expected: float
-    """What was expected, above 0."""
+    """Expected ratio, above 0."""
     factor: float
-    """By how much the two differ beyond what is allowed for, 1 or more."""
+    """Factor between the seen and the expected ratio beyond the allowance, 1 or more."""
     by: Seen
-    """What the expectation comes from."""
+    """Source of the expected ratio."""
     at: str = ""
-    """Level of the one point that it is compared with; empty where there are several."""
+    """Level of the single point used for the comparison; empty if several points were used."""
 
     @property
     def times(self) -> float:
-        """Seen over expected."""
+        """Ratio seen over ratio expected."""
         return self.seen / self.expected
 
 
 def told(misfits: Sequence[Misfit], drive: str, warned: float, refused: float) -> str:
-    """One sentence on what fits least. Channels that are all off alike have the channel ``drive`` in common."""
+    """Describe the worst misfit in one sentence. If all channels are off by the same factor, name channel ``drive`` instead."""
     worst = max(misfits, key=lambda misfit: misfit.factor)
     bound = f"refused from a factor {refused:g}" if worst.factor >= refused else f"trusted up to a factor {warned:g}"
     off = [misfit for misfit in misfits if misfit.by is worst.by and misfit.factor >= warned]

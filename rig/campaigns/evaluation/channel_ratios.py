@@ -1,4 +1,4 @@
-"""What the channels of a point are to each other: ratios of fundamentals and of RMS values, and how well they are known."""
+"""Ratios between the channels of a point: of fundamentals and of RMS values, with their standard errors."""
 
 import math
 from collections.abc import Sequence
@@ -11,25 +11,25 @@ from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 
 __all__ = ["motions_of", "ratios_of", "resistance_of", "rms_ratios_of", "shapes_of", "softened", "spread_of"]
 
-DETUNED = 20.0  # times what is allowed at resonance, for a square of the frequency that is off by all of itself
+DETUNED = 20.0  # factor on the allowance at resonance, per unit of relative error of the squared frequency
 
 
 def ratios_of(point: Point[Any], drive: int) -> np.ndarray:
-    """complex[n_channels]: fundamentals over that of the channel ``drive``, in the units of both."""
+    """Fundamentals over the fundamental of channel ``drive``: complex[n_channels], in the ratio of the channels' units."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(fundamentals / fundamentals[drive])
 
 
 def rms_ratios_of(channel_rms: Sequence[float], drive: int) -> np.ndarray:
-    """float64[n_channels]: RMS of the channels over that of the channel ``drive``, in the units of both."""
+    """RMS values over the RMS of channel ``drive``: float64[n_channels], in the ratio of the channels' units."""
     sizes = np.asarray(channel_rms, float)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(sizes / sizes[drive])
 
 
 def spread_of(bench: Bench, point: Point[Any], drive: int) -> np.ndarray | None:
-    """Standard errors of the ratios from noise and the converter's steps; None where there is no drive to compare with."""
+    """Standard errors of the ratios due to noise and the converter's quantisation; None if the drive amplitude is 0."""
     size = np.abs(spectrum_of(point).harmonics[:, 1])
     known = spectrum_of(point).harmonics_std
     std = np.zeros(size.size) if known is None else known[:, 1]
@@ -38,7 +38,7 @@ def spread_of(bench: Bench, point: Point[Any], drive: int) -> np.ndarray | None:
 
 
 def shapes_of(bench: Bench) -> np.ndarray | None:
-    """Mode shapes over that of the drive point; NaN for channels that have none."""
+    """Mode shapes over that of the drive point; NaN for channels without a mode shape. None if the drive point has none."""
     at_drive = bench.specimen.drive_mode_shape
     if at_drive is None:
         return None
@@ -48,12 +48,12 @@ def shapes_of(bench: Bench) -> np.ndarray | None:
 
 
 def motions_of(bench: Bench) -> list[int]:
-    """Indices of the drive channel and of all responses."""
+    """Indices of the drive channel and of all response channels."""
     return [index for index, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
 
 
 def softened(bench: Bench, point: Point[Any], drive: int) -> float:
-    """How many times the allowance at resonance is allowed, 1 or more."""
+    """Factor, 1 or more, by which the allowance grows away from resonance."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     force, velocity = fundamentals[bench.index_of("force")], -1j * fundamentals[drive]
     active = abs((force * velocity.conjugate()).real)
@@ -63,7 +63,7 @@ def softened(bench: Bench, point: Point[Any], drive: int) -> float:
 
 
 def resistance_of(bench: Bench, point: Point[Any]) -> float:
-    """Part of the force in phase with the drive point's velocity, over that velocity, N s/m."""
+    """Force in phase with the drive point's velocity, divided by that velocity, N s/m."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     velocity = fundamentals[bench.index_of("drive")] / (2j * math.pi * vibration_of(point).frequency_hz)
     force = fundamentals[bench.index_of("force")]

@@ -1,4 +1,4 @@
-"""How far a specimen has drifted over a run: its first point, measured once more at the end, against the first time."""
+"""Drift of a specimen over a run: compare the first point with its repetition at the end of the run."""
 
 from collections.abc import Iterable
 from typing import Any, TypeVar
@@ -11,16 +11,16 @@ Result = TypeVar("Result")
 
 
 def of_the_result(points: Iterable[Point[Result]]) -> list[Point[Result]]:
-    """The points without the repeated one."""
+    """Return the points without the repetition of the first point."""
     return [point for point in points if not point.repeats_first]
 
 
 def drift_of(points: Iterable[Point[Any]]) -> dict[str, Any] | None:
-    """Relative changes of frequency, damping and amplitude from the first point to its repetition, and their stored numbers.
+    """Return the relative changes from the first point to its repetition, with the numbers of both points.
 
-    ``points``: the results in the order of the plan. None where the plan repeats nothing, or one of the two was not accepted; a
-    single change is None where one of the two has no such quantity. The frequency is the modal one: a phase error does not
-    change it.
+    The changes are those of frequency, damping and amplitude. ``points`` are in the order of the plan. Returns None if the plan
+    repeats no point or one of the two points was not accepted. A single change is None if one of the two points lacks the
+    quantity. The frequency is the modal frequency, which a phase error does not affect.
     """
     known = list(points)
     again = next((point for point in known if point.repeats_first), None)
@@ -45,7 +45,7 @@ def _quantities(point: Point[Any]) -> dict[str, float | None]:
 
 
 def _same(point: Point[Any], again: Point[Any]) -> bool:
-    """Whether the plan asks for the same vibration."""
+    """Whether the plan asks for the same vibration in both points."""
     wanted, found = ((one.level, one.direction, one.repeat, one.asked_phase_lag_deg) for one in (again, point))
     return wanted == found
 

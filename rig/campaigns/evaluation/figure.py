@@ -1,4 +1,4 @@
-"""What the figures of several kinds of campaigns share: the course of the loop, and a heading."""
+"""Parts shared by the figures of several kinds of campaigns: the history of the control loop, and a heading."""
 
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ __all__ = ["draw_history", "heading", "said"]
 
 
 def said(recording: Recording, test: str) -> str:
-    """Specimen, kind of test, number of points and how many of them were not accepted."""
+    """Return specimen, kind of test, number of points and number of points not accepted, as one line."""
     points = points_of(recording)
     left_out = sum(not point.accepted for point in points)
     text = f"{specimen_of(recording)}: {test}, {len(points)} point{'' if len(points) == 1 else 's'}"
@@ -26,12 +26,12 @@ def said(recording: Recording, test: str) -> str:
 
 
 def heading(page: "Figure", recording: Recording) -> None:
-    """Write what the recording is over a page."""
+    """Write a heading that describes the recording above a page."""
     title(page, said(recording, f"{recording.kind} test"))
 
 
 def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None:
-    """The loop over time: oscillator frequency with the output amplitude, and the phase error; mean and range of each bin."""
+    """Draw the loop over time: oscillator frequency with output amplitude, and phase error; mean and range of each bin."""
     rate = float(recording.configuration["bench"]["sample_rate_hz"])
     level = frequency.twinx()
     width = max(1, recording.n_rows // TRACE_BINS)
@@ -60,7 +60,7 @@ def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None
 
 
 def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
-    """Mark the phase error of every recorded fundamental of a part; returns the largest, deg."""
+    """Mark the phase error of every recorded fundamental of a part; return the largest absolute value, deg."""
     marks = [
         (0.5 * (point.rows.first_sample + point.rows.end_sample), point.lock.phase_error_deg)
         for point in map(point_from, part.points)
@@ -75,12 +75,12 @@ def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
 
 
 def _binned(values: np.ndarray, width: int) -> np.ndarray:
-    """``values`` in rows of ``width``; an incomplete row at the end is left out."""
+    """Return ``values`` in rows of ``width``, without an incomplete last row."""
     return np.asarray(values[: values.size // width * width].reshape(-1, width))
 
 
 def _band(axis: "Axes", seconds: np.ndarray, values: np.ndarray, width: int, label: str | None = None) -> None:
-    """Mean of each bin as a line, its range as a band: plain decimation would alias the ripple of the detector."""
+    """Draw the mean of each bin as a line and its range as a band; plain decimation would alias the detector's ripple."""
     rows = _binned(values.astype(float), width)
     rows = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, np.nan)  # gaps stay gaps
     axis.fill_between(seconds, rows.min(axis=1), rows.max(axis=1), color=MAIN, alpha=0.25, lw=0)

@@ -1,4 +1,4 @@
-"""Frequency responses from the points of a recording, for every kind of campaign that steps through them."""
+"""Frequency responses from the points of a recording, for every kind of campaign that steps through frequencies or lags."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -15,21 +15,21 @@ from rig.recording.reader import Recording
 __all__ = ["frequency_responses_of", "recorded_frequency_responses"]
 
 CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
-"""What was held, by the unit of the levels."""
+"""The controlled quantity, by the unit of the levels."""
 
 
 def recorded_frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a recording, one response per level and pass, in the order of measurement."""
+    """Return the accepted points of a recording, one response per level and pass, in the order of measurement."""
     return frequency_responses_of(points_of(recording), recording.channels, specimen_of(recording))
 
 
 def frequency_responses_of(
     points: Iterable[Point[Any]], channels: Sequence[Mapping[str, Any]], specimen: str
 ) -> tuple[FrequencyResponse, ...]:
-    """The accepted points of a recording, one frequency response per level and pass.
+    """Return the accepted points of a recording as one frequency response per level and pass.
 
-    A held RMS of the force is ``controlled = "none"``: no fundamental is constant. Raises `IdentificationError` where no point
-    was accepted.
+    If the RMS of the force was held, no fundamental is constant and ``controlled`` is ``"none"``. Raises `IdentificationError`
+    if no point was accepted.
     """
     roles = [channel["role"] for channel in channels]
     force, drive = roles.index("force"), roles.index("drive")
@@ -62,7 +62,7 @@ def frequency_responses_of(
 
 
 def _label(level: float, unit: str, direction: str, repeat: int, alike: Sequence[tuple[Any, ...]]) -> str:
-    """The level, and of direction and repeat what tells it from the others of its level."""
+    """Return the level as text, with direction and repeat where other passes at the same level differ in them."""
     size = f"{1e3 * level:.4g} mm" if unit == "m" else f"{level:g} {unit}"
     size += f" {direction}" if len({other[1] for other in alike}) > 1 else ""
     return size + (f" {repeat}" if len({other[2] for other in alike}) > 1 else "")

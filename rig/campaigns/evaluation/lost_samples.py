@@ -1,4 +1,4 @@
-"""Samples that were lost on their way: which rows of a recording, and what stands in for them where none may be missing."""
+"""Samples lost in transfer: find the affected rows of a recording, and fill the gaps where complete signals are needed."""
 
 import math
 
@@ -10,34 +10,34 @@ __all__ = ["bridged", "lost_rows", "lost_warnings", "rms_of"]
 
 
 def lost_rows(rows: np.ndarray) -> np.ndarray:
-    """bool[n]: rows whose inputs are NaN: lost on their way, or the whole row in a damaged journal."""
+    """Return bool[n]: rows whose inputs are NaN, either lost in transfer or because the row is missing in a damaged journal."""
     return np.asarray(((rows["flags"] & SAMPLE_LOST) != 0) | np.isnan(rows["inputs"]).all(axis=1))
 
 
 def lost_warnings(rows: np.ndarray) -> list[str]:
-    """One line on how many samples are missing; none where all are there."""
+    """Return one line on the number of missing samples; an empty list if none is missing."""
     lost = int(np.count_nonzero(lost_rows(rows)))
     return [f"{lost} of {rows.size} samples were lost on their way"] if lost else []
 
 
 def rms_of(rows: np.ndarray) -> list[float]:
-    """RMS of every channel without its mean, in its unit; lost samples take no part."""
+    """RMS of every channel without its mean, in the channel's unit. Lost samples are left out."""
     inputs = rows["inputs"][~lost_rows(rows)].astype(float)
     return [float(value) for value in inputs.std(axis=0)] if inputs.size else [math.nan] * rows["inputs"].shape[1]
 
 
 def _turns(theta_rad: np.ndarray) -> np.ndarray:
-    """Turns of the oscillator, straight over rows that a damaged journal has lost."""
+    """Turns of the oscillator, interpolated linearly over rows missing in a damaged journal."""
     known = np.flatnonzero(np.isfinite(theta_rad))
     return np.asarray(np.interp(np.arange(theta_rad.size), known, np.unwrap(theta_rad[known]) / (2.0 * math.pi)))
 
 
 def bridged(rows: np.ndarray) -> np.ndarray:
-    """float64[n, n_channels]: the inputs, gaps filled with the mean of the readings one period before and after.
+    """Return the inputs, float64[n, n_channels], with gaps filled by the mean of the readings one period before and after.
 
-    These are read at the same phase, straight between samples, so that a vibration that grows or drifts steadily is met to
-    second order. For windows and spectra that stand no hole; results within reach of a gap are left out by whoever asks.
-    Without any loss the inputs are as recorded.
+    Both readings are taken at the same phase by linear interpolation. The error for a vibration that grows or drifts steadily
+    is therefore of second order. Use this for windows and spectra, which need signals without gaps; the caller must leave out
+    results within reach of a gap. Inputs without lost samples are returned as recorded.
     """
     inputs = np.asarray(rows["inputs"].astype(float))
     lost = lost_rows(rows)

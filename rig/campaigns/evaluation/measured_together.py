@@ -1,4 +1,4 @@
-"""Segments that are evaluated together: when they are over, and as whoever evaluates them sees them."""
+"""Segments that are evaluated together: decide when a round of them is over, and describe each for its evaluation."""
 
 from collections.abc import Set
 from typing import NamedTuple
@@ -11,37 +11,38 @@ __all__ = ["Passage", "Round", "round_at"]
 
 
 class Passage(NamedTuple):
-    """One segment among the rows of several points that are measured in one go."""
+    """One segment of a round, located in the rows of the points that are measured together."""
 
     kind: SegmentKind
-    """What it did with the level."""
+    """Kind of the segment: how it changed the level."""
     level: float
-    """Level that it ended with, or was to end with."""
+    """Final level of the segment, planned or reached."""
     first: int
-    """Number of its first row."""
+    """Index of the first row of the segment."""
     end: int
-    """Number of the row behind its last."""
+    """Index of the row after the last row of the segment."""
     outcome: Outcome
-    """How it ended; ``RUNNING`` where the loop did."""
+    """How the segment ended; ``RUNNING`` if the control loop ended first."""
 
 
 class Round(NamedTuple):
-    """All segments of points that are measured in one go."""
+    """All segments of points that are measured together."""
 
     end_segment: int
-    """Number of the segment behind its last."""
+    """Number of the segment after the last one of the round."""
     first_sample: int
-    """Sample of its first row."""
+    """Sample number of the first row of the round."""
     passages: tuple[Passage, ...]
-    """Its segments, but for those that were passed over."""
+    """Segments of the round, except those that were skipped."""
     ended_early: bool
-    """Whether the output was brought down before the plan was carried out."""
+    """Whether the output was brought down before the plan was completed."""
 
 
 def round_at(tick: Tick, segment: int, numbers: Set[int], *, cut_short: bool) -> Round | None:
-    """The round of the points ``numbers`` that begins with a segment; None where it has not begun or is not over.
+    """Return the round of the points ``numbers`` that begins with ``segment``; None if it has not begun or is not over.
 
-    It is over when all its segments are, when the output is brought down, or, ``cut_short``, whatever there is of it.
+    A round is over when all its segments are over or when the output is brought down. With ``cut_short``, a round that has
+    begun is returned as far as it was measured.
     """
     outcomes, segments = tick.outcomes, tick.arrays.segments
     end = segment

@@ -1,8 +1,8 @@
-"""Whether the channels of a point fit each other: by the mode shapes of the bench, and by the points before.
+"""Check whether the channels of a point fit each other, by the mode shapes of the bench and by earlier points.
 
-A sensor that fails in a plausible way trips nothing: one that reads noise only, one whose sensitivity has fallen to a tenth.
-At phase resonance of one mode the fundamental of response k over that of the drive is ``phi_k / phi_d``, a real number; higher
-harmonics and other modes change it by some per cent. What it differs by is a factor
+Some sensor failures trip nothing: a sensor that reads only noise, or whose sensitivity has fallen to a tenth. At phase
+resonance of one mode, the fundamental of response k over that of the drive is the real number ``phi_k / phi_d``; higher
+harmonics and other modes change it by some per cent. The deviation is expressed as a factor
 
     (max(|q|, |phi|) + a) / (min(|q|, |phi|) + a),    q = Y_k / Y_d phi_d
 
@@ -35,27 +35,27 @@ from rig.campaigns.planning.plan import Plan
 
 __all__ = ["REFUSED", "WARNED", "with_plausibility", "with_plausible_ways"]
 
-WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping with the root of the level
+WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping with the square root of the level
 REFUSED = 4.0
-ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres off its place
+ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres out of place
 SURE = 3.0  # standard errors
-FASTEST = 2.0  # change of a damping that is put down to the level
-NEAR = 0.1  # in frequency, relative: in open loop only points so near are compared
-FEW = 5  # of them
-MANY = 100  # under a lock: more would tell no more
+FASTEST = 2.0  # largest change of a damping that is attributed to the level
+NEAR = 0.1  # relative frequency distance: in open loop only points this close are compared
+FEW = 5  # largest number of such points
+MANY = 100  # largest number of points compared under a lock: more would add nothing
 
 
 def with_plausibility(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> Point[Any]:
-    """The point with its ``misfit``, the largest factor; with a warning or refused where that is too large.
+    """Return the point with ``misfit``, its largest factor, and with a warning or a refusal if the factor is too large.
 
-    ``before``: the points before. Those that did not fit or were not accepted are not compared with: a fault would become
-    the usual. A point that is like one that did not fit does not fit either.
+    ``before`` are the earlier points. Points that did not fit or were not accepted are not used as a reference; otherwise a
+    fault would become the expectation. A point that agrees with a point that did not fit does not fit either.
     """
     return _judged(bench, point, misfits_of(bench, plan, point, before))
 
 
 def with_plausible_ways(bench: Bench, point: Point[Any], pieces: Sequence[np.ndarray]) -> Point[Any]:
-    """The same from the rows of two ways past one level, of which a point holds the mean; a single way is not judged."""
+    """Check a point that is the mean of two ways by comparing the rows of both ways. A single way is not judged."""
     if len(pieces) < 2:
         return point
     drive = bench.index_of("drive")
@@ -85,12 +85,12 @@ def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point
 
 
 def _misfit_of(point: Point[Any]) -> float:
-    """Its misfit; 1 where there was nothing to compare with."""
+    """Return the misfit of a point; 1 if there was nothing to compare with."""
     return 1.0 if point.misfit is None else point.misfit
 
 
 def misfits_of(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
-    """By how much each channel differs from what is expected of it; none where nothing is known to compare with."""
+    """Return the misfit of each channel from its expectation; an empty list if nothing is known to compare with."""
     usual = [one for one in before if one.accepted and _misfit_of(one) < WARNED]
     if point.spectrum is not None:
         tones = [one for one in usual if one.spectrum is not None]
@@ -100,7 +100,7 @@ def misfits_of(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Poi
 
 
 def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
-    """Fundamentals of the responses over that of the drive."""
+    """Compare the fundamentals of the responses, relative to the drive, with the mode shapes and with earlier points."""
     drive, locked = bench.index_of("drive"), isinstance(plan, LockedPlan)
     ratios, spread = ratios_of(point, drive), spread_of(bench, point, drive)
     times = 1.0 if spread is None else softened(bench, point, drive)
@@ -125,10 +125,10 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Poi
 def _of_the_force(
     bench: Bench, point: Point[Any], usual: Sequence[Point[Any]], before: Sequence[Point[Any]]
 ) -> list[Misfit]:
-    """In-phase force over velocity, against the nearest of the points before: a damping may change with the level's root.
+    """Compare in-phase force over velocity with that of the nearest earlier point.
 
-    Over some levels a damping may change so much that a fault is hidden. So a point that is like a nearer one of which the
-    force did not fit does not fit either.
+    Damping may change with the square root of the level. Over several levels it may change so much that it hides a fault.
+    Therefore a point does not fit if it agrees with a nearer point whose force did not fit.
     """
     force = bench.channels[bench.index_of("force")].name
     nearest, misfitting = (
@@ -152,7 +152,7 @@ def _of_the_force(
 
 
 def _against(bench: Bench, point: Point[Any], other: Point[Any]) -> tuple[float, float]:
-    """Force over velocity over that of another point, and by how much that is more than the levels tell of."""
+    """Return the ratio of force over velocity to that of another point, and the factor that the levels do not explain."""
     here, there = resistance_of(bench, point), resistance_of(bench, other)
     if not (here > 0.0 and there > 0.0):
         return 1.0, 1.0
@@ -165,7 +165,7 @@ def _level_of(point: Point[Any]) -> str:
 
 
 def _of_a_band(bench: Bench, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
-    """RMS of force and responses over that of the drive, against the points before at the same level."""
+    """Compare the RMS of force and responses, relative to the drive, with earlier points at the same level."""
     alike = [one.channel_rms for one in before if one.channel_rms is not None and one.level == point.level]
     if point.channel_rms is None or not alike:
         return []
@@ -180,7 +180,7 @@ def _of_a_band(bench: Bench, point: Point[Any], before: Sequence[Point[Any]]) ->
 
 
 def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: Seen) -> Misfit:
-    """How far a ratio is from the expected one; opposite signs of what stands out are as far apart as can be."""
+    """Return the misfit between a ratio and its expectation. If both are significant, opposite signs are always refused."""
     size, wanted = abs(seen), abs(expected)
     factor = (max(size, wanted) + allowed) / (min(size, wanted) + allowed)
     turned = (seen * expected.conjugate()).real < 0.0
@@ -194,10 +194,10 @@ def _near_the_mode(bench: Bench, point: Point[Any]) -> bool:
 
 
 def _apart(one: Point[Any], other: Point[Any]) -> float:
-    """Between the levels of two points, as a logarithm."""
+    """Distance between the levels of two points, as a logarithm."""
     return abs(math.log(one.level / other.level))
 
 
 def _lags_apart(one: Point[Any], other: Point[Any]) -> float:
-    """Between the lags that were asked for, deg."""
+    """Distance between the requested lags of two points, deg."""
     return abs((one.asked_phase_lag_deg or 0.0) - (other.asked_phase_lag_deg or 0.0))

@@ -1,7 +1,7 @@
-"""A point of a recording: where it stands in the plan, whether it is used, and what was measured at it.
+"""A point of a recording: its place in the plan, whether it is used, and its results.
 
-`Point` holds what the points of all kinds of campaigns have. What several kinds measure is in parts of its own: `Vibration`,
-`Modal`, `Lock`. What one kind alone measures is its `Point.result`, a class that stands beside the kind's plan.
+`Point` holds the fields that points of all kinds of campaigns have. Results that several kinds share are in separate parts:
+`Vibration`, `Modal`, `Lock`. Results of one kind alone are in `Point.result`, a class defined beside the plan of that kind.
 `rig.campaigns.evaluation.stored_point` writes and reads the JSON form.
 """
 
@@ -35,18 +35,18 @@ __all__ = [
 ]
 
 PART = {"stored": "part"}
-"""Metadata of a field whose own fields are stored among the keys of the point."""
+"""Metadata of a field that is a dataclass whose fields are stored among the keys of the point."""
 PAIRS = {"stored": "pairs"}
-"""Metadata of a complex array, which is stored as pairs of real and imaginary part."""
+"""Metadata of a complex array, stored as pairs of real and imaginary part."""
 ARRAY = {"stored": "array"}
 """Metadata of an array of numbers."""
 
 
 class Quality(StrEnum):
-    """What a point is worth: the same words in files, tables, messages and figures. Only the first two are accepted."""
+    """Quality of a point. Files, tables, messages and figures use the same words. Only the first two count as accepted."""
 
     GOOD = "good"
-    """Accepted, and there is nothing to say."""
+    """Accepted without warnings."""
     WARNED = "warned"
     """Accepted, with warnings."""
     REJECTED = "rejected"
@@ -54,13 +54,13 @@ class Quality(StrEnum):
     IMPLAUSIBLE = "implausible"
     """Recorded, but a channel does not fit the others."""
     NOT_SETTLED = "not-settled"
-    """Not recorded: it did not settle in time."""
+    """Not recorded: the vibration did not settle in time."""
     DISTURBED = "disturbed"
     """The settle rule was broken while recording."""
     LOST_LOCK = "lost-lock"
     """The phase lock was lost."""
     NOT_LOCKED = "not-locked"
-    """No phase lock was gained."""
+    """No phase lock was reached."""
     UNREACHABLE = "unreachable"
     """The output stood at its voltage limit."""
     OUTSIDE_WINDOW = "outside-window"
@@ -70,71 +70,71 @@ class Quality(StrEnum):
 
     @property
     def accepted(self) -> bool:
-        """Whether such a point is used."""
+        """Whether a point of this quality is used."""
         return self in (Quality.GOOD, Quality.WARNED)
 
     @classmethod
     def of(cls, reason: str) -> "Quality":
-        """Quality of a point that was recorded, by the reason not to accept it, which is empty if it is accepted."""
+        """Return the quality of a recorded point: good if ``reason``, the reason not to accept it, is empty."""
         return cls.REJECTED if reason else cls.GOOD
 
 
 @dataclass(frozen=True, kw_only=True)
 class RowRange:
-    """Which rows of its part belong to a point."""
+    """Rows of a part that belong to a point."""
 
     first_sample: int
     """Number of the first row in the part."""
     end_sample: int
-    """Number of the row behind the last."""
+    """Number of the row after the last row."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spectrum:
-    """Harmonics of all channels over the record. Summaries leave them in the file."""
+    """Harmonics of all channels over the record. Summaries omit them; they remain in the file."""
 
     harmonics: NDArray[np.complex128] = field(metadata=PAIRS)
     """complex128[channel, h], h from 0: peak, ``y = Re sum_h Y_h exp(i h theta)``, SI."""
     harmonics_std: NDArray[np.float64] | None = field(metadata=ARRAY)
     """float64[channel, h]: standard errors."""
     residual_rms: NDArray[np.float64] = field(metadata=ARRAY)
-    """float64[channel]: RMS of what the harmonics leave of the signal."""
+    """float64[channel]: RMS of the signal after the harmonics are subtracted."""
     drift: NDArray[np.complex128] | None = field(metadata=PAIRS)
-    """complex128[channel]: relative change of the fundamental over the record; None where nothing was at rest."""
+    """complex128[channel]: relative change of the fundamental over the record; None if the vibration was not steady."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Purity:
-    """How pure a vibration is; NaN where there is no force or no motion."""
+    """Purity of a vibration; NaN where there is no force or no motion."""
 
     force_purity: float
-    """Fundamental of the force over the root of the sum of squares of its harmonics, 1 where it is pure."""
+    """Fundamental of the force over the root of the sum of squares of its harmonics; 1 for a pure force."""
     response_purity: float
-    """The same of the displacement of the drive point."""
+    """Fundamental of the drive point's displacement over the root of the sum of squares of its harmonics; 1 if pure."""
     power_indicator: float | None
-    """Active over apparent power, 1 where the force is in phase with the velocity. None in files of earlier versions."""
+    """Active over apparent power; 1 if the force is in phase with the velocity. None in files of earlier versions."""
     harmonic_power: float | None
-    """Power of all higher harmonics over that of the fundamental. None in files of earlier versions."""
+    """Power of all higher harmonics over power of the fundamental. None in files of earlier versions."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Vibration:
-    """A periodic vibration, as it was recorded at a point."""
+    """The periodic vibration recorded at a point."""
 
     frequency_hz: float
     """Frequency, Hz."""
     force_n: float
-    """Peak of the force's fundamental, N; of a short point the one that would hold it at phase resonance."""
+    """Peak of the force's fundamental, N. For a slow-flow point: the force that would hold the vibration at phase resonance."""
     amplitude_m: float
     """Peak of the fundamental of the drive point's displacement, m."""
     voltage_v: float
     """Mean amplitude of the output, V."""
     purity: Purity = field(metadata=PART)
-    """How pure it is."""
+    """Purity of force, motion and power."""
     periods: int
-    """Periods that were evaluated."""
+    """Number of periods evaluated."""
     spectrum: Spectrum | None = field(default=None, metadata=PART)
-    """Its harmonics; None in a summary."""
+    """Harmonics of all channels; None in a summary."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,9 +142,9 @@ class Modal:
     """Modal properties of the vibration."""
 
     modal_frequency_hz: float
-    """Frequency without the phase error that was left, Hz."""
+    """Frequency at exact phase resonance, corrected for the remaining phase error, Hz."""
     damping_ratio: float | None
-    """Modal damping ratio; None where the bench has no mode shape of the drive point."""
+    """Modal damping ratio; None if the bench has no mode shape of the drive point."""
     modal_frequency_std_hz: float | None = None
     """Standard error of the modal frequency, Hz."""
     damping_ratio_std: float | None = None
@@ -153,14 +153,14 @@ class Modal:
 
 @dataclass(frozen=True, kw_only=True)
 class Lock:
-    """How well a phase lag was held."""
+    """How accurately a phase lag was held."""
 
     phase_error_deg: float | None
-    """Wanted less measured lag of the fundamental, deg."""
+    """Wanted minus measured lag of the fundamental, deg."""
     phase_scatter_deg: float | None = None
     """Standard deviation of the lag while the point was recorded, deg."""
     frequency_scatter: float | None = None
-    """Standard deviation of the frequency from period to period, relative."""
+    """Relative standard deviation of the frequency from period to period."""
 
 
 Result = TypeVar("Result")
@@ -170,17 +170,17 @@ Result = TypeVar("Result")
 class Point(Generic[Result]):
     """A point that was measured, failed or was interrupted.
 
-    In the stored form a field that has a default is left out while it has its default value; all others are always there.
+    The stored form omits a field that has a default while it has its default value. All other fields are always stored.
     """
 
     number: int
-    """Number in the recording, from 0 and for good. People see `point_name`, which counts from 1."""
+    """Permanent number in the recording, from 0. People see `point_name`, which counts from 1."""
     level: float
-    """Level in the plan's unit."""
+    """Level in the unit of the plan."""
     level_unit: str
     """Unit of the level: V, V RMS, N, N RMS or m."""
     direction: Literal["up", "down", "both"]
-    """From where the level or frequency was approached; ``both`` for the mean of two ways."""
+    """Side from which the level or frequency was approached; ``both`` for the mean of two ways."""
     repeat: int
     """Number of the pass, from 1."""
     asked_frequency_hz: float | None = None
@@ -190,68 +190,68 @@ class Point(Generic[Result]):
     realisation: int | None = None
     """Number of a multisine's realisation, from 0."""
     repeats_first: bool = False
-    """Whether it is the first point measured again at the end, which is part of no result."""
+    """Whether this is the repetition of the first point at the end of the run. It enters no result."""
     settled: bool | None
-    """Whether the vibration settled; None where that was not asked for."""
+    """Whether the vibration settled; None if settling was not required."""
     reason: str
-    """Why it is not accepted; empty if it is."""
+    """Why the point is not accepted; empty if it is accepted."""
     quality: Quality
-    """What it is worth."""
+    """Quality of the point."""
     warnings: tuple[str, ...] | None = None
-    """What a user should know of it, one line each; None where nothing was evaluated."""
+    """Warnings for the user, one line each; None if nothing was evaluated."""
     settle_periods: float | None = None
-    """Periods from the end of the ramp until it settled or failed."""
+    """Periods from the end of the ramp until the vibration settled or the point failed."""
     amplitude_drift: float | None = None
-    """Last drift of the amplitude that the settle rule saw, relative."""
+    """Last relative drift of the amplitude that the settle rule computed."""
     alien_force: float | None = None
-    """Part of the force's RMS that is neither a harmonic nor noise; NaN where the record is too short to tell."""
+    """Part of the force's RMS that is neither a harmonic nor noise; NaN if the record is too short to determine it."""
     channel_rms: tuple[float, ...] | None = None
-    """RMS of every channel without its mean, where no single frequency was evaluated."""
+    """RMS of every channel without its mean, if no single frequency was evaluated."""
     lost_samples: int | None = None
-    """Samples that were lost on their way; None where nothing was recorded."""
+    """Number of samples lost in transfer; None if nothing was recorded."""
     misfit: float | None = None
-    """Largest factor by which a channel does not fit the others; None where there was nothing to compare with."""
+    """Largest factor by which a channel does not fit the others; None if there was nothing to compare with."""
     misfit_channels: tuple[str, ...] = ()
     """Names of the channels that do not fit."""
     rows: RowRange | None = field(default=None, metadata=PART)
-    """Where its rows are; None where none were recorded, or not all of them."""
+    """Rows of the point; None if no rows or not all of them were recorded."""
     vibration: Vibration | None = field(default=None, metadata=PART)
     """The vibration that was recorded."""
     modal: Modal | None = field(default=None, metadata=PART)
-    """Its modal properties."""
+    """Modal properties of the vibration."""
     lock: Lock | None = field(default=None, metadata=PART)
-    """How well its phase was held."""
+    """How accurately the phase was held."""
     result: Result | None = field(default=None, metadata=PART)
-    """What only this kind of campaign measures."""
+    """Results that only this kind of campaign has."""
     part: int | None = None
-    """Number of the part of the recording it lies in, from 0; None before it is recorded."""
+    """Number of the part of the recording that contains the point, from 0; None before it is recorded."""
 
     @property
     def accepted(self) -> bool:
-        """Whether it is used."""
+        """Whether the point is used."""
         return self.quality.accepted
 
     @property
     def evaluated(self) -> bool:
-        """Whether its rows told anything."""
+        """Whether the rows of the point gave a result."""
         return self.vibration is not None or self.channel_rms is not None
 
     @property
     def spectrum(self) -> Spectrum | None:
-        """Harmonics of its vibration; None where there is none."""
+        """Harmonics of the vibration; None if there are none."""
         return None if self.vibration is None else self.vibration.spectrum
 
     def refused(self, reason: str, quality: Quality = Quality.REJECTED) -> "Point[Result]":
-        """The same point, not accepted."""
+        """Return the same point, not accepted."""
         return replace(self, reason=reason, quality=quality)
 
     def warned(self, *texts: str) -> "Point[Result]":
-        """The same point with further warnings."""
+        """Return the same point with further warnings."""
         return replace(self, warnings=(*(self.warnings or ()), *texts))
 
 
 def planned_point(plan: Plan, target: Target) -> Point[Any]:
-    """A point as the plan asks for it, before anything is known of it."""
+    """Return a point as the plan asks for it, before anything is measured."""
     return Point(
         number=target.number,
         level=target.level,
@@ -269,26 +269,26 @@ def planned_point(plan: Plan, target: Target) -> Point[Any]:
 
 
 def point_name(number: int) -> str:
-    """What a point is called where people read it: its number in the recording, counted from 1."""
+    """Return the name of a point as people read it: its number in the recording, counted from 1."""
     return f"point {number + 1}"
 
 
 def vibration_of(point: Point[Any]) -> Vibration:
-    """The vibration of a point that must have one; `RecordingError` where it has none."""
+    """Return the vibration of a point that must have one; raise `RecordingError` if it has none."""
     if point.vibration is None:
         raise RecordingError(f"{point_name(point.number)}: holds no vibration")
     return point.vibration
 
 
 def spectrum_of(point: Point[Any]) -> Spectrum:
-    """The harmonics of a point that must have some; `RecordingError` where it has none."""
+    """Return the harmonics of a point that must have some; raise `RecordingError` if it has none."""
     if point.spectrum is None:
         raise RecordingError(f"{point_name(point.number)}: holds no harmonics")
     return point.spectrum
 
 
 def result_of(point: Point[Result]) -> Result:
-    """What the kind of campaign has measured at a point that must have been measured; `RecordingError` where it was not."""
+    """Return the results that only this kind of campaign has; raise `RecordingError` if the point has none."""
     if point.result is None:
         raise RecordingError(f"{point_name(point.number)}: holds no result")
     return point.result

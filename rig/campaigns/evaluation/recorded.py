@@ -1,4 +1,4 @@
-"""What a recording holds, as objects: its bench, its points, the rows of a point."""
+"""Read a recording as objects: its bench, its points, and the rows of a point."""
 
 from typing import Any, TypeVar, overload
 
@@ -18,12 +18,12 @@ Result = TypeVar("Result")
 
 
 def bench_of_recording(recording: Recording) -> Bench:
-    """The bench as it was."""
+    """Return the bench as it was recorded."""
     return validated(Bench, recording.configuration["bench"], "bench of the recording")
 
 
 def specimen_of(recording: Recording) -> str:
-    """Name of the specimen."""
+    """Return the name of the specimen."""
     return str(recording.configuration["bench"]["specimen"]["name"])
 
 
@@ -34,15 +34,16 @@ def points_of(recording: Recording, result: type[Result]) -> list[Point[Result]]
 
 
 def points_of(recording: Recording, result: type[Any] | None = None) -> list[Point[Any]]:
-    """The last result of each point that the plan in force asks for, in the order of the plan.
+    """Return the last result of each point of the current plan, in the order of the plan.
 
-    ``result`` is the class of what the kind of campaign measures; without it the points hold what all kinds have.
+    ``result`` is the class of the results that only this kind of campaign has. Without it, the points hold only what all kinds
+    have.
     """
     return [point_from(table) if result is None else point_from(table, result) for table in recording.latest.values()]
 
 
 def accepted_points(recording: Recording, result: type[Result]) -> list[Point[Result]]:
-    """The accepted ones of `points_of`; `IdentificationError` where there is none."""
+    """Return the accepted points among those of `points_of`; raise `IdentificationError` if there are none."""
     accepted = [point for point in points_of(recording, result) if point.accepted]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
@@ -50,10 +51,10 @@ def accepted_points(recording: Recording, result: type[Result]) -> list[Point[Re
 
 
 def point_rows(recording: Recording, number: int) -> np.ndarray:
-    """All recorded rows of a point by its stored ``number``, which counts from 0.
+    """Return all recorded rows of a point by its stored ``number``, which counts from 0.
 
-    A structured array with the inputs in SI units (`rig.tick.layout.recorded_row`). Raises `RecordingError` where there is no
-    such point or nothing was recorded of it; the message counts points from 1.
+    The rows are a structured array with the inputs in SI units (`rig.tick.layout.recorded_row`). Raises `RecordingError` if
+    there is no such point or nothing was recorded of it; the message counts points from 1.
     """
     for part in reversed(recording.parts):
         for table in part.points:

@@ -1,4 +1,4 @@
-"""The slow flow of recorded rows, and which of its instants are of use."""
+"""Slow flow of recorded rows, and the instants of it that are unusable."""
 
 import numpy as np
 
@@ -13,13 +13,14 @@ __all__ = ["AT_VOLTAGE_LIMIT", "flagged", "recorded_flow"]
 
 AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
 
-HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far an instant looks to either side
+HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far its window reaches to either side of an instant
 
 
 def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFacts | None = None) -> SlowFlow:
-    """The slow flow of recorded rows, the channels' skew taken out, and with a known plant the share of its other modes.
+    """Compute the slow flow of recorded rows.
 
-    Raises `identification.IdentificationError` where there is none to be seen.
+    The skew of the channels is removed. If the plant is known, the contribution of its other modes is removed too. Raises
+    `identification.IdentificationError` if the rows contain no vibration.
     """
     return slow_flow(
         rows["theta_rad"].astype(float),
@@ -34,7 +35,10 @@ def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFa
 
 
 def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndarray]:
-    """By reason, bool[n]: instants within whose window output, frequency or a sensor stood at a limit, or samples were lost."""
+    """Return the unusable instants by reason, bool[n] each.
+
+    An instant is unusable if, within its window, the output, the frequency or a sensor was at a limit, or samples were lost.
+    """
     half = HALF_WINDOW_PERIODS / flow.frequency_hz
     first, end = (
         np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size) for side in (-1, 1)

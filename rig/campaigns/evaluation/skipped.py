@@ -1,4 +1,4 @@
-"""What a run has not measured, and why, in one line."""
+"""Summarise in one line what a run has not measured, and why."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -9,9 +9,10 @@ __all__ = ["what_was_skipped"]
 
 
 def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
-    """Quality and place of the points that are missing: ``3 of 13 points skipped: not-settled (0.1 N), unreachable (2 N)``.
+    """Return the missing points by quality: ``3 of 13 points skipped: not-settled (0.1 N), unreachable (2 N)``.
 
-    Empty where every point was accepted. ``points`` are the last of each number, ``planned`` is how many the plan asks for.
+    The text is empty if every point was accepted. ``points`` holds the last result of each number; ``planned`` is the number of
+    points in the plan.
     """
     known = list(points)
     places: dict[str, list[str]] = {}
@@ -27,7 +28,7 @@ def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
 
 
 def _place(point: Point[Any]) -> str:
-    """Level, and frequency or lag where the plan asks for one."""
+    """Return the level of a point, with the frequency or lag if the plan asks for one."""
     where = [f"{point.level:.4g} {point.level_unit}"]
     if point.asked_frequency_hz is not None:
         where.append(f"{point.asked_frequency_hz:.6g} Hz")

@@ -1,7 +1,7 @@
-"""The JSON form of a point, in journals and HDF5 files: one table whose keys are the names of fields.
+"""JSON form of a point in journals and HDF5 files: one table whose keys are the names of fields.
 
-The fields of a point's parts stand among its own keys. A part is there if the key of its first field is. Unknown keys are
-ignored. Keys of parts that are missing, as in files of earlier versions, are None.
+The fields of a point's parts are stored among the keys of the point. A part is present if the key of its first field is.
+Unknown keys are ignored. Keys of parts that are missing, as in files of earlier versions, are read as None.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,23 +20,23 @@ Result = TypeVar("Result")
 
 
 def as_pairs(values: np.ndarray) -> Any:
-    """Complex numbers as [real, imaginary]."""
+    """Return complex numbers as [real, imaginary]."""
     return np.stack([values.real, values.imag], axis=-1).tolist()
 
 
 def as_complex(pairs: Any) -> np.ndarray:
-    """The inverse of `as_pairs`."""
+    """Return the complex array for the output of `as_pairs`."""
     array = np.asarray(pairs, float)
     return np.asarray(array[..., 0] + 1j * array[..., 1])
 
 
 def stored(point: Point[Any]) -> dict[str, Any]:
-    """The JSON form of a point."""
+    """Return the JSON form of a point."""
     return {**_table(point), "accepted": point.accepted}
 
 
 def _table(value: Any) -> dict[str, Any]:
-    """Keys and values of a dataclass, its parts among them."""
+    """Return the keys and values of a dataclass, including those of its parts."""
     out: dict[str, Any] = {}
     for one in fields(value):
         content = getattr(value, one.name)
@@ -64,16 +64,17 @@ def point_from(table: Mapping[str, Any], result: type[Result]) -> Point[Result]:
 
 
 def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Point[Any]:
-    """A point from its JSON form, with what its kind of campaign measured as a ``result``, or without that if None.
+    """Return a point from its JSON form.
 
-    Raises KeyError where a key is missing that points of all versions have.
+    ``result`` is the class of the results that only its kind of campaign has; if None, the point has no such results. Raises
+    KeyError if a key is missing that points of all versions have.
     """
     point: Point[Any] = _read(Point, {**table, "quality": _quality(table)}, result)
     return point
 
 
 def _quality(table: Mapping[str, Any]) -> Quality:
-    """The quality that a file tells; files of earlier versions have only ``accepted``."""
+    """Return the quality stored in a file. Files of earlier versions have only ``accepted``."""
     accepted, told = bool(table["accepted"]), table.get("quality")
     if told in set(Quality) and Quality(told).accepted is accepted:
         return Quality(told)
@@ -81,7 +82,7 @@ def _quality(table: Mapping[str, Any]) -> Quality:
 
 
 def _read(kind: Any, table: Mapping[str, Any], result: type[Any] | None = None) -> Any:
-    """A dataclass from the keys of a table."""
+    """Build a dataclass from the keys of a table."""
     found: dict[str, Any] = {}
     for one, inner, optional in _layout(kind):
         inner = result if inner is None and one.metadata == PART else inner
@@ -108,7 +109,7 @@ def _read(kind: Any, table: Mapping[str, Any], result: type[Any] | None = None) 
 
 
 def _first_key(kind: Any) -> str:
-    """Key of the first field of a part, which is there if the part is."""
+    """Return the key of the first field of a part. If this key is present, so is the part."""
     one, inner, _ = _layout(kind)[0]
     return _first_key(inner) if one.metadata == PART and inner is not None else one.name
 
@@ -119,7 +120,7 @@ def _tuples(value: Any) -> Any:
 
 @cache
 def _layout(kind: Any) -> tuple[tuple[Field[Any], type[Any] | None, bool], ...]:
-    """Of each field: itself, the dataclass that it holds (None: another type), and whether it may be None."""
+    """Return for each field: the field, the dataclass that it holds (None: another type), and whether it may be None."""
     hints = get_type_hints(kind)
     out = []
     for one in fields(kind):
@@ -130,17 +131,17 @@ def _layout(kind: Any) -> tuple[tuple[Field[Any], type[Any] | None, bool], ...]:
 
 
 def value_of(point: Point[Any], name: str) -> Any:
-    """The value of a field of a point or of one of its parts by its name; None where the part is not there."""
+    """Return the value of a named field of a point or of one of its parts; None if the part is missing."""
     return next((getattr(part, name) for part in _parts(point) if name in _own_names(type(part))), None)
 
 
 def names_of(result: type[Any]) -> frozenset[str]:
-    """Names of all fields of the points of a kind of campaign, by the class of its results."""
+    """Return the names of all fields that points of a kind of campaign have, given the class of its results."""
     return frozenset(_names(Point)) | frozenset(_names(result))
 
 
 def _parts(value: Any) -> Iterator[Any]:
-    """A dataclass and the parts in it."""
+    """Yield a dataclass and all parts in it."""
     yield value
     for one in fields(value):
         if one.metadata == PART and (part := getattr(value, one.name)) is not None:

@@ -1,4 +1,4 @@
-"""Quality of a recorded vibration: purity of force and response, bias of the damping by harmonics, scatter of the lag."""
+"""Quality of a recorded vibration: purity of force and response, bias of the damping due to harmonics, scatter of the lag."""
 
 import math
 
@@ -23,23 +23,23 @@ PURITY_COLUMNS = (
     Column("response_purity", "response purity", "%", ".2f", 100.0, in_line=False),
     Column("power_indicator", "power indicator", "%", ".2f", 100.0, in_line=False),
 )
-"""Columns that stand last in the tables of all campaigns under a lock."""
+"""Last columns in the tables of all campaigns under a phase lock."""
 
 BIASED_DAMPING = (
-    0.01  # of the fundamental's power in all other harmonics: from here on the two dampings differ too much
+    0.01  # power of all higher harmonics over that of the fundamental, above which the two dampings differ too much
 )
-OTHER_MODE = 0.1  # a nonlinear resonance this far from the linear one is rather that of another mode
-SCATTERING_DEG = 5.0  # a lag that scatters more tells of a signal that hardly stands out of noise and converter steps
+OTHER_MODE = 0.1  # a nonlinear resonance this far from the linear one more likely belongs to another mode
+SCATTERING_DEG = 5.0  # a larger scatter of the lag indicates a signal that hardly exceeds noise and converter steps
 
 
 def purity(vibration: PeriodicVibration) -> Purity:
-    """Purity of force, response and power, from the first harmonic on; 1 is pure.
+    """Return the purity of force, response and power, from the first harmonic up; 1 is pure.
 
     ``force_purity``, ``response_purity``: ``|Y_1| / sqrt(sum |Y_h|^2)`` of force and drive-point displacement.
-    ``power_indicator``: active over apparent power, ``P / (F_rms V_rms)`` with ``P = sum P_h``,
-    ``P_h = Re(F_h conj(V_h))/2``; 1 where the force is in phase with the velocity at every instant. ``harmonic_power``:
-    ``sum_{h>1} P_h / P_1``, by which part damping from the whole power differs from that of the fundamental.
-    NaN where there is no force or no motion.
+    ``power_indicator``: active over apparent power, ``P / (F_rms V_rms)`` with ``P = sum P_h``, ``P_h = Re(F_h conj(V_h))/2``;
+    1 if the force is in phase with the velocity at every instant. ``harmonic_power``: ``sum_{h>1} P_h / P_1``, the relative
+    difference between damping from the whole power and damping from the fundamental. All are NaN if there is no force or no
+    motion.
     """
     force, motion = vibration.force[1:], vibration.drive_m[1:]
     orders = np.arange(1, force.size + 1)
@@ -56,7 +56,7 @@ def purity(vibration: PeriodicVibration) -> Purity:
 
 
 def lag_scatter_deg(rows: np.ndarray) -> float:
-    """Standard deviation of the lag as the detector saw it, deg; NaN in open loop."""
+    """Standard deviation of the lag as measured by the detector, deg; NaN in open loop."""
     seen = rows["phase_error_rad"][np.isfinite(rows["phase_error_rad"])].astype(float)
     return math.degrees(float(seen.std())) if seen.size else math.nan
 
@@ -64,7 +64,7 @@ def lag_scatter_deg(rows: np.ndarray) -> float:
 def quality_warnings(
     bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True
 ) -> tuple[str, ...]:
-    """What a user should know of a recorded vibration, one line each. A lag that was not ``held`` may scatter."""
+    """Return warnings about a recorded vibration, one line each. The scatter of a lag that was not ``held`` is ignored."""
     out = [*vibration.warnings, *quantisation_warnings(vibration, bench)]
     scatter = lag_scatter_deg(rows) if held else 0.0
     if scatter > SCATTERING_DEG:
@@ -90,7 +90,7 @@ def quality_warnings(
 
 
 def vibration_part(vibration: PeriodicVibration, rows: np.ndarray) -> Vibration:
-    """What a point holds of the vibration in its ``rows``."""
+    """Return the part of a point that describes the vibration in its ``rows``."""
     return Vibration(
         frequency_hz=vibration.frequency_hz,
         force_n=vibration.force_n,

@@ -1,4 +1,4 @@
-"""What the evaluation of all campaigns shares: points that failed, channels, periodic vibrations."""
+"""Evaluation shared by all campaigns: failed points, channels, periodic vibrations."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 VOLTAGE = Channel("voltage", "monitor", "V")
-"""The output on the converter, as a channel beside the inputs."""
+"""The output measured at the converter, as a channel beside the inputs."""
 
 WHY = {
     Outcome.NOT_SETTLED: "not settled within {longest:g} periods",
@@ -43,21 +43,21 @@ WHY = {
     Outcome.INTERRUPTED: "interrupted",
 }
 
-POLARITY_DEG = 60.0  # a phase error that large is no matter of patience
-FEW_BITS = 20.0  # below, quantisation may move the damping by a percent, without noise to dither it
+POLARITY_DEG = 60.0  # a larger phase error does not come from a settling time that is too short
+FEW_BITS = 20.0  # below this, quantisation may change the damping by a percent unless noise dithers it
 
 
 def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> Point[Any]:
-    """A point whose rows tell of no vibration."""
+    """Return a point whose rows contain no vibration that can be evaluated."""
     return replace(planned_point(plan, target), settled=settled).refused(f"cannot be evaluated: {error}")
 
 
 def failed_point(
     plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False, locked: bool = False
 ) -> Point[Any]:
-    """A point that was not measured, with the reason.
+    """Return a point that was not measured, with the reason.
 
-    ``at_start``: no lock was gained at the start voltage. ``locked``: a lock had been gained before, so no polarity is wrong.
+    ``at_start``: no lock was gained at the start voltage. ``locked``: a lock had been gained before, so the polarity is right.
     """
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
@@ -80,9 +80,9 @@ def failed_point(
 def recorded_vibration(
     bench: Bench, rows: np.ndarray, harmonics: int, phase_lag_target_deg: float = 90.0
 ) -> PeriodicVibration:
-    """The periodic vibration in recorded rows, the channels' skew taken out.
+    """Return the periodic vibration in recorded rows, with the skew of the channels removed.
 
-    Lost rows take no part. Raises `identification.IdentificationError` where there is none to be seen.
+    Lost rows are left out. Raises `identification.IdentificationError` if the rows contain no vibration.
     """
     vibration = periodic_vibration(
         rows["theta_rad"].astype(float),
@@ -98,7 +98,7 @@ def recorded_vibration(
 
 
 def modal_part(mode: NonlinearMode) -> Modal:
-    """What a point holds of the nonlinear mode that was identified from it alone."""
+    """Return the part of a point that holds modal properties, from the nonlinear mode identified from this point alone."""
     damping = float(mode.damping_ratio[0])
     return Modal(
         modal_frequency_hz=float(mode.modal_frequency_hz[0]),
@@ -107,14 +107,14 @@ def modal_part(mode: NonlinearMode) -> Modal:
 
 
 def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:
-    """A recording's table of channels as measurements know them."""
+    """Convert a recording's table of channels to the channels of measurements."""
     return tuple(Channel(row["name"], row["role"], row["unit"]) for row in rows)
 
 
 def vibration_from(
     point: Point[Any], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
 ) -> PeriodicVibration:
-    """The vibration that a recorded point holds."""
+    """Return the vibration of a recorded point as a measurement."""
     vibration, spectrum = vibration_of(point), spectrum_of(point)
     return PeriodicVibration(
         channels,
@@ -130,13 +130,13 @@ def vibration_from(
 
 
 def within_periods(theta_rad: np.ndarray, periods: int) -> slice:
-    """The rows of the first so many periods, and one sample more."""
+    """Return the slice of rows that holds the first ``periods`` periods and one more sample."""
     turned = np.unwrap(theta_rad.astype(float))
     return slice(0, int(np.searchsorted(turned - turned[0], 2.0 * math.pi * periods)) + 1)
 
 
 def frequency_scatter(theta_rad: np.ndarray) -> float:
-    """Standard deviation of the frequency of single periods, relative to its mean."""
+    """Standard deviation of the frequency of single periods, relative to the mean frequency."""
     turned = np.unwrap(theta_rad.astype(float))
     turns = (turned - turned[0]) / (2.0 * math.pi)
     ends = np.interp(np.arange(int(turns[-1]) + 1), turns, np.arange(turns.size))
@@ -157,19 +157,19 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
 
 
 def _without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
-    """The vibration with every channel's harmonics turned forward by its skew: ``Y_h exp(i h Omega tau)``."""
+    """Correct the harmonics of every channel for the skew of the channel: ``Y_h exp(i h Omega tau)``."""
     orders = np.arange(vibration.harmonics.shape[1])
     return replace(vibration, harmonics=vibration.harmonics * skew_turn(bench, vibration.frequency_hz * orders))
 
 
 def skew_turn(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:
-    """Factors complex[n_channels, n] ``exp(2 pi i f tau)`` that take each channel's skew tau out of amplitudes at f."""
+    """Return factors ``exp(2 pi i f tau)``, complex[n_channels, n], which remove each channel's skew tau at frequency f."""
     delay_s = np.array([channel.skew_samples for channel in bench.channels]) / bench.sample_rate_hz
     return np.asarray(np.exp(2j * math.pi * np.outer(delay_s, frequency_hz)))
 
 
 def channels_of(bench: Bench) -> tuple[Channel, ...]:
-    """The bench's channels as measurements know them."""
+    """Convert the channels of a bench to the channels of measurements."""
     return tuple(
         Channel(c.name, cast(Literal["force", "drive", "response", "monitor"], c.role), c.unit) for c in bench.channels
     )

@@ -37,10 +37,10 @@ def draw_multisine(
     response: str = "drive",
     title: str = "",
 ) -> None:
-    """Amplitude spectra of voltage, force and response with their noise levels, and the frequency response with its own.
+    """Draw amplitude spectra of voltage, force and response, and the frequency response, all with their noise levels.
 
-    ``page`` is an empty figure, about 9 by 6.4 inches. Odd and even lines that are not excited have marks of their own: what
-    stands there above the noise is odd and even nonlinear distortion of the rig, shaker included.
+    ``page`` is an empty figure, about 9 by 6.4 inches. Lines that are not excited have separate marks for odd and even. What
+    exceeds the noise on them is odd or even nonlinear distortion of the rig, including the shaker.
     """
     force = next(channel.name for channel in spectra.channels if channel.role == "force")
     left, right = np.asarray(page.subfigures(1, 2))
@@ -61,7 +61,7 @@ def _spectrum(axis: "Axes", spectra: PeriodicSpectra, name: str, text: str) -> N
     amplitude, noise = spectra.amplitude[row], spectra.noise_std[row]
     dots = {"ls": "", "ms": 3.0}
     axis.semilogy(spectra.frequency_hz[excited], amplitude[excited], marker="o", color=MAIN, label="excited", **dots)
-    floor = 1e-6 * amplitude[excited].max()  # below lies rounding, not noise
+    floor = 1e-6 * amplitude[excited].max()  # anything lower is rounding, not noise
     if not excited.all():
         for name, marker, colour, parity in (("odd", "x", _ODD, ~spectra.even), ("even", "+", SECOND, spectra.even)):
             rest = ~excited & parity & (amplitude > floor)
@@ -90,7 +90,7 @@ def _response(page: Any, measured: InstrumentResponse, text: str) -> None:
     unit = {"m/s2/N": "1/kg", "m/s^2/N": "1/kg"}.get(measured.unit, measured.unit)
     size.set(ylabel=f"frequency response, {unit}")
     page.legend(fontsize=8, ncols=3, loc="outside lower center")
-    degrees = (np.degrees(np.angle(measured.value)) + 90.0) % 360.0 - 90.0  # neither 0 nor 180 deg is torn apart
+    degrees = (np.degrees(np.angle(measured.value)) + 90.0) % 360.0 - 90.0  # the curve has no jump at 0 or 180 deg
     phase.plot(frequency, degrees, ".-", ms=3, color=MAIN)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-100.0, 280.0), yticks=(-90, 0, 90, 180, 270))
 

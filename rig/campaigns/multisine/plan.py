@@ -1,4 +1,4 @@
-"""The multisine campaign in open loop: periodic random-phase signals, realisation by realisation, in whole periods."""
+"""The multisine campaign in open loop: periodic random-phase signals, recorded realisation by realisation in whole periods."""
 
 from typing import Literal, Self
 
@@ -14,45 +14,47 @@ from rig.tick.sequencer.segments import Excitation, Segment
 
 __all__ = ["MultisinePlan"]
 
-LARGEST_WAVEFORMS = 100_000_000  # samples of all realisations, that are held in memory
+LARGEST_WAVEFORMS = 100_000_000  # samples of all realisations, which are held in memory
 
 
 class MultisinePlan(OpenLoopPlan):
-    """Multisines at given RMS voltages, several realisations of random phases at each.
+    """Multisines at given RMS voltages, with several realisations of random phases at each level.
 
-    Every realisation begins from rest, is played for ``transient_periods`` that are thrown away, and recorded for ``periods``.
+    Every realisation begins from rest. It is played for ``transient_periods``, which are discarded, and then recorded for
+    ``periods``.
     """
 
     kind: Literal["multisine"] = "multisine"
     """Kind of campaign."""
     levels_rms_v: tuple[float, ...] = Field(min_length=1)
-    """RMS of the output voltage, V; every level is gone through in turn."""
+    """RMS of the output voltage, V. The levels are measured one after the other."""
     lowest_hz: float = Field(gt=0)
     """Lowest excited frequency, Hz."""
     highest_hz: float = Field(gt=0)
     """Highest excited frequency, Hz."""
     resolution_hz: float = Field(gt=0)
-    """Distance of neighbouring lines, Hz; a period lasts its inverse and must be a whole number of samples."""
+    """Distance of neighbouring lines, Hz. Its inverse is the period, which must be a whole number of samples."""
     grid: Literal["full", "odd", "odd-random"] = "full"
-    """Which lines of the band are excited: all, the odd multiples of the resolution, or these but for a random few, on which
-    odd distortion is heard. Even distortion is heard on even lines that are not excited."""
+    """Which lines of the band are excited: all (``full``), the odd multiples of the resolution (``odd``), or these except a
+    random few (``odd-random``), on which odd distortion is detected. Even distortion is detected on even lines that are not
+    excited."""
     detection_group: int = Field(4, ge=2, le=1000)
-    """Odd lines of a group, of which ``odd-random`` leaves out one, chosen by ``phase_seed``."""
+    """Number of odd lines in a group. ``odd-random`` leaves out one line of each group, chosen by ``phase_seed``."""
     realisations: int = Field(5, ge=1, le=1000)
     """Number of realisations at each level."""
     periods: int = Field(4, ge=1, le=100_000)
-    """Periods that are recorded of each."""
+    """Periods recorded of each realisation."""
     transient_periods: int = Field(2, ge=0, le=10_000)
-    """Periods that are played before."""
+    """Periods played before the recording starts."""
     phase_seed: int = Field(0, ge=0)
-    """Seed of the phases; realisation k of a seed is always the same signal, at every level."""
+    """Seed of the phases. For a given seed, realisation k is always the same signal, at every level."""
     silent_s: float = Field(0.0, ge=0, le=3600)
-    """Time at 0 V that is recorded before the first realisation, for the noise, s."""
+    """Time at 0 V that is recorded before the first realisation to measure the noise, s."""
     ramp_s: float = Field(0.5, gt=0, le=60)
     """Length of the ramps to the level and down from it, s."""
     accepted_change: float = Field(0.05, gt=0, le=1)
-    """Largest difference of force or drive between the first recorded period and the mean of the others, RMS in the band,
-    relative, with which a realisation is accepted: a transient or a disturbance."""
+    """Largest relative difference of force or drive between the first recorded period and the mean of the others with which a
+    realisation is accepted (RMS in the band). A larger difference indicates a transient or a disturbance."""
 
     @model_validator(mode="after")
     def _each_level_once(self) -> Self:
@@ -65,11 +67,11 @@ class MultisinePlan(OpenLoopPlan):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Levels and realisations."""
+        """Numbers of levels and realisations."""
         return {"levels_rms_v": len(self.levels_rms_v), "realisations": self.realisations}
 
     def design(self, sample_rate_hz: float) -> MultisineDesign:
-        """The multisine of unit RMS; `ConfigurationError` where it cannot be."""
+        """Return the multisine of unit RMS; raise `ConfigurationError` if no such multisine exists."""
         try:
             return MultisineDesign.with_resolution(
                 sample_rate_hz=sample_rate_hz,
@@ -85,11 +87,11 @@ class MultisinePlan(OpenLoopPlan):
 
     @property
     def level_unit(self) -> str:
-        """The levels are RMS voltages."""
+        """Unit of the levels: V RMS."""
         return "V RMS"
 
     def targets(self) -> tuple[Target, ...]:
-        """Every realisation at the first level, then at the next."""
+        """Return every realisation at the first level, then at the next level, and so on."""
         return tuple(
             Target(number=number, level=level, realisation=realisation)
             for number, (level, realisation) in enumerate(
@@ -98,20 +100,20 @@ class MultisinePlan(OpenLoopPlan):
         )
 
     def waveforms(self, sample_rate_hz: float) -> np.ndarray:
-        """One period of every realisation, of unit peak: float64[realisations, period]."""
+        """Return one period of every realisation, scaled to unit peak: float64[realisations, period]."""
         design = self.design(sample_rate_hz)
         return np.array([design.unit_peak(self.phase_seed, index) for index in range(self.realisations)])
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that play all realisations but those ``done`` already; their level is the waveform's peak."""
+        """Return the segments that play all realisations except those in ``done``. Their level is the peak of the waveform."""
         design = self.design(sample_rate_hz)
         ramp = self.ramp_s / design.period_s
-        recorded = self.periods + 1.0 / design.period_samples  # one sample to be sure of the last period
+        recorded = self.periods + 1.0 / design.period_samples  # one more sample, so that the last period is complete
         out: list[Segment] = []
         if self.silent_s and not done:  # a ramp from 0 V to 0 V: at a held level a quiet channel would count as stuck
             silent = Excitation(design.resolution_hz, waveform=0)
             out.append(Segment(SegmentKind.RAMP, -1, 0.0, self.silent_s / design.period_s, excitation=silent))
-        # Of each realisation once: it takes a Fourier transform.
+        # Compute each crest factor once: it takes a Fourier transform.
         crest_factors = [design.crest_factor(self.phase_seed, index) for index in range(self.realisations)]
         for target in self.targets():
             if target.number in done:
@@ -127,7 +129,7 @@ class MultisinePlan(OpenLoopPlan):
         return tuple(out)
 
     def check(self, bench: Bench) -> None:
-        """Refuse bands, periods and peaks beyond what the bench allows."""
+        """Refuse bands, periods and peaks that the bench does not allow."""
         self.check_frequencies(bench, lowest_hz=self.lowest_hz, highest_hz=self.highest_hz)
         design = self.design(bench.sample_rate_hz)
         most = LARGEST_WAVEFORMS // design.period_samples

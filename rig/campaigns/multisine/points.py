@@ -1,4 +1,4 @@
-"""The realisations of a multisine: what their points hold, how they come from recorded rows, and spectra in memory."""
+"""Realisations of a multisine: contents of their points, evaluation from recorded rows, and spectra of a recording."""
 
 import math
 from collections.abc import Mapping
@@ -46,12 +46,12 @@ MULTISINE_COLUMNS = (
 )
 
 _LINES = 50
-"""Lines over which noise is taken to be even."""
+"""Number of lines over which the noise is assumed to be constant."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MultisineResult:
-    """What was measured of a realisation."""
+    """Results of a realisation."""
 
     force_rms_n: float
     """RMS of the force over the band, N."""
@@ -62,15 +62,15 @@ class MultisineResult:
     voltage_peak_v: float
     """Peak of the output, V."""
     change: float | None
-    """Difference of force or drive between the first period and the others, relative; None with one period only."""
+    """Relative difference of force or drive between the first period and the others; None if there is only one period."""
     periods: int
-    """Periods that were recorded."""
+    """Number of periods recorded."""
 
 
 def measure_multisine_point(
     bench: Bench, plan: MultisinePlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[MultisineResult]:
-    """A recorded realisation, with its quality."""
+    """Evaluate a recorded realisation and its quality."""
     try:
         spectra = spectra_of(bench, plan, {target.realisation or 0: rows})
     except (IdentificationError, ArithmeticError) as error:
@@ -104,26 +104,27 @@ def measure_multisine_point(
 
 
 def _watched(bench: Bench, rows: np.ndarray) -> list[tuple[Channel, np.ndarray]]:
-    """Force and drive with what was read of them, but for lost samples."""
+    """Return force and drive channels with their readings, without lost samples."""
     readings = rows["inputs"][~lost_rows(rows)]
     return [(c, readings[:, i]) for i, c in enumerate(bench.channels) if c.role in ("force", "drive")]
 
 
 def _warnings(planned: int, periods: int) -> tuple[str, ...]:
-    """Warnings about the number of periods that were used, of those planned."""
+    """Return warnings about the number of used periods compared with the ``planned`` number."""
     left_out = (f"{planned - periods} of {planned} periods are left out",) if periods < planned else ()
     return (*left_out, *(("one period only: neither noise nor a transient can be told",) if periods == 1 else ()))
 
 
 def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
-    """Spectra of recorded rows, by the number of the realisation; every period is turned to begin where the signal does.
+    """Return the spectra of recorded rows, which are given by the number of the realisation.
 
-    The channels' skew is taken out. Periods in which samples were lost are left out.
+    Every period is rotated to begin where the signal begins. The skew of the channels is removed. Periods with lost samples are
+    left out.
     """
     design = plan.design(bench.sample_rate_hz)
     channels = len(bench.channels) + 1
     turned = [turned_periods(bench, plan, index, rows).reshape(channels, -1) for index, rows in records.items()]
-    shortest = min(record.shape[1] for record in turned)  # all realisations with as many periods as the poorest has
+    shortest = min(record.shape[1] for record in turned)  # all realisations get as many periods as the shortest has
     turned = [record[:, :shortest] for record in turned]
     spectra = periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
     without_skew = spectra.spectra.copy()
@@ -132,10 +133,11 @@ def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarr
 
 
 def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarray) -> np.ndarray:
-    """float[n_channels + 1, n_periods, n]: whole periods of realisation ``index``, each beginning where the signal does.
+    """Return whole periods of realisation ``index``, each rotated to begin where the signal does.
 
-    The output comes last. Periods in which samples were lost are left out; the channels' skew is still in them. Raises
-    `identification.IdentificationError` where the record is too short, or no period is left.
+    The result is float[n_channels + 1, n_periods, n]; the output is the last channel. Periods with lost samples are left out.
+    The skew of the channels is not removed. Raises `identification.IdentificationError` if the record is too short or no period
+    is left.
     """
     design = plan.design(bench.sample_rate_hz)
     size = design.period_samples
@@ -152,20 +154,20 @@ def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarr
 
 
 def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:
-    """By how many samples the one period of ``output`` lies behind the beginning of the ``period`` it plays."""
+    """Return the sample of the played ``period`` at which the recorded period of ``output`` starts."""
     match = np.fft.irfft(np.conj(np.fft.rfft(output)) * np.fft.rfft(period), period.size)
     return int(np.argmax(match))
 
 
 def _change(spectra: PeriodicSpectra, name: str) -> float:
-    """Difference between the first period and the mean of the others beyond noise, RMS over the band, relative.
+    """Return the difference between the first period and the mean of the others beyond noise: RMS over the band, relative.
 
-    0 where there is nothing in the others: a channel that stands still.
+    The result is 0 if the other periods contain no signal, as for a channel that does not change.
     """
     periods = spectra.spectra[0, :, spectra.index(name)]
     count, others = periods.shape[0], periods[1:].mean(axis=0)
     difference = periods[0] - others
-    if count > 2:  # the others among themselves
+    if count > 2:  # noise from the scatter of the other periods
         noise = np.sum(np.abs(periods[1:] - others) ** 2) / (count - 2) * count / (count - 1)
     else:
         noise = _rough_power(difference)
@@ -175,17 +177,17 @@ def _change(spectra: PeriodicSpectra, name: str) -> float:
 
 
 def _rough_power(difference: np.ndarray) -> float:
-    """Power of what differs from line to line, as noise does and a decaying vibration away from its resonance does not."""
+    """Power of the part that varies from line to line. Noise does; a decaying vibration away from its resonance does not."""
     if difference.size < 2 * _LINES:
         return 0.0
     bends = np.abs(difference[1:-1] - 0.5 * (difference[:-2] + difference[2:])) ** 2
     used = bends[: bends.size // _LINES * _LINES].reshape(-1, _LINES)
-    # A power of two degrees of freedom has its median at log 2 of its mean; the bend of noise has 3/2 of its power.
+    # Noise power with two degrees of freedom has its median at log 2 of its mean; the bend of noise has 3/2 of the noise power.
     return float(np.mean(np.median(used, axis=1)) / (1.5 * math.log(2.0)) * difference.size)
 
 
 def recorded_spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
-    """Spectra of every accepted realisation, by level (V RMS); the output is channel ``voltage``."""
+    """Return the spectra of every accepted realisation, by level (V RMS). The output is channel ``voltage``."""
     bench = bench_of_recording(recording)
     plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
     levels: dict[float, dict[int, np.ndarray]] = {}
@@ -193,7 +195,7 @@ def recorded_spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
     for point in accepted_points(recording, MultisineResult):
         level, recorded = point.level, result_of(point).periods
         levels.setdefault(level, {})[point.realisation or 0] = point_rows(recording, point.number)
-        periods[level] = min(periods.get(level, recorded), recorded)  # a change of plan may change them
+        periods[level] = min(periods.get(level, recorded), recorded)  # a changed plan may change their number
     return {
         level: spectra_of(bench, plan.model_copy(update={"periods": periods[level]}), records)
         for level, records in levels.items()
@@ -203,7 +205,7 @@ def recorded_spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
 def recorded_response_matrices(
     recording: Recording, *, estimator: Estimator = "instrument"
 ) -> dict[float, FrequencyResponseMatrix]:
-    """Frequency responses from the force to every motion, by level (V RMS), with their covariance."""
+    """Return the frequency responses from the force to every motion, by level (V RMS), with their covariance."""
     specimen = bench_of_recording(recording).specimen.name
     return {
         level: best_linear_approximation(measured, estimator=estimator, specimen=specimen)

@@ -1,1 +1,1 @@
-"""Plans: what every plan has, levels, what may be known of the plant, and what is refused before anything moves."""
+"""Plans: fields common to all plans, levels, knowledge of the plant, and checks before anything moves."""

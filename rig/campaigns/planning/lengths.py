@@ -1,4 +1,4 @@
-"""How long a plan may take, and how much of it is held in memory: absurd lengths are refused before anything moves."""
+"""Limit the duration of a plan and the size of a record held in memory. Absurd lengths are refused before anything moves."""
 
 from collections import defaultdict
 
@@ -11,9 +11,9 @@ from rig.tick.sequencer.segments import Segment
 __all__ = ["LONGEST_DAYS", "MOST_ROWS", "check_length"]
 
 LONGEST_DAYS = 100.0
-"""Of a whole plan whose every point takes all the time it may have to settle."""
+"""Longest duration of a whole plan if every point takes the longest time allowed for settling."""
 MOST_ROWS = 100_000_000
-"""Samples of one record, which is held in memory until it is evaluated: five hours at 5000 samples/s."""
+"""Most samples of one record, which is held in memory until it is evaluated: five hours at 5000 samples/s."""
 _DAY_S = 86400.0
 _KEYS = {
     SegmentKind.RAMP: ("ramp_periods", "level_ramp_periods", "approach_periods", "ramp_s", "silent_s"),
@@ -24,11 +24,11 @@ _KEYS = {
     SegmentKind.LEVEL_SWEEP: ("sweep_periods", "record_periods"),
     SegmentKind.START: ("start_periods",),
 }
-"""Keys that the length of a segment comes from, of which a plan has one or some."""
+"""Plan keys that determine the length of a segment, by kind of segment. A plan has one or more of them."""
 
 
 def check_length(plan: Plan, bench: Bench) -> None:
-    """Raise `ConfigurationError`, which names the keys, for a record beyond `MOST_ROWS` or a plan beyond `LONGEST_DAYS`."""
+    """Raise `ConfigurationError`, naming the keys, for a record beyond `MOST_ROWS` or a plan beyond `LONGEST_DAYS`."""
     took: dict[SegmentKind, float] = defaultdict(float)
     for segment in plan.segments(bench.sample_rate_hz):
         duration_s = _duration_s(plan, bench, segment)
@@ -49,7 +49,7 @@ def check_length(plan: Plan, bench: Bench) -> None:
 
 
 def _duration_s(plan: Plan, bench: Bench, segment: Segment) -> float:
-    """How long a segment takes at the most, at the lowest frequency that it may have, s."""
+    """Longest possible duration of a segment, at the lowest frequency that it may have, s."""
     if segment.kind is SegmentKind.SWEEP:
         return float(getattr(plan, "duration_s", 0.0))
     if segment.duration_s is not None:

@@ -1,4 +1,4 @@
-"""Levels of a plan: volts, newtons or metres, and how a loop is brought in before it holds them."""
+"""Levels of a plan in volts, newtons or metres, and the start at a voltage before a loop holds them."""
 
 import math
 from dataclasses import replace
@@ -23,11 +23,11 @@ LEVELS = {
     "levels_rms_n": (AmplitudeLaw.FORCE_RMS, "N RMS"),
     "levels_m": (AmplitudeLaw.RESPONSE, "m"),
 }
-"""What each key's levels are, and their unit."""
+"""Amplitude law and unit of the levels, by plan key."""
 
 
 class Levels(Configured):
-    """Levels in exactly one of four quantities; those that a loop holds may begin with a voltage, ``start_v``."""
+    """Levels in exactly one of four quantities. If a loop holds the levels, the run may begin at a voltage, ``start_v``."""
 
     levels_v: tuple[float, ...] | None = None
     """Levels as amplitude of the output voltage, V peak."""
@@ -40,8 +40,9 @@ class Levels(Configured):
     start_v: float | None = Field(None, gt=0)
     """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""
     start_periods: float = Field(40.0, ge=1, le=1e5)
-    """Time at ``start_v``, for the lock to be gained, periods; a little longer while one is in doubt. Without any at its end
-    (the frequency at an end of its window for 20 periods, or the phase far off for all of 100), the run ends."""
+    """Time at ``start_v`` in which the lock is gained, periods. It is extended a little while it is uncertain whether there is
+    a lock. If there is none at the end (the frequency stays at an end of its window for 20 periods, or the phase is far off for
+    100 periods), the run ends."""
 
     @model_validator(mode="after")
     def _levels_make_sense(self) -> Self:
@@ -59,12 +60,12 @@ class Levels(Configured):
 
     @property
     def level_count(self) -> dict[str, int]:
-        """Number of levels by their key, of any key that is given."""
+        """Number of levels, by each level key that is given."""
         return {name: len(getattr(self, name)) for name in LEVELS if getattr(self, name) is not None}
 
     @property
     def levels_key(self) -> str:
-        """Name of the key that the levels were given by."""
+        """Name of the key that gives the levels."""
         return next(name for name in LEVELS if getattr(self, name) is not None)
 
     @property
@@ -74,16 +75,16 @@ class Levels(Configured):
 
     @property
     def amplitude_law(self) -> AmplitudeLaw:
-        """What the levels are."""
+        """Quantity that the levels refer to."""
         return LEVELS[self.levels_key][0]
 
     @property
     def level_unit(self) -> str:
-        """``V``, ``N``, ``N RMS`` or ``m``."""
+        """Unit of the levels: ``V``, ``N``, ``N RMS`` or ``m``."""
         return LEVELS[self.levels_key][1]
 
     def start_segments(self, lag_deg: float | None = None, excitation: Excitation | None = None) -> list[Segment]:
-        """Set the rig in motion at ``start_v``; nothing where there is none or the levels are volts."""
+        """Return the segments that set the rig in motion at ``start_v``; none without ``start_v`` or with levels in volts."""
         if self.start_v is None or self.amplitude_law is AmplitudeLaw.VOLTAGE:
             return []
         ramp = Segment(
@@ -99,14 +100,14 @@ class Levels(Configured):
         return [ramp, replace(ramp, kind=kind, periods=self.start_periods)]
 
     def ratios_to_drive(self, bench: Bench) -> dict[str, float]:
-        """How far each channel moves for one metre at the drive point, as far as known: by the bench's mode shapes."""
+        """Return the motion of each channel per metre at the drive point, as far as the bench's mode shapes give it."""
         return bench.response_ratios
 
     def check_levels(self, bench: Bench, band_hz: tuple[float, float] | None = None) -> None:
-        """Refuse a level beyond the bench's limit, and levels of a logarithmic loop without a voltage to begin with.
+        """Refuse levels beyond the bench's limits, and levels of a logarithmic loop without a start voltage.
 
-        A displacement is checked at every channel whose motion in the mode under test is known, where the band that is
-        passed through, if any is given, holds that mode.
+        A displacement is checked at every channel whose motion in the tested mode is known. If a band is given, this check is
+        made only if the band contains the mode.
         """
         limits = bench.limits
         largest = {"V": limits.voltage_v, "N": limits.force_n, "N RMS": limits.force_n, "m": limits.displacement_m}
@@ -130,7 +131,7 @@ class Levels(Configured):
             raise ConfigurationError(f"start_v: levels by {self.levels_key} of this loop need a voltage to begin with")
 
     def _check_channels(self, bench: Bench) -> None:
-        """Refuse levels in metres that take a channel beyond its limits when the linear mode is passed."""
+        """Refuse levels in metres at which a channel exceeds its limits when the linear mode is passed."""
         if self.level_unit != "m":
             return
         omega = 2.0 * math.pi * bench.specimen.linear_frequency_hz

@@ -1,4 +1,4 @@
-"""What levels mean on a known linear plant: voltage, force, and the motion of every channel, against the bench's limits."""
+"""Check levels on a known linear plant: voltage, force, and motion of every channel, against the bench's limits."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,13 +10,13 @@ from rig.errors import ConfigurationError
 
 __all__ = ["MORE_DAMPING", "check_motion", "check_voltage", "lags_text", "motion_for", "voltage_for"]
 
-MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known one: a joint's rises with the level
+MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known damping: that of a joint rises with the level
 
 
 def check_voltage(levels: Levels, plant: PlantModel, lags_deg: Sequence[float], bench: Bench) -> None:
     """Refuse levels that need more than the bench's voltage."""
     limit = bench.limits.voltage_v
-    # All is linear in the level: what a unit of it needs is found once, for there may be many levels and lags.
+    # Everything is linear in the level. Compute the need of a unit level once, because there may be many levels and lags.
     of_unit, lag = max((voltage_for(plant, 1.0, levels.level_unit, lag), lag) for lag in lags_deg)
     for index, level in enumerate(levels.levels):
         volts = level * of_unit
@@ -31,10 +31,11 @@ def check_voltage(levels: Levels, plant: PlantModel, lags_deg: Sequence[float], 
 def check_motion(
     levels: Levels, plant: PlantModel, lags_deg: Sequence[float], bench: Bench, ratios: Mapping[str, float]
 ) -> None:
-    """Refuse levels that are beyond the limits of force, or of any channel's motion, whatever a joint may dissipate.
+    """Refuse levels beyond the limits of force or of any channel's motion, even if a joint adds damping.
 
-    ``ratios`` are how far channels move for one metre at the drive point. A joint that dissipates more moves less under a
-    force or a voltage, but needs more force for a displacement, and under a voltage its force drops out less.
+    ``ratios`` are the motions of the channels per metre at the drive point. With more damping the structure moves less under a
+    given force or voltage, but it needs more force for a given displacement, and under a given voltage the force drop-out is
+    smaller.
     """
     unit, most = levels.level_unit, MORE_DAMPING[-1]
     part = 1.0 if unit == "m" else most
@@ -64,7 +65,7 @@ def check_motion(
 
 
 def lags_text(lags_deg: Sequence[float]) -> str:
-    """The lags that are meant; nothing where that is resonance alone."""
+    """Return the lags as text; empty if the only lag is that of resonance."""
     if list(lags_deg) == [-90.0]:
         return ""
     if len(lags_deg) > 3:
@@ -73,7 +74,7 @@ def lags_text(lags_deg: Sequence[float]) -> str:
 
 
 def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> float:
-    """Voltage (V peak) that a level (V, N, N RMS, m) needs on a linear plant."""
+    """Voltage (V peak) that a linear plant needs for a level (V, N, N RMS, m)."""
     if unit == "V":
         return level
     omega = plant.lock_frequency_rad_s(lag_deg)
@@ -83,9 +84,9 @@ def voltage_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> f
 
 
 def motion_for(plant: PlantModel, level: float, unit: str, lag_deg: float) -> dict[str, float]:
-    """Force, displacement and acceleration (peak, by their limits' names) of the drive point at a level on a linear plant.
+    """Return peak force, displacement and acceleration of the drive point at a level on a linear plant.
 
-    The level is in V, N, N RMS or m.
+    The keys are the names of the limits. The level is in V, N, N RMS or m.
     """
     omega = plant.lock_frequency_rad_s(lag_deg)
     accelerance = abs(complex(plant.accelerance(1j * omega)))

@@ -1,4 +1,4 @@
-"""What all campaigns under a phase lock share: what they may know of the plant, what they check, what they accept."""
+"""Parts shared by all campaigns under a phase lock: known plant, checks and acceptance limits."""
 
 from typing import Literal
 
@@ -15,23 +15,23 @@ __all__ = ["LockedPlan", "SettledPlan"]
 
 
 class LockedPlan(KnownPlant, Plan):
-    """Base of the plans whose frequency follows a phase lag."""
+    """Base of the plans whose frequency is controlled to hold a phase lag."""
 
     controller: PhaseLockedLoop
     """The phase-locked loop, and the loops that hold levels in newtons or metres."""
     repeats: int = Field(1, ge=1, le=1000)
-    """How many times all points are passed through."""
+    """How many times all points are measured."""
     harmonics: int = Field(7, ge=1, le=50)
-    """Highest harmonic that is evaluated."""
+    """Highest harmonic evaluated."""
     accepted_alien_force: float = Field(0.1, gt=0, le=1)
-    """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted: another mode, a loop
-    that swings."""
+    """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted. Its cause is another
+    mode or an oscillating control loop."""
     on_failure: Literal["skip", "stop"] = "skip"
-    """What follows when a point fails: what comes next, or a ramp-down and the end."""
+    """What follows a failed point: ``skip`` goes on with the next point, ``stop`` ramps down and ends the run."""
 
     @property
     def counts(self) -> dict[str, int]:
-        """Levels and repeats."""
+        """Numbers of levels and repeats."""
         return {**self.level_count, "repeats": self.repeats}
 
     @property
@@ -41,7 +41,7 @@ class LockedPlan(KnownPlant, Plan):
 
     @property
     def asked_lags_deg(self) -> tuple[float, ...]:
-        """Every lag that is held, of the acceleration behind the force, deg."""
+        """All lags that are held, each of the acceleration behind the force, deg."""
         return (self.controller.phase_lag_deg,)
 
     def check(self, bench: Bench) -> None:
@@ -78,20 +78,20 @@ class LockedPlan(KnownPlant, Plan):
 
 
 class SettledPlan(LockedPlan):
-    """Base of the plans whose points are settled and then recorded."""
+    """Base of the plans whose points settle before they are recorded."""
 
     settle: SettleRule = SettleRule()
     """When a point counts as settled."""
     accepted_phase_error_deg: float = Field(3.0, gt=0, le=180)
     """Largest phase error of the recorded fundamental with which a point is accepted, deg."""
     accepted_frequency_scatter: float = Field(1e-3, gt=0, le=1)
-    """Largest scatter of the frequency from period to period, relative, with which a point is accepted: a loop that hunts
-    has not settled, whatever its averages say."""
+    """Largest relative scatter of the frequency from period to period with which a point is accepted. A loop that hunts has not
+    settled, whatever its averages are."""
     accepted_drift: float = Field(0.05, gt=0, le=1)
-    """Largest change of the fundamental of force or drive over a record, relative, in amplitude and phase together, with
-    which a point is accepted: the detector's filter hides what happens late in a record."""
+    """Largest relative change of the fundamental of force or drive over a record, in amplitude and phase together, with which a
+    point is accepted. The filter of the detector hides changes late in a record."""
     on_lost_lock: Literal["skip", "stop"] = "stop"
-    """What follows when a lock is lost where it is held: ``stop`` trips, ``skip`` seeks it again at the next point."""
+    """What follows when a held lock is lost: ``stop`` trips, ``skip`` seeks the lock again at the next point."""
 
     @property
     def settle_rule(self) -> SettleRule:

@@ -1,4 +1,4 @@
-"""What every plan has: points to measure, the segments that measure them, and what it needs of bench and law."""
+"""Base classes of all plans: points to measure, the segments that measure them, and the requirements on bench and law."""
 
 import math
 from abc import abstractmethod
@@ -18,41 +18,42 @@ from rig.tick.sequencer.segments import Segment, SettleRule
 __all__ = ["MOST_POINTS", "Column", "OpenLoopPlan", "Plan", "Target", "TonePlan", "with_first_repeated"]
 
 MOST_POINTS = 10_000
-"""Of a plan, repeats and both directions counted: at ten seconds a point more than a day.
-See `rig.campaigns.planning.lengths`, too."""
+"""Most points of a plan, including repeats and both directions: at ten seconds a point, more than a day. See also
+`rig.campaigns.planning.lengths`."""
 
 
 class Target(Configured):
-    """One point of a plan: where it is and from where it is approached."""
+    """One point of a plan: its coordinates and the side from which it is approached."""
 
     number: int
-    """From 0, in the order of measurement."""
+    """Number of the point, from 0, in the order of measurement."""
     level: float
     """Level in the plan's unit: V, N or m."""
     direction: Literal["up", "down"] = "up"
-    """Whether the level or frequency before was lower or higher; matters where the specimen remembers."""
+    """Whether the previous level or frequency was lower (``up``) or higher (``down``). This matters if the specimen has
+    hysteresis."""
     repeat: int = 1
     """Number of the pass, from 1."""
     frequency_hz: float | None = None
-    """Frequency, where the plan gives it."""
+    """Frequency, if the plan gives one, Hz."""
     phase_lag_deg: float | None = None
-    """Wanted lag of the drive-point acceleration behind the force, where the plan gives it, deg."""
+    """Wanted lag of the drive-point acceleration behind the force, if the plan gives one, deg."""
     realisation: int | None = None
     """Number of a multisine's realisation, from 0."""
     repeats_first: bool = False
-    """Whether it is the plan's first point measured again at its end, to see a drift; it is part of no result."""
+    """Whether this is the repetition of the first point at the end, which reveals a drift. It enters no result."""
 
 
 def with_first_repeated(targets: tuple[Target, ...]) -> tuple[Target, ...]:
-    """The targets and the first of them once more, numbered behind the last, so that all others keep their numbers."""
+    """Append the first target once more. It is numbered after the last target, so that all others keep their numbers."""
     return (*targets, targets[0].model_copy(update={"number": len(targets), "repeats_first": True}))
 
 
 class Column(NamedTuple):
-    """A quantity of a point as it is shown: key in the point, heading, unit, format, and what it is multiplied with.
+    """A column of tables of points: key in the point, heading, unit, format, and scale factor of the value.
 
-    ``plain``: in a line of its own unit's company it needs no name. ``in_line``: whether it is shown while the test runs, too,
-    and not in tables alone. ``optional``: shown only where there is a value.
+    ``plain``: in a line of text the heading is left out, because the unit already identifies the quantity. ``in_line``: the
+    column is also shown while the test runs, not only in tables. ``optional``: the column is shown only if it has a value.
     """
 
     key: str
@@ -78,7 +79,7 @@ class Plan(Configured):
     @property
     @abstractmethod
     def counts(self) -> dict[str, int]:
-        """How many of each the plan goes through, by its key, from nothing but the fields; their product is that of points."""
+        """Numbers of levels, repeats and so on, by plan key, from the fields alone. Their product is at most `MOST_POINTS`."""
 
     @model_validator(mode="after")
     def _not_too_many_points(self) -> Self:
@@ -91,12 +92,12 @@ class Plan(Configured):
 
     @property
     def level_unit(self) -> str:
-        """Unit of the targets' levels."""
+        """Unit of the levels."""
         return "V"
 
     @property
     def amplitude_law(self) -> AmplitudeLaw:
-        """What the segments' levels are."""
+        """Quantity that the levels of the segments refer to."""
         return AmplitudeLaw.VOLTAGE
 
     @property
@@ -111,32 +112,32 @@ class Plan(Configured):
 
     @abstractmethod
     def targets(self) -> tuple[Target, ...]:
-        """All points in the order of measurement."""
+        """Return all points in the order of measurement."""
 
     @abstractmethod
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that measure all points but those ``done`` already."""
+        """Return the segments that measure all points except those in ``done``."""
 
     @property
     def known_plant(self) -> PlantModel | None:
-        """Exciter and structure, where the plan knows them."""
+        """Model of exciter and structure, if the plan contains one."""
         return None
 
     @property
     def evaluates_approach(self) -> bool:
-        """Whether the rows of a point begin with the ramp to it; else with its record."""
+        """Whether the rows of a point begin with the ramp to the point; otherwise they begin with its record."""
         return False
 
     def together(self, number: int) -> frozenset[int]:
-        """Numbers of the targets that are measured in one go with this one, itself included."""
+        """Return the numbers of the targets that are measured together with this one, including its own."""
         return frozenset((number,))
 
     def row_stride(self, number: int, sample_rate_hz: float) -> int:
-        """Of how many rows one is stored while a target is measured; 1 for all."""
+        """Return the number of rows per stored row while a target is measured; 1 stores all rows."""
         return 1
 
     def waveforms(self, sample_rate_hz: float) -> np.ndarray | None:
-        """Waveforms of unit peak that the segments play, float64[n, period]; None where they play none."""
+        """Return the waveforms of unit peak that the segments play, float64[n, period]; None if they play none."""
         return None
 
     @abstractmethod
@@ -145,14 +146,14 @@ class Plan(Configured):
 
 
 class OpenLoopPlan(Plan):
-    """Base of the plans without feedback of the phase: the frequency is the plan's."""
+    """Base of the plans without phase feedback: the plan prescribes the frequency."""
 
     controller: OpenLoop = Field(OpenLoop(), validation_alias=AliasChoices("controller", "demodulation"))
-    """How force and response are demodulated beside the excitation, and the loops that hold levels in newtons or metres."""
+    """Demodulation of force and response, and the loops that hold levels in newtons or metres."""
 
     @property
     def law(self) -> Law:
-        """No feedback of the phase."""
+        """The control law, which has no phase feedback."""
         return self.controller
 
     def check_frequencies(self, bench: Bench, **frequencies_hz: float) -> None:
@@ -166,9 +167,9 @@ class OpenLoopPlan(Plan):
 
 
 class TonePlan(Levels, OpenLoopPlan):
-    """Base of the plans that put out one frequency at a time; every level is gone through in turn."""
+    """Base of the plans that excite one frequency at a time. The levels are measured one after the other."""
 
     @property
     def counts(self) -> dict[str, int]:
-        """Levels."""
+        """Number of levels."""
         return self.level_count

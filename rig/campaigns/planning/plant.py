@@ -1,4 +1,4 @@
-"""What a plan may know of the plant, and what is refused on that ground before anything moves."""
+"""Knowledge of the plant in a plan, and the checks that it allows before anything moves."""
 
 import math
 from collections.abc import Sequence
@@ -30,11 +30,11 @@ from rig.errors import ConfigurationError
 
 __all__ = ["KnownPlant", "PlantFacts", "control_loop"]
 
-CLOSEST_DEG = 0.5  # lags that are checked on the plant: a few hundred at the most, each takes milliseconds
+CLOSEST_DEG = 0.5  # spacing of the lags that are checked on the plant: at most a few hundred, each takes milliseconds
 
 
 class PlantFacts(Configured):
-    """Exciter and structure near the mode, from voltage to force and acceleration, as ``rig tune`` has measured them.
+    """Model of exciter and structure near the mode, from voltage to force and acceleration, as measured by ``rig tune``.
 
     See `controller.tuning.PlantModel`: force per volt is ``1/(alpha + beta Y)`` with the structure's accelerance Y.
     """
@@ -42,9 +42,9 @@ class PlantFacts(Configured):
     frequency_rad_s: float = Field(gt=0)
     """Angular frequency of the mode of the structure alone, rad/s."""
     damping_ratio: float = Field(gt=0, lt=1)
-    """Its damping ratio."""
+    """Damping ratio of the mode."""
     drive_shape: float = Field(gt=0)
-    """Its mass-normalised shape at the drive point, kg^-1/2."""
+    """Mass-normalised mode shape at the drive point, kg^-1/2."""
     residual_per_kg: tuple[float, float]
     """Accelerance of the other modes, 1/kg: a constant, and the factor of (s/centre)^2."""
     force_v_n: tuple[float, float, float, float]
@@ -54,43 +54,43 @@ class PlantFacts(Configured):
     centre_rad_s: float = Field(gt=0)
     """Angular frequency that s is divided by, rad/s."""
     band_hz: tuple[float, float]
-    """Band that was fitted, Hz."""
+    """Fitted frequency band, Hz."""
     fit_error: float = Field(ge=0)
     """Relative error of the fit, root mean square."""
     sample_rate_hz: float = Field(gt=0)
     """Sample rate of the loop, Hz."""
     latency_samples: float = Field(ge=0)
-    """Samples from an output to the input that shows it."""
+    """Samples between an output and the input that responds to it."""
     response_ratios: dict[str, PositiveFloat] = Field(default_factory=dict)
-    """How far each response channel moves for one metre at the drive point, at resonance, by its name. They take the place of
-    the bench's mode shapes where levels are checked."""
+    """Motion of each response channel per metre at the drive point, at resonance, by channel name. These ratios replace the
+    bench's mode shapes when levels are checked."""
 
     @property
     def residual_m_n(self) -> float:
-        """Receptance of the other modes at the drive point, at the mode's frequency, m/N."""
+        """Receptance of the other modes at the drive point at the frequency of the tested mode, m/N."""
         constant, square = self.residual_per_kg
         return -(constant - square * (self.frequency_rad_s / self.centre_rad_s) ** 2) / self.frequency_rad_s**2
 
     @property
     def model(self) -> PlantModel:
-        """The plant."""
+        """The plant model."""
         return PlantModel(**self.model_dump(exclude={"response_ratios"}))
 
 
 class KnownPlant(Levels):
-    """Levels of a plan that may know its plant."""
+    """Levels of a plan that may contain a model of its plant."""
 
     plant: PlantFacts | None = None
-    """The plant as ``rig tune`` has found it; with it, gains that are unstable there and levels beyond the bench's limits are
-    refused."""
+    """The plant as measured by ``rig tune``. If it is given, gains that are unstable on it and levels beyond the bench's limits
+    are refused."""
 
     @property
     def known_plant(self) -> PlantModel | None:
-        """Exciter and structure, where the plan knows them."""
+        """Model of exciter and structure, if the plan contains one."""
         return None if self.plant is None else self.plant.model
 
     def ratios_to_drive(self, bench: Bench) -> dict[str, float]:
-        """How far each channel moves for one metre at the drive point: as measured, else by the bench's mode shapes."""
+        """Return the motion of each channel per metre at the drive point: as measured, else from the bench's mode shapes."""
         measured = {} if self.plant is None else self.plant.response_ratios
         names = [channel.name for channel in bench.channels if channel.role == "response"]
         for name in measured:
@@ -102,12 +102,12 @@ class KnownPlant(Levels):
         return bench.response_ratios | measured
 
     def check_plant(self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float]) -> None:
-        """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels out of its reach."""
+        """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels beyond its reach."""
         if self.plant is None:
             return
         plant, lags_deg = self.plant.model, _apart(lags_deg)
         try:
-            # What a sign detector sees cannot be linearised.
+            # A sign detector cannot be linearised.
             if law.detector != "sign":
                 loops = self._loops(plant, law, lags_deg, bench)
                 _check_quickness(loops)
@@ -120,7 +120,10 @@ class KnownPlant(Levels):
     def _loops(
         self, plant: PlantModel, law: PhaseLockedLoop, lags_deg: Sequence[float], bench: Bench
     ) -> list[ControlLoop]:
-        """The loop at each lag; where the force at rest is used, which cannot be linearised, only the loops inside it."""
+        """Return the control loop at each lag.
+
+        The force at rest cannot be linearised. If it is used, only the inner loops are returned.
+        """
         amplitude_law = self.amplitude_law
         if law.rest_low_pass_rad_s > 0.0 and amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
             through = law.force_loop == "through-response"
@@ -132,7 +135,7 @@ class KnownPlant(Levels):
 
 
 def _apart(lags_deg: Sequence[float]) -> list[float]:
-    """The lags without those that lie so near to the one before that the loop is the same; the last is among them."""
+    """Return the lags without those so close to the previous one that the loop is the same. The last lag is always included."""
     *rising, last = sorted(lags_deg)
     out: list[float] = []
     for lag in rising:
@@ -142,7 +145,7 @@ def _apart(lags_deg: Sequence[float]) -> list[float]:
 
 
 def _check_quickness(loops: Sequence[ControlLoop]) -> None:
-    """Refuse a loop that would have to act within a period or two, where no demodulator has anything to go by."""
+    """Refuse a loop that would have to act within a period or two, which is faster than any demodulator can follow."""
     found = [(gain, name, loop) for loop in loops for name, gain in gains_at_half(loop).items()]
     gain, name, loop = max(found, key=lambda entry: entry[0])
     if gain > LARGEST_AT_HALF:
@@ -174,7 +177,7 @@ def _check_stability(loops: Sequence[ControlLoop]) -> None:
 
 
 def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
-    """Whether all the loops are stable with so many times the damping; not where a lag is none of that plant's."""
+    """Whether all loops are stable with ``part`` times the damping; False if a lag does not exist on the damped plant."""
     damped = (replace(loop, plant=loop.plant.at(damping_ratio=part * loop.plant.damping_ratio)) for loop in loops)
     try:
         return not any(map(unstable_poles, damped))
@@ -185,9 +188,9 @@ def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
 def control_loop(
     plant: PlantModel, law: PhaseLockedLoop, amplitude_law: AmplitudeLaw, bench_shape: float | None
 ) -> ControlLoop:
-    """The linearised loop that a configured law makes with a plant, its lag and its gains as they are.
+    """Return the linearised loop of a configured law and a plant, with the lag and the gains as configured.
 
-    The frequency-error law takes the mode shape of ``law``, or else that of the bench, whatever the plant's own is.
+    The frequency-error law uses the mode shape of ``law``, or else that of the bench, even if the plant's own shape differs.
     """
     kp, ki = law.proportional_and_integral()
     if law.frequency_law == "frequency-error":

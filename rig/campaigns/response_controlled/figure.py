@@ -1,4 +1,4 @@
-"""Figure of a response-controlled test: every level, and the force surface through them where there are enough."""
+"""Figure of a response-controlled test: all levels, and the force surface through them if there are enough levels."""
 
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ __all__ = ["draw"]
 
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw every level, and the surface through them where there are enough."""
+    """Draw all levels, and the force surface through them if there are enough levels."""
     page.set_size_inches(11.0, 7.0)
     responses = recorded_frequency_responses(recording)
     try:

@@ -1,4 +1,4 @@
-"""The response-controlled campaign: the drive point's displacement is held while the phase lag is stepped through resonance."""
+"""The response-controlled campaign: hold the drive point's displacement while the phase lag steps through resonance."""
 
 from collections.abc import Sequence
 from typing import Literal, Self
@@ -19,10 +19,10 @@ LEAST_SINE_LAG_DEG = 5.0
 
 
 class ResponseControlledPlan(SettledPlan):
-    """Vibrations at given displacements of the drive point and given phase lags, from below resonance to above.
+    """Vibrations at given displacements of the drive point and given phase lags, from below resonance to above it.
 
-    Where the displacement is held, a nonlinear structure answers as a linear one: no folds, no jumps, one frequency at each
-    lag. Points are given by their lag, not by their frequency, so that they stay about a resonance that moves with the level.
+    At a held displacement a nonlinear structure responds like a linear one: no folds, no jumps, one frequency at each lag.
+    Points are given by lag, not by frequency, so that they stay around a resonance that shifts with the level.
     """
 
     kind: Literal["response-controlled"] = "response-controlled"
@@ -30,17 +30,17 @@ class ResponseControlledPlan(SettledPlan):
     phase_lags_deg: tuple[float, ...]
     """Lags of the drive-point acceleration behind the force, deg; -90 is phase resonance."""
     direction: Literal["up", "down", "up-down"] = "up"
-    """Order of the lags at each level; up: rising frequency."""
+    """Order of the lags at each level; ``up`` is rising frequency."""
     level_ramp_periods: float = Field(40.0, ge=1, le=1e5)
-    """Length of the ramp from one level to the next, back to the first lag, periods."""
+    """Length of the ramp from the last lag of one level to the first lag of the next level, periods."""
     ramp_periods: float = Field(10.0, ge=1, le=1e5)
     """Length of the ramp from one lag to the next, periods."""
     record_periods: int = Field(20, ge=4, le=1_000_000)
-    """Periods that are recorded and evaluated at each point."""
+    """Periods recorded and evaluated at each point."""
     settle: SettleRule = SettleRule(settled_periods=10)
-    """When a point counts as settled: displacement, force and lag."""
+    """When a point counts as settled, by displacement, force and lag."""
     accepted_level_error: float = Field(0.01, gt=0, le=1)
-    """Largest deviation of the recorded displacement from its level, relative, with which a point is accepted."""
+    """Largest relative deviation of the recorded displacement from its level with which a point is accepted."""
 
     @model_validator(mode="after")
     def _lags_and_levels_make_sense(self) -> Self:
@@ -58,17 +58,17 @@ class ResponseControlledPlan(SettledPlan):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Levels, lags, ways and repeats."""
+        """Numbers of levels, lags, directions and repeats."""
         ways = 2 if self.direction == "up-down" else 1
         return {**super().counts, "phase_lags_deg": len(self.phase_lags_deg), "direction": ways}
 
     @property
     def asked_lags_deg(self) -> tuple[float, ...]:
-        """Every lag that is held, deg."""
+        """All lags that are held, deg."""
         return tuple(sorted(self.phase_lags_deg))
 
     def targets(self) -> tuple[Target, ...]:
-        """All points: at each level, the lowest first, all lags; in both directions one way after the other."""
+        """Return all points: all lags at each level, the lowest level first. ``up-down`` passes the lags up, then down."""
         rising = sorted(self.phase_lags_deg)
         ways: dict[str, list[tuple[float, Literal["up", "down"]]]] = {
             "up": [(lag, "up") for lag in rising],
@@ -86,10 +86,10 @@ class ResponseControlledPlan(SettledPlan):
         )
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that measure all points but those ``done`` already.
+        """Return the segments that measure all points except those in ``done``.
 
-        A point whose predecessor is done is approached from its predecessor's lag, so that it is reached from the
-        recorded direction.
+        A point whose predecessor is done is approached from the predecessor's lag, so that the direction of approach is the
+        recorded one.
         """
         targets = self.targets()
         left = [target for target in targets if target.number not in done]
@@ -116,7 +116,7 @@ class ResponseControlledPlan(SettledPlan):
         super().check(bench)
 
     def _ramp(self, at: Target | None, target: Target, number: int) -> Segment:
-        """The ramp to a point: along the lags, or to another level."""
+        """Return the ramp to a point, from the previous lag or from another level."""
         on_the_way = at is not None and (at.level, at.repeat) == (target.level, target.repeat)
         return self._segment(
             SegmentKind.RAMP, target, number, self.ramp_periods if on_the_way else self.level_ramp_periods
@@ -138,7 +138,7 @@ class ResponseControlledPlan(SettledPlan):
 
     @staticmethod
     def _approach(targets: Sequence[Target], target: Target) -> Target | None:
-        """The point to come from: the one before, where it belongs to the same way through the same level."""
+        """Return the point from which a point is approached: the previous one if it has the same level and repeat."""
         before = targets[target.number - 1] if target.number else None
         same_way = before is not None and (before.level, before.repeat) == (target.level, target.repeat)
         return before if same_way else None

@@ -1,4 +1,4 @@
-"""The points of a response-controlled test: what they hold, and how they come from recorded rows."""
+"""Points of a response-controlled test: their contents and their evaluation from recorded rows."""
 
 from dataclasses import dataclass, replace
 
@@ -35,7 +35,7 @@ RESPONSE_CONTROLLED_COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseControlledResult:
-    """What a point of a response-controlled test has beside the rest."""
+    """Results of a point of a response-controlled test, in addition to those of every point."""
 
     phase_lag_deg: float
     """Lag of the displacement behind the force, deg."""
@@ -46,7 +46,7 @@ class ResponseControlledResult:
 def measure_response_controlled_point(
     bench: Bench, plan: ResponseControlledPlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[ResponseControlledResult]:
-    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment."""
+    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
         wanted = (target.phase_lag_deg or 0.0) + 180.0

@@ -1,1 +1,1 @@
-"""Carrying out a plan: the runner, the execution of a part, continuation, output file, limits and trips."""
+"""Carry out a plan: runner, execution of a part, continuation, output file, limits and trips."""

@@ -1,7 +1,7 @@
-"""What is left to do of a recording: by its plan, or by a changed one that takes the place of the plan in force.
+"""Determine what remains to be measured of a recording, by its current plan or by a changed plan that replaces it.
 
-A point is known by what it physically is, not by where it stands in a plan. It keeps its number in the recording for good;
-points that only a changed plan asks for are numbered on behind all others.
+A point is identified by its physical quantities, not by its place in a plan. It keeps its number in the recording permanently.
+New points of a changed plan are numbered after all existing ones.
 """
 
 from collections import Counter
@@ -28,33 +28,33 @@ Identity = tuple[object, ...]
 
 @dataclass(frozen=True)
 class Continuation:
-    """How a recording goes on."""
+    """How a recording is continued."""
 
     plan: Plan
     """The plan to follow."""
     bench: Bench
     """The bench of the recording."""
     numbers: tuple[int, ...]
-    """Number in the recording of each of the plan's targets."""
+    """Numbers in the recording of the plan's targets."""
     done: frozenset[int]
-    """The targets, by their place in the plan, that were accepted already."""
+    """Places in the plan of the targets that are already accepted."""
     changed: bool
-    """Whether the plan is another one than that in force."""
+    """Whether the plan differs from the current plan of the recording."""
 
     @property
     def to_measure(self) -> tuple[Target, ...]:
-        """The targets that are not done."""
+        """Targets that are not done."""
         return tuple(target for place, target in enumerate(self.plan.targets()) if place not in self.done)
 
     def information(self) -> dict[str, Any]:
-        """What a part says of a plan that comes into force with it; nothing where it is the one before."""
+        """Return the table that a part records about a new plan; an empty table if the plan is unchanged."""
         return {"plan": self.plan.model_dump(mode="json"), "numbers": list(self.numbers)} if self.changed else {}
 
 
 def what_is_left(recording: Recording, change: Plan | None = None, source: str | Path = "") -> Continuation:
-    """How a recording goes on, by the plan in force or by a ``change`` of it, read from ``source``.
+    """Return how a recording is continued, by its current plan or by ``change``, a plan read from ``source``.
 
-    Raises `ConfigurationError` where the changed plan cannot follow on the one in force, or does not fit the bench.
+    Raises `ConfigurationError` if the changed plan cannot follow the current one or does not fit the bench.
     """
     name = recording.path.name
     plans = [(plan_from(dict(said.plan), f"{name}: plan"), said.numbers) for said in recording.plans]
@@ -71,7 +71,7 @@ def what_is_left(recording: Recording, change: Plan | None = None, source: str |
 
 
 def identities(plan: Plan) -> tuple[Identity, ...]:
-    """What each of a plan's targets physically is, numbers to nine digits; the last entry tells equal ones apart."""
+    """Return the physical identity of each target, with numbers rounded to nine digits. The last entry counts equal targets."""
     common = _rounded(attrgetter(path)(plan) for path in KINDS[plan.kind].identity)
     seen: Counter[Identity] = Counter()
     out = []
@@ -87,9 +87,9 @@ def _rounded(values: Iterable[Any]) -> Identity:
 
 
 def numbered(plans: Sequence[tuple[Plan, Sequence[int] | None]], change: Plan) -> tuple[int, ...]:
-    """The number of each target of a changed plan: its old one where any plan before has asked for it, else a new one.
+    """Return the number of each target of a changed plan: the old number if any earlier plan had this target, else a new one.
 
-    ``plans``: those so far, with the numbers of their targets (``None``: 0, 1, 2 and so on).
+    ``plans`` are all plans so far, with the numbers of their targets (``None``: 0, 1, 2 and so on).
     """
     known: dict[Identity, int] = {}
     for plan, numbers in plans:
@@ -106,7 +106,7 @@ def numbered(plans: Sequence[tuple[Plan, Sequence[int] | None]], change: Plan) -
 
 
 def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: str) -> None:
-    """Refuse a plan that cannot take the place of the one before, or that the bench cannot carry out."""
+    """Refuse a plan that cannot replace the previous one, or that the bench cannot carry out."""
     head = f"{source}: " if str(source) else ""
     if change.kind != before.kind:
         raise ConfigurationError(
@@ -137,7 +137,7 @@ def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: s
 
 
 def changed_keys(before: dict[str, Any], after: dict[str, Any], path: str = "") -> list[str]:
-    """Dotted paths of the keys in which two tables differ, in alphabetical order."""
+    """Return the dotted paths of the keys in which two tables differ, in alphabetical order."""
     out = []
     for key in sorted({*before, *after}):
         old, new = before.get(key), after.get(key)

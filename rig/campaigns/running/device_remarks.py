@@ -1,4 +1,4 @@
-"""What the device says of the samples of a point: its flags, samples that were lost, and outputs that came too late."""
+"""Remarks of the device on the samples of a point: its flags, lost samples, and outputs that came too late."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -14,19 +14,19 @@ from rig.tick.layout import DEVICE_SHIFT
 __all__ = ["flag_names", "with_device_remarks"]
 
 HELD = "output_held"
-LARGEST_HELD = 0.05  # of a point's samples: the rows tell another voltage than was put out
+LARGEST_HELD = 0.05  # of a point's samples: above this, the recorded voltage is not the voltage that was put out
 
 
 def flag_names(counters: Iterable[str]) -> list[str]:
-    """Names of the device's flags, the lowest bit first: the driver's first counters, as far as there are bits below `LOST`."""
+    """Return the names of the device's flags, lowest bit first: the driver's first counters, one for each bit below `LOST`."""
     return [*counters][: LOST.bit_length() - 1]
 
 
 def with_device_remarks(point: Point[Any], rows: np.ndarray, counters: Iterable[str]) -> Point[Any]:
-    """A point with the number of its samples that were lost, and a warning for each flag that was up while it was recorded.
+    """Add to a point the number of its lost samples, and a warning for each flag raised while it was recorded.
 
-    ``counters`` are the driver's. A point with more than 5 % of its outputs held by the device, because they came too late,
-    is not accepted.
+    ``counters`` are those of the driver. A point is not accepted if the device held more than 5 % of its outputs because they
+    came too late.
     """
     flags = rows["flags"] >> DEVICE_SHIFT
     counts = {name: int(np.count_nonzero(flags & (1 << bit))) for bit, name in enumerate(flag_names(counters))}

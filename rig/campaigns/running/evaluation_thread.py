@@ -1,4 +1,4 @@
-"""Points are worked out beside the loop, so that no length of record keeps its rows waiting."""
+"""Evaluation of points in a separate thread, so that a long record does not delay the rows of the control loop."""
 
 from collections import deque
 from collections.abc import Callable
@@ -13,32 +13,32 @@ Points = list[Point[Any]]
 
 
 class EvaluationThread:
-    """Evaluates points one after the other in a thread of its own, and returns them in the order of the requests."""
+    """Evaluates points one after the other in its own thread, and returns them in the order of the requests."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "evaluation")
         self._asked: deque[Future[Points]] = deque()
 
     def ask(self, step: Callable[..., Points], *arguments: Any) -> None:
-        """Have points worked out from ``arguments``, which nobody may change any more."""
+        """Request the evaluation of points from ``arguments``, which must not be changed afterwards."""
         self._asked.append(self._thread.submit(step, *arguments))
 
     def known(self, point: Point[Any]) -> None:
-        """Put in a point that needs no evaluation, behind those asked for before."""
+        """Queue a point that needs no evaluation, after those requested before."""
         self.ask(lambda: [point])
 
     def __bool__(self) -> bool:
-        """Whether points are still to come."""
+        """Whether requested points have not been taken yet."""
         return bool(self._asked)
 
     def ready(self) -> bool:
-        """Whether the next points are worked out."""
+        """Whether the next points are evaluated."""
         return bool(self._asked) and self._asked[0].done()
 
     def take(self) -> Points:
-        """The next points, waited for; raises what their evaluation raised."""
+        """Wait for the next points and return them; raise the error that their evaluation raised."""
         return self._asked.popleft().result()
 
     def close(self) -> None:
-        """End the thread once it has done what it is at."""
+        """End the thread after the current evaluation; queued requests are cancelled."""
         self._thread.shutdown(cancel_futures=True)

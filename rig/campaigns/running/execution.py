@@ -1,4 +1,4 @@
-"""Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
+"""Execution of one part of a run: the control loop, the journal, the evaluated points, and every way to stop."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -49,18 +49,18 @@ OVER = {
 
 @dataclass(frozen=True)
 class MeasuredBefore:
-    """What earlier parts of the recording have measured of the plan."""
+    """Results of earlier parts of the recording that concern the plan."""
 
     done: frozenset[int] = frozenset()
-    """Numbers, in the plan, of points that were accepted."""
+    """Numbers in the plan of the points that were accepted."""
     numbers: Sequence[int] | None = None
-    """Number in the recording of every point of the plan; None where the two are the same."""
+    """Number in the recording of every point of the plan; None if it equals the number in the plan."""
     points: tuple[Point[Any], ...] = ()
-    """Points of the recording."""
+    """All points of the recording so far."""
 
 
 class Execution:
-    """One part of a recording: the loop, what is written of it, and the points that come out."""
+    """One part of a recording: runs the control loop, writes the journal and evaluates the points."""
 
     def __init__(
         self,
@@ -95,9 +95,9 @@ class Execution:
         self.failure: BaseException | None = None
 
     def go(self, information: Mapping[str, Any]) -> None:
-        """Run to the end of the plan or of what can be done of it; raises only what could not be recorded.
+        """Run to the end of the plan, or as far as possible; afterwards raise errors that occurred on the way.
 
-        ``information`` is what is said of the part before its first row.
+        ``information`` is written to the journal before the first row of the part. A run that ends early raises no error.
         """
         flags = {"points_done": self.finished, "device_flags": flag_names(self.loop.counters)}
         self._write(self.journal.part, {**information, **flags})
@@ -109,7 +109,7 @@ class Execution:
                 try:
                     for rows in self.loop.run():
                         self._take(rows)
-                except BaseException as error:  # also what interrupted the loop: its end is recorded all the same
+                except BaseException as error:  # whatever interrupted the loop, its end is still recorded
                     self.failure = self.failure or error
                     self.loop.bring_down()
             self._report_rest()
@@ -124,7 +124,7 @@ class Execution:
             raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
 
     def _take(self, rows: np.ndarray) -> None:
-        """Record and evaluate a chunk."""
+        """Record and evaluate a chunk of rows."""
         stored, events = self.stored.take(self.tick.sample - rows.size, rows)
         if stored.size:
             self._write(self.journal.rows, stored)
@@ -135,21 +135,21 @@ class Execution:
         self._attempt(self.progress.advance, rows, self.tick)
 
     def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
-        """Do what is not the loop; where it fails, the rig is ramped down first and the failure raised at the end."""
+        """Run a step outside the control loop. If it fails, the rig is ramped down, and the error is raised at the end."""
         if self.failure is None:
             self._anyway(step, *arguments)
 
     def _anyway(self, step: Callable[..., Any], *arguments: Any) -> Any:
-        """The same after a failure; returns what the step does, or None where it fails."""
+        """Run a step even after an earlier failure; return the result of the step, or None if it fails."""
         try:
             return step(*arguments)
-        except BaseException as error:  # whatever it is: a driven rig is brought down before anything is said
+        except BaseException as error:  # whatever the error, the driven rig is brought down before anything is reported
             self.failure = self.failure or error
             self.loop.request_stop()
             return None
 
     def _write(self, method: Any, what: Any) -> None:
-        """Write, or else bring the rig down; the run goes on unrecorded until it stands still."""
+        """Write to the journal. If that fails, bring the rig down; the run continues unrecorded until it is at rest."""
         if self.write_error is not None:
             return
         try:
@@ -159,7 +159,7 @@ class Execution:
             self.loop.request_stop()
 
     def _note_changes(self, rows: np.ndarray) -> None:
-        """Every change of lock state and guard becomes an event, with its sample."""
+        """Record every change of the lock state and of the guard as an event with its sample number."""
         first = self.tick.sample - rows.size
         events: list[dict[str, Any]] = []
         for name, kind in (("lock", LockState), ("guard", GuardMode)):
@@ -173,7 +173,7 @@ class Execution:
             self._write(self.journal.event, event)
 
     def _collect(self, rows: np.ndarray) -> None:
-        """Keep the rows of the point under way, and have the points evaluated that are over."""
+        """Keep the rows of the current point, and request the evaluation of points that are over."""
         self.kept.add(self.tick.sample - rows.size, rows)
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
@@ -201,7 +201,7 @@ class Execution:
                 self._report(point)
 
     def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[Point[Any]]:
-        """The points that come out of rows which begin with sample ``first``."""
+        """Evaluate the points in rows that begin with sample ``first``."""
         found = self.measure(self.bench, self.plan, target, rows, *told)
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
@@ -211,13 +211,13 @@ class Execution:
         return [replace(point, rows=where) for point in points]
 
     def _report_rest(self) -> None:
-        """Wait for the points that are still being worked out, also after a failure elsewhere or in one of them."""
+        """Wait for points still being evaluated, even after a failure elsewhere or in one of them, and report them."""
         while self.evaluations:
             for point in self._anyway(self.evaluations.take) or ():
                 self._anyway(self._report, point)
 
     def _begin(self, segment: int) -> int:
-        """First sample of the rows that a segment is evaluated with."""
+        """Return the first sample of the rows with which a segment is evaluated."""
         points = self.tick.arrays.segments["point"]
         if self.plan.evaluates_approach:
             while segment > 0 and points[segment - 1] == points[segment]:
@@ -240,7 +240,7 @@ class Execution:
         return self._begin(index) if records and running else self.tick.sample
 
     def _finish_round(self, *, cut_short: bool = False) -> bool:
-        """Evaluate the points that are measured in one go, once all their segments are over or none will follow."""
+        """Evaluate points that are measured together, once all their segments are over or no further segment will run."""
         numbers = self.plan.together(int(self.tick.arrays.segments[self.next_segment]["point"]))
         found = round_at(self.tick, self.next_segment, numbers, cut_short=cut_short)
         if found is None:
@@ -254,7 +254,7 @@ class Execution:
         return True
 
     def _report(self, point: Point[Any]) -> None:
-        """Write and show a point under its number in the recording, which a change of plan leaves as it is."""
+        """Write and show a point under its number in the recording, which a change of plan does not alter."""
         point = with_plausibility(self.bench, self.plan, point, self.known)
         if self.watch is not None:
             point, stop = self.watch(self.plan, self.known, point)
@@ -271,7 +271,7 @@ class Execution:
         self.progress.point(point, self.finished, len(self.targets))
 
     def _mark_unlocked(self) -> None:
-        """Without a lock at the start voltage all that is left of the plan has failed, and for that reason."""
+        """If no lock was found at the start voltage, mark all remaining points of the plan as failed for that reason."""
         if EndReason(int(self.tick.guard["reason"][0])) not in NO_LOCK:
             return
         entry = next(one for one in self.tick.outcomes[::-1] if int(one["outcome"]) in UNLOCKED)
@@ -294,7 +294,7 @@ class Execution:
     def _end(self) -> dict[str, Any]:
         reason = EndReason(int(self.tick.guard["reason"][0]))
         if self.loop.failure is not None and not reason.is_trip:
-            reason = end_reason_of(self.loop.failure)  # it failed once the output was down, when it was stopped
+            reason = end_reason_of(self.loop.failure)  # the driver failed when it was stopped, after ramp-down
         return {
             "completed": reason is EndReason.COMPLETED and self.accepted == len(self.targets) and self.failure is None,
             "reason": reason.name.lower(),
@@ -307,7 +307,7 @@ class Execution:
         }
 
     def _trip(self, reason: EndReason) -> dict[str, Any]:
-        """Where in the plan it tripped, what the cause most likely was, and what to do."""
+        """Return where in the plan the run tripped, the most likely cause, and what to do."""
         at = tripped_at(self.tick, self.plan, self.targets)
         frequency_hz = self.tick.frequency_hz
         trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
@@ -318,7 +318,7 @@ class Execution:
         return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}
 
     def _why(self) -> str:
-        """Why the output was brought down, in one sentence."""
+        """Return in one sentence why the output was brought down."""
         reason = EndReason(int(self.tick.guard["reason"][0]))
         if self.loop.failure is not None:
             down = "" if reason.is_trip else f"{TEXT[reason]}, but the driver failed at the end: "
@@ -333,7 +333,7 @@ class Execution:
 
 
 def nothing_left(bench: Bench) -> dict[str, Any]:
-    """The end of a part in which nothing moved, for all that the plan asks for had been measured before."""
+    """Return the end record of a part in which nothing moved, because all points of the plan had been measured before."""
     return {
         "completed": True,
         "reason": EndReason.COMPLETED.name.lower(),

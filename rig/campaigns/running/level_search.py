@@ -1,6 +1,6 @@
-"""Searches for a level at which a multisine stands out of the noise, from a safe voltage upwards.
+"""Search for a level at which a multisine stands out of the noise, upwards from a safe voltage.
 
-A check and a tuning use it. All levels go into one recording: each further one is a change of its plan.
+The search is used by a check and by a tuning. All levels are recorded in one file: each further level is a change of the plan.
 """
 
 import math
@@ -24,7 +24,7 @@ LARGEST_RISE = 4.0
 
 
 class MultisineSeries:
-    """Plays multisines, one after the other, into one recording; a person is asked once to arm all of them."""
+    """Plays multisines one after the other into one recording. A person arms all of them at once."""
 
     def __init__(self, bench: Bench, output: Path, options: RunOptions, purpose: str) -> None:
         self.bench, self.output = bench, output
@@ -32,7 +32,7 @@ class MultisineSeries:
         self._begun = False
 
     def play(self, plan: MultisinePlan) -> Recording:
-        """The recording with this multisine as its last part; the first one begins the recording."""
+        """Play a multisine and return the recording with it as the last part. The first call creates the recording."""
         if self._begun:
             return take_up(self.output, replace(self._options, seed=None), change=plan, trust_code=True)
         self._begun = True
@@ -41,39 +41,39 @@ class MultisineSeries:
 
 @dataclass(frozen=True)
 class Seen:
-    """How the responses to one level stood out of the noise."""
+    """Evaluation of the responses to one level."""
 
     enough: bool
-    """Whether they suffice."""
+    """Whether the responses stand out of the noise sufficiently."""
     share_of_limits: float
-    """Largest peak, as a part of its limit (`share_of_limits`)."""
+    """Largest peak relative to its limit (`share_of_limits`)."""
     wanted_rise: float = LARGEST_RISE
-    """Factor by which the level should be raised, where they do not suffice."""
+    """Factor by which the level should be raised if the responses do not suffice."""
 
 
 @dataclass(frozen=True)
 class Levels:
-    """Levels of a search."""
+    """Outcome of a search."""
 
     tried_v: tuple[float, ...]
-    """All levels that were played, V RMS; the last is the one to use."""
+    """All levels that were played, V RMS. The last one is the level to use."""
     enough: bool
-    """Whether the last one suffices."""
+    """Whether the last level suffices."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LevelSearch:
-    """Raises the level until the responses suffice, peaks come near the limits, or enough levels were tried."""
+    """Raises the level until the responses suffice, peaks come near the limits, or the largest number of levels was tried."""
 
     safe_share: float
-    """Part of every limit that peaks may be expected to reach."""
+    """Share of every limit that expected peaks may reach."""
     least_rise: float
     """Factor below which a further level is not worth its time."""
     most_levels: int
-    """Levels that are tried at most."""
+    """Largest number of levels tried."""
 
     def search(self, bench: Bench, listen: Callable[[float], Seen]) -> Levels:
-        """Search from a thousandth of the largest voltage on; ``listen`` plays a level (V RMS) and evaluates it."""
+        """Search from a thousandth of the largest voltage upwards; ``listen`` plays a level (V RMS) and evaluates it."""
         tried: list[float] = []
         level: float | None = FIRST * bench.limits.voltage_v
         while level is not None:
@@ -83,16 +83,16 @@ class LevelSearch:
         return Levels(tuple(tried), seen.enough)
 
     def next_level(self, level_rms_v: float, seen: Seen) -> float | None:
-        """The level to play after this one; None where it suffices, or where limits leave no room for a higher one."""
+        """Return the next level to play; None if this level suffices, or if the limits allow no worthwhile rise."""
         rise = min(seen.wanted_rise, LARGEST_RISE, self.safe_share / seen.share_of_limits)
         return level_rms_v * rise if not seen.enough and rise >= self.least_rise else None
 
 
 def share_of_limits(bench: Bench, rows: np.ndarray, displacement_m: Callable[[str, float], float]) -> float:
-    """Largest peak of output and channels against its limit; inf where a channel has no reading left.
+    """Return the largest peak of output and channels relative to its limit; inf if a channel has no reading left.
 
     ``displacement_m`` estimates a channel's peak displacement from its name and its peak acceleration. Lost samples and the
-    mean of a channel do not count.
+    mean of a channel are left out.
     """
     limits = bench.limits
     shares = [float(np.abs(rows["output_v"]).max()) / limits.voltage_v]
@@ -102,7 +102,7 @@ def share_of_limits(bench: Bench, rows: np.ndarray, displacement_m: Callable[[st
         values = rows["inputs"][:, index].astype(float)
         values = values[np.isfinite(values)]
         if not values.size:
-            return math.inf  # the readings that were lost may have been at a limit
+            return math.inf  # the lost readings may have been at a limit
         peak = float(np.abs(values - values.mean()).max())
         if channel.role == "force":
             shares.append(peak / limits.force_n)

@@ -1,4 +1,4 @@
-"""How near recorded points have come to the limits of the bench, and to the ends of its sensors' ranges."""
+"""How close recorded points came to the limits of the bench and to the ranges of its sensors."""
 
 import math
 from collections.abc import Iterable
@@ -18,28 +18,28 @@ LIMITS = {
     EndReason.DISPLACEMENT_LIMIT: "displacement_m",
     EndReason.OVERTRAVEL: "displacement_m",
 }
-"""Which of the bench's limits a reason is about."""
+"""The limit of the bench that a trip reason refers to."""
 
 SAMPLES = 256  # of a period
 
 
 class Margin(NamedTuple):
-    """What a point had reached of what stopped the run later."""
+    """How close an earlier point came to the limit that later stopped the run."""
 
     level: float
-    """Its level."""
+    """Level of the point."""
     share: float
     """Peak over what is allowed, 1 at the limit."""
     key: str
-    """Key of the bench that allows it."""
+    """Key or range of the bench that defines the limit."""
 
 
 def margin_before(
     bench: Bench, reason: EndReason, channel: int, unit: str, points: Iterable[Point[Any]]
 ) -> Margin | None:
-    """The highest share that points with levels in ``unit`` had reached of what a trip is about.
+    """Return the largest share of the tripped limit that points with levels in ``unit`` had reached.
 
-    None where the reason is about no amplitude of a channel, or no point holds harmonics.
+    Returns None if the trip does not concern an amplitude of a channel, or if no point has harmonics.
     """
     key, allowed = _allowed(bench, reason, channel)
     known = [point for point in points if point.spectrum is not None and point.level_unit == unit]
@@ -62,7 +62,7 @@ def _allowed(bench: Bench, reason: EndReason, channel: int) -> tuple[str, float]
 
 
 def _peak(point: Point[Any], channel: int, reason: EndReason) -> float:
-    """Largest instantaneous value of a channel over a period, without its mean; of an acceleration or its displacement."""
+    """Largest instantaneous value of a channel over a period, without its mean: of the signal, or of its displacement."""
     harmonics = spectrum_of(point).harmonics[channel, 1:]
     orders = np.arange(1, harmonics.size + 1)
     if LIMITS.get(reason) == "displacement_m":

@@ -1,4 +1,4 @@
-"""The file that a run is recorded in: nothing is overwritten unasked, nothing is lost while it is."""
+"""Output file of a run: nothing is overwritten without permission, and nothing is lost while the file is written."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ __all__ = ["forget_before", "make_way", "put_back", "set_aside"]
 
 
 def make_way(output: Path, overwrite: bool) -> None:
-    """Refuse an output that cannot or should not be written: no folder, a folder, a file that exists."""
+    """Refuse an output that cannot or must not be written: a missing folder, a name of a folder, an existing file."""
     try:
         if not output.parent.is_dir():
             raise RecordingError(f"{output.parent}: there is no such folder")
@@ -24,14 +24,14 @@ def make_way(output: Path, overwrite: bool) -> None:
             if path.exists() and not overwrite:
                 raise RecordingError(f"{path}: exists already; choose another name, or `overwrite`")
         if output.exists():
-            kind_of(output)  # only what is ours is overwritten
+            kind_of(output)  # only files of this program are overwritten
     except OSError as error:
         raise RecordingError(f"{output}: cannot be used ({error.strerror})") from None
 
 
 @contextmanager
 def set_aside(output: Path) -> Iterator[None]:
-    """Keep an earlier recording, and its journal, under other names until the new one is written; put back if it never is."""
+    """Keep an earlier recording and its journal under other names; put them back if the new one is never begun."""
     journal = journal_path(output)
     moved: list[Path] = []
     try:
@@ -51,14 +51,13 @@ def set_aside(output: Path) -> Iterator[None]:
 
 
 def put_back(output: Path) -> str:
-    """Undo what a run into ``output`` has left that was killed before it had recorded anything.
+    """Undo what a run into ``output`` has left if it was killed before it recorded anything.
 
-    Its journal, which holds no part, is removed. A recording that it was to overwrite comes back under its name. Where rows
-    were recorded, their journal is the recording now, and the old one is removed once that has become a file
-    (`forget_before`).
+    A journal without any part is removed. A recording that the run was to overwrite gets its name back. If rows were recorded,
+    their journal is the recording now; the old one is removed once this journal has become a file (`forget_before`).
 
     Returns:
-        One line that says what was put back; empty where nothing was.
+        One line that says what was put back; empty if nothing was.
     """
     journal = journal_path(output)
     if journal.exists():
@@ -75,7 +74,7 @@ def put_back(output: Path) -> str:
 
 
 def forget_before(output: Path) -> None:
-    """Remove what was overwritten, once the new recording is whole."""
+    """Remove the overwritten recording once the new one is complete."""
     for path in (output, journal_path(output)):
         _before(path).unlink(missing_ok=True)
 
@@ -85,7 +84,7 @@ def _holds_a_part(journal: Path) -> bool:
         with JournalContents(journal) as contents:
             return bool(contents.parts)
     except RecordingError:
-        return journal.stat().st_size > 0  # unreadable, and perhaps all that is left of a run
+        return journal.stat().st_size > 0  # unreadable, but perhaps all that is left of a run
 
 
 def _before(path: Path) -> Path:
@@ -93,6 +92,6 @@ def _before(path: Path) -> Path:
 
 
 def _moved(path: Path) -> Path:
-    """The path of a file that was moved out of the way."""
+    """Move a file out of the way; return its original path."""
     path.replace(_before(path))
     return path

@@ -1,4 +1,4 @@
-"""The rows of the points under way: kept until their point is over, and no longer."""
+"""Rows of the points being measured. They are kept in memory until their point is over."""
 
 from collections import deque
 
@@ -8,7 +8,7 @@ __all__ = ["RowBuffer"]
 
 
 class RowBuffer:
-    """Chunks of rows in their order, by the number of their first sample."""
+    """Chunks of rows, sorted by the number of their first sample."""
 
     def __init__(self, dtype: np.dtype) -> None:
         self._dtype = dtype
@@ -19,7 +19,7 @@ class RowBuffer:
         self._chunks.append((first, rows))
 
     def take(self, first: int, end: int) -> np.ndarray:
-        """The rows of a point; those up to its end are kept no longer."""
+        """Return the rows of a point, and drop all rows up to the end of the point."""
         out = np.empty(end - first, self._dtype)
         while self._chunks and self._chunks[0][0] < end:
             start, rows = self._chunks.popleft()
@@ -33,6 +33,6 @@ class RowBuffer:
         return out
 
     def drop_before(self, sample: int) -> None:
-        """Keep no chunk that ends before a sample."""
+        """Drop the chunks that end before a sample."""
         while self._chunks and self._chunks[0][0] + self._chunks[0][1].size <= sample:
             self._chunks.popleft()

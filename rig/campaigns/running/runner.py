@@ -1,4 +1,4 @@
-"""The runner: carries out a plan on a bench and records it. Every way out brings the output to 0 V."""
+"""The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -42,10 +42,10 @@ __all__ = ["carry_out", "take_up"]
 def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None = None) -> Recording:
     """Carry out a plan from its beginning and record it in the HDF5 file ``output``.
 
-    Raises `ConfigurationError` before anything is started where plan and bench do not fit, `RecordingError` where the
-    file exists or cannot be written, `rig.errors.DaqError` where the driver cannot be started. A run that ends early
-    raises nothing: the recording's last part says how it ended. A bench on which something physical moves must be armed
-    (`rig.arming.arming`), else `rig.errors.NotArmed`.
+    Raises `ConfigurationError`, before anything starts, if plan and bench do not fit; `RecordingError` if the file exists or
+    cannot be written; `rig.errors.DaqError` if the driver cannot be started. A run that ends early raises no error: the
+    recording's last part says how it ended. A bench on which something physical moves must be armed (`rig.arming.arming`);
+    otherwise `rig.errors.NotArmed` is raised.
     """
     plan.check(bench)
     check_length(plan, bench)
@@ -86,15 +86,15 @@ def take_up(
     retry_tripped: bool = False,
     trust_code: bool = False,
 ) -> Recording:
-    """Finish a run that was interrupted: accepted points stay, the others are measured in a further part of the file.
+    """Finish an interrupted run: keep the accepted points and measure the remaining ones in a new part of the file.
 
-    Points that failed are tried again. A ``change`` of the plan, read from ``source``, replaces the plan in force from this
-    part on; points that it asks for and that were accepted before are not measured again. A recording that is complete, with
-    no change of its plan, is returned as it is.
+    Points that failed are tried again. A ``change`` of the plan, read from ``source``, replaces the current plan from this part
+    on; its points that were accepted before are not measured again. A complete recording without a change of plan is returned
+    unchanged.
 
-    Raises as `carry_out`. Raises `ConfigurationError` for a plan that cannot follow the one before; for a level that tripped
-    or a higher one, unless ``retry_tripped``; and for a bench with functions of the user's own, unless ``trust_code``: the
-    recording names the module that would be imported, so its author chooses the code.
+    Raises the same errors as `carry_out`. Also raises `ConfigurationError` for a plan that cannot follow the previous one; for
+    a level that tripped or a higher one, unless ``retry_tripped``; and for a bench with functions of the user, unless
+    ``trust_code``: the recording names the module to import, so the author of the file chooses the code.
     """
     options = options or RunOptions()
     progress = options.progress
@@ -106,7 +106,7 @@ def take_up(
                     f"part {number}: {part.dropped_reason}; points whose results are missing are measured again"
                 )
         left = what_is_left(recording, change, source)
-        # A further part draws its own noise: the same seed again would repeat the first part's.
+        # Each part has its own noise: with the same seed, a new part would repeat the noise of the first.
         drawn = (recording.seed or 0) + len(recording.parts) if options.seed is None else options.seed
         information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
         finished = recording.complete and not left.changed
@@ -143,7 +143,7 @@ def _put_back(output: Path, progress: Progress) -> None:
 
 
 def _whole(output: Path, progress: Progress) -> Recording:
-    """The recording, its journal turned into its file; a signal meanwhile ends the program as soon as nothing can be lost."""
+    """Convert the journal to the recording's file and return it. A signal ends the program once nothing can be lost."""
     with held() as signals:
         damaged = finalise(journal_path(output), output, signals.check)
         forget_before(output)
@@ -156,7 +156,7 @@ def _whole(output: Path, progress: Progress) -> Recording:
 
 
 def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> dict[str, Any]:
-    """Arm the bench, and collect what is recorded of the part: who armed it, operator, specimen, device, code."""
+    """Arm the bench and collect the facts recorded for a part: who armed it, operator, specimen, device, code."""
     facts = {
         **options.about.facts(),
         "armed": armed(bench, session, options.about.purpose or plan.kind, options.arm),
@@ -170,14 +170,14 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> d
 
 
 def _lead(loop: RunningLoop) -> float:
-    """Samples from an output to the input that shows it."""
+    """Return the number of samples between an output and the input that responds to it."""
     record = loop.tick.arrays.loop
     return float(record["lead_whole"][0] + record["lead_fraction"][0])
 
 
 @contextmanager
 def _unless_empty(journal: JournalWriter) -> Iterator[JournalWriter]:
-    """A journal that is removed at the end where no part was begun in it, for nothing has run."""
+    """Hold a journal open; remove it at the end if no part was begun, because then nothing has run."""
     try:
         with journal:
             yield journal
@@ -188,9 +188,10 @@ def _unless_empty(journal: JournalWriter) -> Iterator[JournalWriter]:
 
 @contextmanager
 def _started(session: Session, settings: TickSettings, output: Path) -> Iterator[RunningLoop]:
-    """A loop that was started. Of something physical it is remembered that it runs, and then that it tripped, if it did.
+    """Start a loop and hold it. On a physical bench, remember first that it runs, and at the end whether it tripped.
 
-    So a campaign that never comes to its end, or cannot write any more, leaves a word for the person who arms the next.
+    A campaign that never ends properly, or that can no longer write, thus leaves a message for the person who arms the next
+    one.
     """
     if session.capabilities.virtual:
         yield session.start(settings)
@@ -210,7 +211,7 @@ def _started(session: Session, settings: TickSettings, output: Path) -> Iterator
 
 
 def _remember_end(bench: Bench, loop: RunningLoop, output: Path) -> None:
-    """A trip, or a driver that failed at any time, is remembered; an orderly end takes back the word of a run under way."""
+    """Remember a trip or a failure of the driver. After an orderly end, clear the note that a run was under way."""
     reason = EndReason(int(loop.tick.guard["reason"][0]))
     if loop.failure is not None or reason.is_trip:
         text = str(loop.failure) if loop.failure is not None else describe_end(loop.tick.guard, bench)

@@ -1,4 +1,4 @@
-"""Which rows of a run are stored, and at which row of the file a sample stands."""
+"""Select the rows of a run that are stored, and map samples to rows of the file."""
 
 from bisect import bisect_right
 from typing import Any
@@ -11,22 +11,22 @@ __all__ = ["StoredRows"]
 
 
 class StoredRows:
-    """Rows on their way to the journal.
+    """Selects rows on their way to the journal.
 
-    ``segments`` is the table of the sequencer. Between the records that a plan keeps whole, one row of ``plan.row_stride`` is
-    stored, those whose sample number is a multiple of it. Every change of the stride is an event, from which the samples of
-    all rows follow.
+    ``segments`` is the table of the sequencer. For points that the plan does not store in full, only rows whose sample number
+    is a multiple of ``plan.row_stride`` are stored. Every change of the stride is recorded as an event. The sample numbers of
+    all rows follow from these events.
     """
 
     def __init__(self, plan: Plan, segments: np.ndarray, sample_rate_hz: float) -> None:
         strides = [plan.row_stride(int(n), sample_rate_hz) if n >= 0 else 1 for n in segments["point"]]
-        self._strides = np.array([*strides, 1])  # the last is that of no segment, whose number is -1
+        self._strides = np.array([*strides, 1])  # the last entry is for rows outside any segment (number -1)
         self._all = bool((self._strides == 1).all())
         self._changes: list[tuple[int, int, int]] = [(0, 0, 1)]  # first sample, first row, stride
         self._rows = 0
 
     def take(self, first: int, rows: np.ndarray) -> tuple[np.ndarray, list[dict[str, Any]]]:
-        """Of rows that begin with sample ``first``, those to be stored; and an event for every change of the stride."""
+        """Return the rows to store of a chunk that begins with sample ``first``, and an event for each change of stride."""
         if self._all:
             return rows, []
         strides = self._strides[rows["segment"]]
@@ -45,7 +45,7 @@ class StoredRows:
         return rows[kept], events
 
     def row_range(self, first: int, end: int) -> tuple[int, int] | None:
-        """Rows of the part that hold samples ``first`` to ``end``; None where not all of them are stored."""
+        """Return the rows of the part that hold samples ``first`` to ``end``; None if not all of these samples are stored."""
         index = bisect_right(self._changes, (first, 2**63, 0)) - 1
         sample, row, stride = self._changes[index]
         until = self._changes[index + 1][0] if index + 1 < len(self._changes) else end

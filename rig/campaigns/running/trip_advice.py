@@ -1,4 +1,4 @@
-"""What a trip was likely caused by, from what was measured before it, and what to do."""
+"""Likely cause of a trip, judged by what was measured before it, and advice on what to do."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,8 +13,8 @@ from rig.tick.safety.layout import POLARITY_HINT, EndReason
 
 __all__ = ["Advice", "Before", "Trip", "advice_on"]
 
-CLEAR = 0.7  # of a limit: a level that is expected there, in proportion to one before, is too high
-ROOM = 0.9  # of a limit: where a level is proposed that in proportion should fit
+CLEAR = 0.7  # of a limit: a level expected to reach this share, in proportion to an earlier level, is too high
+ROOM = 0.9  # of a limit: share that the proposed level should reach, in proportion
 AT_AN_END = 0.01  # of a frequency window's width
 
 BESIDE_THE_LEVEL = {
@@ -31,11 +31,11 @@ BESIDE_THE_LEVEL = {
     ),
     EndReason.EMERGENCY_STOP: ("somebody pressed the stop, or its cable is broken", "ask who, and release it"),
 }
-"""Likely cause and what to do for what has nothing to do with levels and locks."""
+"""Likely cause and advice for trips that are independent of levels and locks."""
 
 
 class Trip(NamedTuple):
-    """What stopped a run, as the guard has kept it."""
+    """What stopped a run, as recorded by the guard."""
 
     reason: EndReason
     """The first cause."""
@@ -46,27 +46,27 @@ class Trip(NamedTuple):
 
 
 class Before(NamedTuple):
-    """What the run had come to before it tripped."""
+    """State of the run before it tripped."""
 
     points: Sequence[Point[Any]]
     """Points that were recorded, accepted or not."""
     locked: bool
-    """Whether a lock was gained at any time."""
+    """Whether a lock was gained at any time in the run."""
     first: bool
     """Whether it tripped at its first point."""
 
 
 class Advice(NamedTuple):
-    """Two half sentences for a person who stands before a rig that has tripped."""
+    """Two half sentences for the person at a rig that has tripped."""
 
     likely_cause: str
-    """What it most likely was."""
+    """The most likely cause."""
     what_to_do: str
-    """What comes first."""
+    """What to do first."""
 
 
 def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before: Before) -> Advice:
-    """Likely cause and remedy of a trip at a level, from what had been measured before."""
+    """Return the likely cause and remedy of a trip at a level, judged by what was measured before."""
     if trip.reason in BESIDE_THE_LEVEL:
         return Advice(*BESIDE_THE_LEVEL[trip.reason])
     if trip.reason is EndReason.SENSOR_STUCK:
@@ -92,7 +92,7 @@ def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before
 
 
 def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before: Before) -> Advice:
-    """By the share of the limit that the points before had reached, in proportion to their level."""
+    """Advise on a trip at a limit, from the share of the limit that earlier points reached in proportion to their level."""
     name, unit = _name(bench, trip), plan.level_unit if at is None else at.level_unit
     margin = margin_before(bench, trip.reason, trip.channel, unit, before.points)
     raised = _what_may_be_raised(trip, bench)
@@ -114,7 +114,7 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
 
 
 def _on_a_lock(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None) -> Advice:
-    """A lock that was gained and then lost: at an end of the window, or within it."""
+    """Advise on a lock that was gained and then lost, at an end of the frequency window or within it."""
     window = getattr(plan.law, "frequency_window_hz", None)
     low, high = bench.limits.frequency_hz if window is None else window
     key = "limits.frequency_hz of the bench" if window is None else "controller.frequency_window_hz"
@@ -141,7 +141,7 @@ def _what_may_be_raised(trip: Trip, bench: Bench) -> str:
 
 
 def _key(plan: Plan, at: TrippedAt | None) -> str:
-    """Key of the plan that the level stands under."""
+    """Return the key of the plan that gives the level."""
     if at is not None and at.start:
         return "start_v"
     return str(getattr(plan, "levels_key", "levels_rms_v" if plan.level_unit == "V RMS" else "the levels"))

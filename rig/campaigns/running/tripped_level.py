@@ -1,4 +1,4 @@
-"""At which level a run tripped, and what asks for it again."""
+"""Determine the level at which a run tripped, and refuse plans that ask for this level again."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -17,18 +17,18 @@ from rig.tick.tick import Tick
 __all__ = ["TrippedAt", "refuse_tripped", "tripped_at"]
 
 NEVER_BEGUN = {Outcome.PENDING, Outcome.SKIPPED}
-ALMOST = 1.0 - 1e-9  # the last bits of a number make no other level
+ALMOST = 1.0 - 1e-9  # levels that differ only by rounding count as equal
 
 
 class TrippedAt(NamedTuple):
     """Where in a plan a run tripped."""
 
     level: float
-    """The level."""
+    """Level at the trip."""
     level_unit: str
-    """Its unit."""
+    """Unit of the level."""
     start: bool
-    """Whether it is the voltage that sets the rig in motion (``start_v``), not a level of the plan."""
+    """Whether the level is ``start_v``, the voltage that sets the rig in motion, and not a level of the plan."""
 
     @property
     def text(self) -> str:
@@ -37,7 +37,7 @@ class TrippedAt(NamedTuple):
 
 
 def tripped_at(tick: Tick, plan: Plan, targets: Sequence[Target]) -> TrippedAt | None:
-    """The level that was held, or on the way to which it was, when the output was brought down; None before the first."""
+    """Return the level that was held or approached when the output was brought down; None before the first level."""
     segments, codes = tick.arrays.segments, [Outcome(int(code)) for code in tick.outcomes["outcome"]]
     index = max((i for i, code in enumerate(codes) if code not in NEVER_BEGUN), default=-1)
     if index < 0:
@@ -55,10 +55,10 @@ def tripped_at(tick: Tick, plan: Plan, targets: Sequence[Target]) -> TrippedAt |
 
 
 def refuse_tripped(recording: Recording, plan: Plan, left: Sequence[Target]) -> None:
-    """Raise `ConfigurationError` where what is ``left`` to measure asks for a level that tripped, or a higher one.
+    """Raise `ConfigurationError` if a target ``left`` to measure has a level that tripped, or a higher one.
 
-    A trip is forgotten once a point at its level, or a higher one, was accepted in a later part. One before the first level
-    is not met by any plan.
+    A trip is forgotten once a point at its level, or at a higher one, was accepted in a later part. No plan is allowed after a
+    trip before the first level.
     """
     if not left:
         return
@@ -76,7 +76,7 @@ def refuse_tripped(recording: Recording, plan: Plan, left: Sequence[Target]) -> 
 
 
 def _said(part: Part) -> TrippedAt | None:
-    """Where a part tripped; in files of earlier versions, where its last point failed."""
+    """Return where a part tripped; for files of earlier versions, where its last point failed."""
     end = part.end or {}
     if "tripped_at" in end:
         return None if end["tripped_at"] is None else TrippedAt(**end["tripped_at"])
@@ -85,7 +85,7 @@ def _said(part: Part) -> TrippedAt | None:
 
 
 def _reached_since(parts: Sequence[Part], at: TrippedAt) -> bool:
-    """Whether a point at such a level, or a higher one, was accepted later; after a start, any."""
+    """Whether a later point at this level or a higher one was accepted. For a trip at the start, any point counts."""
     return any(_is_beyond(point, at) for part in parts for point in map(point_from, part.points) if point.accepted)
 
 

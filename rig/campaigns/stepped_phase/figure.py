@@ -1,4 +1,4 @@
-"""Figure of a stepped-phase test: responses at constant level along their branches, lag by lag."""
+"""Figure of a stepped-phase test: responses at constant level, drawn along their branches."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -42,12 +42,12 @@ def draw_stepped_phase(
     title: str = "",
     lags_deg: Sequence[float] = (),
 ) -> None:
-    """Displacement amplitude, phase lag of the displacement and force over frequency.
+    """Draw displacement amplitude, lag of the displacement, and force over frequency.
 
-    ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement: where the response
-    folds over, the line runs back; where lags of the displacement that were asked for, ``lags_deg``, are missing, it is
-    broken. The point nearest to phase resonance is filled; beside the force's fundamental a level
-    that was ``held`` otherwise is dashed.
+    ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement, so the line runs back
+    where the response folds over. The line is interrupted where a requested lag (``lags_deg``) was not measured. The point
+    nearest to phase resonance is filled. If the force was controlled, its level is a dashed line. If another quantity was
+    ``held``, its name is the title of the legend.
     """
     from matplotlib import colormaps
 
@@ -76,7 +76,7 @@ def draw_stepped_phase(
 
 
 def _gaps(item: FrequencyResponse, lags_deg: Sequence[float]) -> NDArray[np.intp]:
-    """int[k]: points before which at least one of the lags that were asked for is missing."""
+    """Return int[k]: the points before which at least one requested lag is missing."""
     if not len(lags_deg):
         return np.array([], dtype=np.intp)
     asked = np.sort(lags_deg)
@@ -92,7 +92,7 @@ def _branch(
     gaps: NDArray[np.intp],
     label: str | None = None,
 ) -> None:
-    """One level in the order of measurement, its resonant point filled."""
+    """Draw one level in the order of measurement, with its resonant point filled."""
     x, y = np.insert(item.frequency_hz, gaps, np.nan), np.insert(values, gaps, np.nan)
     axis.plot(x, y, "o-", ms=4, mfc="white", color=colour, label=label)
     resonant = int(np.argmin(np.abs(item.phase_lag_deg - 90.0)))

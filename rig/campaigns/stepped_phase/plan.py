@@ -1,4 +1,4 @@
-"""The stepped-phase campaign: at a constant level through phase lags on both sides of resonance, unstable branches too."""
+"""The stepped-phase campaign: step through lags on both sides of resonance at a constant level, also on unstable branches."""
 
 import math
 from dataclasses import replace
@@ -14,22 +14,22 @@ from rig.tick.sequencer.segments import Segment
 
 __all__ = ["SteppedPhasePlan"]
 
-LAGS_DEG = (-175.0, -5.0)  # between, the force feeds the vibration, and a lag tells frequencies apart
+LAGS_DEG = (-175.0, -5.0)  # between these lags the force feeds the vibration, and the lag determines the frequency
 
 
 class SteppedPhasePlan(SettledPlan):
     """Frequency responses at constant level, stepped through the phase instead of the frequency.
 
-    The frequency follows the phase lag that the plan asks for, so that over a fold of the response, where one frequency
-    has three vibrations, every lag still has one. Each level is approached from ``start_v`` at the first lag.
+    The frequency follows the requested phase lag. At a fold of the response, where one frequency has three vibrations, every
+    lag still has only one. Each level is approached from ``start_v`` at the first lag.
     """
 
     kind: Literal["stepped-phase"] = "stepped-phase"
     """Kind of campaign."""
     phase_lags_deg: tuple[float, ...] | None = Field(None, min_length=1)
-    """Lags of the drive-point acceleration behind the force, deg; these or ``start_deg`` and ``stop_deg``."""
+    """Lags of the drive-point acceleration behind the force, deg. Give either these or ``start_deg`` and ``stop_deg``."""
     start_deg: float | None = None
-    """Lowest lag, deg; -90 is phase resonance, lower ones lie below it in frequency."""
+    """Lowest lag, deg; -90 is phase resonance, and lower lags lie below resonance in frequency."""
     stop_deg: float | None = None
     """Highest lag, deg."""
     step_deg: float = Field(10.0, gt=0, le=90)
@@ -37,15 +37,16 @@ class SteppedPhasePlan(SettledPlan):
     direction: Literal["up", "down", "up-down"] = "up"
     """Whether the lag rises, falls, or rises and falls."""
     repeat_first: bool = False
-    """Whether the first point is measured again at the end, to see how the specimen has drifted; it is part of no result."""
+    """Whether the first point is measured again at the end to reveal a drift of the specimen. The repeated point enters no
+    result."""
     approach_deg: float | None = None
-    """Lag at which a level is reached before the first lag is stepped to, deg; the first lag if not given."""
+    """Lag at which a level is approached before the step to the first lag, deg; by default the first lag."""
     approach_periods: float = Field(40.0, ge=1, le=1e5)
     """Length of the ramp to a level, periods."""
     ramp_periods: float = Field(10.0, ge=1, le=1e5)
     """Length of the ramp from one lag to the next, periods."""
     record_periods: int = Field(20, ge=4, le=1_000_000)
-    """Periods that are recorded and evaluated at each point."""
+    """Periods recorded and evaluated at each point."""
     accepted_level_error: float = Field(0.01, gt=0, le=1)
     """Largest relative error of the held force or response over the record with which a point is accepted."""
 
@@ -78,7 +79,7 @@ class SteppedPhasePlan(SettledPlan):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Levels, lags, ways and repeats."""
+        """Numbers of levels, lags, directions and repeats."""
         if self.start_deg is None or self.stop_deg is None:
             lags = {"phase_lags_deg": len(self.phase_lags_deg or ())}
         else:
@@ -87,7 +88,7 @@ class SteppedPhasePlan(SettledPlan):
 
     @property
     def asked_lags_deg(self) -> tuple[float, ...]:
-        """Every lag that is held, deg."""
+        """All lags that are held, deg."""
         return self.lags if self.approach_deg is None else tuple(sorted({*self.lags, self.approach_deg}))
 
     @property
@@ -99,7 +100,7 @@ class SteppedPhasePlan(SettledPlan):
         return (*(float(lag) for lag in steps), self.stop_deg)
 
     def targets(self) -> tuple[Target, ...]:
-        """All points: every lag at the first level, then at the next."""
+        """Return all points: every lag at the first level, then at the next level, and so on."""
         rising, falling = [(lag, "up") for lag in self.lags], [(lag, "down") for lag in self.lags[::-1]]
         way = {"up": rising, "down": falling, "up-down": rising + falling[1:]}[self.direction]
         passes = [(level, repeat) for level in self.levels for repeat in range(1, self.repeats + 1)]
@@ -112,10 +113,10 @@ class SteppedPhasePlan(SettledPlan):
         return with_first_repeated(targets) if self.repeat_first else targets
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that measure all points but those ``done`` already.
+        """Return the segments that measure all points except those in ``done``.
 
-        A point whose predecessor is done is stepped to from its predecessor's lag, so that it is reached from the recorded
-        direction.
+        A point whose predecessor is done is approached from the predecessor's lag, so that the direction of approach is the
+        recorded one.
         """
         failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
         out: list[Segment] = []
@@ -147,7 +148,7 @@ class SteppedPhasePlan(SettledPlan):
         return tuple(out)
 
     def _approach(self, target: Target, origin: Target | None) -> list[Segment]:
-        """From whatever was before to the target's level, at ``approach_deg``, then at the lag of the ``origin``."""
+        """Return the segments that approach the target's level, at ``approach_deg`` and then at the lag of ``origin``."""
         first = _lag(origin or target) if self.approach_deg is None else self.approach_deg
         ramp = Segment(SegmentKind.RAMP, -1, target.level, self.approach_periods, lag_deg=first, geometric=True)
         hold = replace(ramp, kind=SegmentKind.HOLD, periods=float(2 * self.settle.average_periods))
@@ -159,10 +160,10 @@ class SteppedPhasePlan(SettledPlan):
 
 
 def _same_pass(before: Target, target: Target) -> bool:
-    """Whether a point lies on the way that the one before it is on."""
+    """Whether two consecutive points belong to the same pass."""
     return (before.level, before.repeat, before.repeats_first) == (target.level, target.repeat, target.repeats_first)
 
 
 def _lag(target: Target) -> float:
-    """The lag that is asked for, deg."""
+    """Return the requested lag, deg."""
     return 0.0 if target.phase_lag_deg is None else target.phase_lag_deg

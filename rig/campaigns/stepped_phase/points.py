@@ -1,4 +1,4 @@
-"""The points of stepped phase: what they hold, and how they come from recorded rows."""
+"""Points of a stepped-phase test: their contents and their evaluation from recorded rows."""
 
 from dataclasses import dataclass, replace
 
@@ -32,20 +32,20 @@ STEPPED_PHASE_COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class SteppedPhaseResult:
-    """What a point of stepped phase has beside the rest."""
+    """Results of a stepped-phase point in addition to those of every point."""
 
     force_rms_n: float
-    """RMS of the force's samples without their mean, with all their harmonics, N."""
+    """RMS of the force samples without their mean value, all harmonics included, N."""
     phase_lag_deg: float
     """Lag of the drive-point acceleration behind the force, deg."""
     level_error: float | None
-    """Relative deviation of what a loop held from its level; None with levels in volts."""
+    """Relative deviation of the held quantity from its level; None with levels in volts."""
 
 
 def measure_stepped_phase_point(
     bench: Bench, plan: SteppedPhasePlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[SteppedPhaseResult]:
-    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment."""
+    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
     lag_deg = target.phase_lag_deg or 0.0
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:

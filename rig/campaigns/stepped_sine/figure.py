@@ -31,10 +31,10 @@ def draw(page: "Figure", recording: Recording) -> None:
 
 
 def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *, title: str = "") -> None:
-    """Force, displacement amplitude, phase lag and accelerance over frequency, one line per level.
+    """Draw force, displacement amplitude, phase lag and accelerance over frequency, one line per level.
 
-    ``page`` is an empty figure, about 9 by 6.4 inches; points are joined in the order of measurement, so that jumps and
-    the direction of a sweep stay visible.
+    ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement, so that jumps and the
+    direction of a sweep stay visible.
     """
     from matplotlib import colormaps
 
@@ -61,7 +61,7 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
 
 
 def _stepped(axis: "Axes", measured: FrequencyResponse, values: Float, **style: Any) -> None:
-    """Points in the order of measurement; where the amplitude jumps from one to the next, their link is dotted."""
+    """Draw points in the order of measurement. Two points between which the amplitude jumps are joined by a dotted line."""
     frequency_hz, amplitude_m = measured.frequency_hz, measured.amplitude_m
     jumps = np.flatnonzero(np.abs(np.diff(np.log(amplitude_m))) > np.log(_JUMP)) + 1
     gaps = np.full(jumps.size, np.nan)

@@ -1,4 +1,4 @@
-"""The stepped-sine campaign: frequencies given, step by step, at a given voltage or a held force or displacement."""
+"""The stepped-sine campaign: step through given frequencies at a given voltage or at a held force or displacement."""
 
 from functools import partial
 from typing import Literal, Self
@@ -17,11 +17,12 @@ __all__ = ["SteppedSinePlan"]
 
 
 class SteppedSinePlan(TonePlan):
-    """Vibrations at given frequencies and levels; a single frequency makes it a sine test.
+    """Vibrations at given frequencies and levels. With a single frequency this is a sine test.
 
-    Every point is approached by a half-cosine ramp of frequency and level, settled by the amplitudes of force and response in
-    ``settle``, and recorded over whole periods. Where two responses exist at one frequency and voltage or force, the
-    direction decides which is found; the unstable one never is. A held displacement has one force at every frequency.
+    Every point is approached by a half-cosine ramp of frequency and level, settled by the amplitudes of force and response as
+    in ``settle``, and recorded over whole periods. If two stable responses exist at one frequency and voltage or force, the
+    direction decides which of them is found; the unstable one is never found. At a held displacement there is one force at
+    every frequency.
     """
 
     kind: Literal["stepped-sine"] = "stepped-sine"
@@ -29,28 +30,28 @@ class SteppedSinePlan(TonePlan):
     frequencies_hz: tuple[float, ...] | None = None
     """Frequencies, in the order of measurement, Hz."""
     start_hz: float | None = Field(None, gt=0)
-    """First frequency, in place of ``frequencies_hz``, Hz."""
+    """First frequency, instead of ``frequencies_hz``, Hz."""
     stop_hz: float | None = Field(None, gt=0)
     """Last frequency, Hz; below ``start_hz`` to step down."""
     steps: int = Field(50, ge=2, le=100_000)
     """Number of frequencies from the first to the last."""
     spacing: Literal["linear", "logarithmic"] = "linear"
-    """How they are spaced."""
+    """Spacing of the frequencies."""
     ramp_periods: float = Field(10.0, ge=1, le=1e5)
     """Length of the ramp from one point to the next, periods."""
     record_periods: int = Field(20, ge=4, le=1_000_000)
-    """Periods that are recorded and evaluated at each point."""
+    """Periods recorded and evaluated at each point."""
     harmonics: int = Field(7, ge=1, le=50)
-    """Highest harmonic that is evaluated."""
+    """Highest harmonic evaluated."""
     settle: SettleRule = SettleRule(settled_periods=10)
-    """When a point counts as settled; its phase error is not asked for."""
+    """When a point counts as settled. The rule's phase error is not used."""
     accepted_drift: float = Field(0.05, gt=0, le=1)
-    """Largest change of the fundamental of force or drive over a record, relative, with which a point is accepted."""
+    """Largest relative change of the fundamental of force or drive over a record with which a point is accepted."""
     accepted_level_error: float = Field(0.01, gt=0, le=1)
-    """Largest deviation of a recorded force or displacement from its level, relative, with which a point is accepted; of no
-    meaning with levels in volts."""
+    """Largest relative deviation of a recorded force or displacement from its level with which a point is accepted. It is not
+    used with levels in volts."""
     on_failure: Literal["skip", "stop"] = "skip"
-    """What follows when a point does not settle or is disturbed: the next point, or a ramp-down."""
+    """What follows a point that does not settle or is disturbed: ``skip`` goes on with the next point, ``stop`` ramps down."""
 
     @model_validator(mode="after")
     def _frequencies_make_sense(self) -> Self:
@@ -67,7 +68,7 @@ class SteppedSinePlan(TonePlan):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Levels and frequencies."""
+        """Numbers of levels and frequencies."""
         if self.frequencies_hz is not None:
             return {**super().counts, "frequencies_hz": len(self.frequencies_hz)}
         return {**super().counts, "steps": self.steps}
@@ -86,7 +87,7 @@ class SteppedSinePlan(TonePlan):
         return self.settle
 
     def targets(self) -> tuple[Target, ...]:
-        """All points: every frequency at the first level, then at the next."""
+        """Return all points: every frequency at the first level, then at the next level, and so on."""
         frequencies = self.frequencies_at_each_level
         up = len(frequencies) < 2 or frequencies[1] >= frequencies[0]
         return tuple(
@@ -95,10 +96,10 @@ class SteppedSinePlan(TonePlan):
         )
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that measure all points but those ``done``; a new level begins from rest at its first frequency.
+        """Return the segments that measure all points except those in ``done``.
 
-        Points that are done are passed through on the way to the others of their level: where two responses exist, the way
-        decides which is found.
+        A new level starts from rest at its first frequency. Points that are done are passed through on the way to the remaining
+        points of their level: if two responses exist, the path decides which one is found.
         """
         targets = self.targets()
         last_of_level = {target.level: target.number for target in targets if target.number not in done}
@@ -120,7 +121,7 @@ class SteppedSinePlan(TonePlan):
         return tuple(out)
 
     def _at(self, target: Target, number: int, tone: Excitation) -> list[Segment]:
-        """The segments of a point, or the ramp through one that is done (-1)."""
+        """Return the segments of a point, or only the ramp if the point is done (number -1)."""
         at = partial(Segment, point=number, level=target.level, excitation=tone)
         ramp = at(
             kind=SegmentKind.RAMP, periods=self.ramp_periods, geometric=self.amplitude_law is AmplitudeLaw.RESPONSE

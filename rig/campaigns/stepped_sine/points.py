@@ -1,4 +1,4 @@
-"""The points of a stepped sine: what they hold, and how they come from recorded rows."""
+"""Points of a stepped-sine test: their contents and their evaluation from recorded rows."""
 
 from dataclasses import dataclass, replace
 
@@ -25,7 +25,7 @@ from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 
 __all__ = ["STEPPED_SINE", "STEPPED_SINE_COLUMNS", "SteppedSineResult", "measure_stepped_sine_point"]
 
-TRUSTED_ALIEN_FORCE = 0.1  # what no lock holds is warned of, where plans under a lock accept no more
+TRUSTED_ALIEN_FORCE = 0.1  # in open loop a larger value causes a warning; plans under a phase lock reject the point
 
 STEPPED_SINE_COLUMNS = (
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
@@ -38,18 +38,18 @@ STEPPED_SINE_COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class SteppedSineResult:
-    """What a point of a stepped sine has beside the rest."""
+    """Results of a stepped-sine point in addition to those of every point."""
 
     phase_lag_deg: float
     """Lag of the displacement behind the force, deg."""
     level_error: float | None
-    """Relative deviation of what a loop held from its level; None with levels in volts."""
+    """Relative deviation of the held quantity from its level; None with levels in volts."""
 
 
 def measure_stepped_sine_point(
     bench: Bench, plan: SteppedSinePlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[SteppedSineResult]:
-    """A recorded point, with its quality; ``settling`` is the outcome record of its settle segment."""
+    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
         vibration = recorded_vibration(bench, rows, plan.harmonics)

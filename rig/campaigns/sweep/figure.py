@@ -1,4 +1,4 @@
-"""Figure of a sweep: voltage, force, response and momentary frequency over time."""
+"""Figure of a sweep: voltage, force, response and instantaneous frequency over time."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,7 @@ Float = NDArray[np.float64]
 
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw the last sweep of a recording; no other rows are read."""
+    """Draw the last sweep of a recording. Rows of other sweeps are not drawn."""
     number, sweep = list(recorded_sweeps(recording).items())[-1]
     rows, point = point_rows(recording, number), point_from(recording.latest[number], SweepResult)
     held = result_of(point).held
@@ -52,7 +52,7 @@ def draw_sweep(
     response: str = "drive",
     title: str = "",
 ) -> None:
-    """Voltage, force, response and momentary frequency over time.
+    """Draw voltage, force, response and instantaneous frequency over time.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def draw_sweep(
     sample_rate_hz
         Samples per second.
     drop_out
-        What of the force's drop-out is marked; nothing if None.
+        Drop-out of the force, whose characteristic points are marked; None: no marks.
     voltage, response
         Channels drawn beside the force.
     title
@@ -92,7 +92,7 @@ def draw_sweep(
 
 
 def _signal(axis: "Axes", values: Float, period: int, rate_hz: float) -> None:
-    """Range of a signal within the period around each instant: single oscillations would not be seen."""
+    """Draw the range of a signal within one period around each instant; single oscillations would not be visible."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     at = np.arange(0, values.size, max(1, values.size // TRACE_BINS))
@@ -113,7 +113,7 @@ def _momentary_frequency(axis: "Axes", sweep: Transient, force: NDArray[Any], ra
 
 
 def _mark_drop_out(force: "Axes", response: "Axes", drop_out: ForceDropOut) -> None:
-    """Levels off resonance, minimum, overshoot and peak, with their values."""
+    """Mark the force off resonance, its minimum and overshoot, and the peak response, with their values."""
     force.axhline(drop_out.off_resonance_n, color=REJECTED, lw=0.8, ls="--")
     marks = (
         (drop_out.minimum_time_s, drop_out.minimum_n, drop_out.minimum_ratio, drop_out.minimum_frequency_hz, "v"),

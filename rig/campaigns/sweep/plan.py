@@ -1,4 +1,4 @@
-"""The sweep campaign: a tone whose frequency goes from one end to the other, of constant voltage or at a held level."""
+"""The sweep campaign: a tone whose frequency moves from one end to the other, at constant voltage or at a held level."""
 
 import math
 from typing import Literal, Self
@@ -13,16 +13,16 @@ from rig.tick.sequencer.segments import Excitation, Segment
 
 __all__ = ["SweepPlan"]
 
-FEWEST_PERIODS = 10  # the fundamental is a mean over two; fewer than this show no course of it
+FEWEST_PERIODS = 10  # the fundamental is a mean over two periods; fewer than ten show no variation of it
 LONGEST_S = 86400.0
 
 
 class SweepPlan(TonePlan):
-    """Sweeps, one per level, of constant voltage or held force or displacement.
+    """Sweeps, one per level, at constant voltage or at held force or displacement.
 
-    With levels in volts the force is whatever shaker and structure make of the voltage; in newtons or metres a loop holds
-    the level as well as it can. From rest the level is reached at the first frequency by a half-cosine ramp and held for
-    ``hold_periods``; then the frequency moves, linearly or logarithmically in time. Every row is recorded.
+    With levels in volts the force results from shaker and structure; with levels in newtons or metres a loop holds the level as
+    well as it can. Starting from rest, the level is reached at the first frequency by a half-cosine ramp and held for
+    ``hold_periods``. Then the frequency moves, linearly or logarithmically in time. Every row is recorded.
     """
 
     kind: Literal["sweep"] = "sweep"
@@ -32,18 +32,18 @@ class SweepPlan(TonePlan):
     stop_hz: float = Field(gt=0)
     """Last frequency, Hz; below ``start_hz`` to sweep down."""
     rate_hz_per_s: float | None = Field(None, gt=0, le=1e5)
-    """Rate of a linear sweep, Hz/s, whichever way it goes."""
+    """Rate of a linear sweep, up or down, Hz/s."""
     rate_octaves_per_min: float | None = Field(None, gt=0, le=1e4)
-    """Rate of a logarithmic sweep, in place of ``rate_hz_per_s``, octaves/min."""
+    """Rate of a logarithmic sweep, instead of ``rate_hz_per_s``, octaves/min."""
     ramp_periods: float = Field(20.0, ge=1, le=1e5)
     """Length of the ramp to the level, and down from it, periods."""
     hold_periods: float = Field(20.0, ge=1, le=1e5)
     """Time at the first frequency before the sweep, periods."""
     off_resonance_hz: tuple[tuple[float, float], ...] | None = Field(None, min_length=1)
-    """Bands in which the force counts as that off resonance (the mean of their medians); the first 15 % if not given."""
+    """Frequency bands that define the force off resonance (the mean of their medians); by default the first 15 %."""
     accepted_level_error: float = Field(0.2, gt=0, le=1)
-    """Largest deviation of a held force or displacement from its level, relative, over three quarters of a sweep with which it
-    is accepted: the rest is left to jumps; of no meaning with levels in volts."""
+    """Largest relative deviation of a held force or displacement from its level, over three quarters of a sweep, with which the
+    sweep is accepted. The remaining quarter allows for jumps. It is not used with levels in volts."""
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
@@ -75,7 +75,7 @@ class SweepPlan(TonePlan):
 
     @property
     def duration_s(self) -> float:
-        """How long one sweep takes, s."""
+        """Duration of one sweep, s."""
         if self.rate_hz_per_s is not None:
             return abs(self.stop_hz - self.start_hz) / self.rate_hz_per_s
         return abs(math.log2(self.stop_hz / self.start_hz)) / ((self.rate_octaves_per_min or math.inf) / 60.0)
@@ -88,7 +88,7 @@ class SweepPlan(TonePlan):
         return Excitation(self.stop_hz, way * (self.rate_octaves_per_min or 0.0) / 60.0, logarithmic=True)
 
     def targets(self) -> tuple[Target, ...]:
-        """One sweep per level."""
+        """Return one sweep per level."""
         up = self.stop_hz > self.start_hz
         return tuple(
             Target(number=number, level=level, direction="up" if up else "down")
@@ -96,7 +96,7 @@ class SweepPlan(TonePlan):
         )
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
-        """The segments that make all sweeps but those ``done`` already; each begins from rest."""
+        """Return the segments of all sweeps except those in ``done``. Each sweep begins from rest."""
         start, stop = Excitation(self.start_hz), Excitation(self.stop_hz)
         volts = AmplitudeLaw.VOLTAGE
         out: list[Segment] = []

@@ -1,4 +1,4 @@
-"""Sweeps: what their points hold, how they come from recorded rows, and fundamentals over time."""
+"""Points of a sweep test: their contents, their evaluation from recorded rows, and fundamentals over time."""
 
 from dataclasses import dataclass, field, replace
 
@@ -19,8 +19,8 @@ from rig.tick.layout import SATURATED
 
 __all__ = ["SWEEP", "SWEEP_COLUMNS", "HeldCourse", "SweepResult", "measure_sweep", "recorded_sweeps", "transient_of"]
 
-NOT_HELD = 0.05  # of its level: a deviation that is said
-USUAL = 0.75  # of a sweep: over so much of it the level is to be held
+NOT_HELD = 0.05  # of its level: a larger deviation is reported
+USUAL = 0.75  # of a sweep: the part over which the level has to be held
 
 SWEEP_COLUMNS = (
     Column("off_resonance_n", "force off resonance", "N", ".4f"),
@@ -36,44 +36,44 @@ SWEEP_COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class HeldCourse:
-    """What a loop held over a sweep."""
+    """The held quantity over a sweep."""
 
     held_least: float
-    """Smallest value of what was held, over its level."""
+    """Smallest value of the held quantity over its level."""
     held_least_frequency_hz: float
-    """Where that was, Hz."""
+    """Frequency of the smallest value, Hz."""
     held_most: float
-    """Largest value, over its level."""
+    """Largest value of the held quantity over its level."""
     held_most_frequency_hz: float
-    """Where that was, Hz."""
+    """Frequency of the largest value, Hz."""
     held_rms_error: float
     """RMS of the relative deviation from the level."""
     held_usual_error: float
-    """Relative deviation that three quarters of the sweep keep to."""
+    """Relative deviation that is not exceeded in three quarters of the sweep."""
     saturated_share: float
-    """Part of the sweep with the output at its limit."""
+    """Part of the sweep in which the output was at its limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweepResult:
-    """What was measured of a sweep."""
+    """Results of a sweep."""
 
     drop_out: ForceDropOut = field(metadata=PART)
-    """How far the force's fundamental dropped at the resonance."""
+    """Drop-out of the force's fundamental at the resonance."""
     minimum_ratio: float
-    """Smallest force over the one off resonance."""
+    """Smallest force over the force off resonance."""
     overshoot_ratio: float
-    """Largest force after that, over the one off resonance."""
+    """Largest force after the minimum over the force off resonance."""
     duration_s: float
     """Length of the sweep, s."""
     held: HeldCourse | None = field(default=None, metadata=PART)
-    """What was held; None with levels in volts."""
+    """The held quantity; None with levels in volts."""
 
 
 def measure_sweep(
     bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[SweepResult]:
-    """A recorded sweep, a transient vibration that is not asked to settle."""
+    """Evaluate a recorded sweep: a transient vibration, which does not have to settle."""
     try:
         transient = transient_of(bench, rows)
         drop_out = force_drop_out(transient, off_resonance_hz=plan.off_resonance_hz)
@@ -98,7 +98,7 @@ def measure_sweep(
 
 
 def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
-    """Where a sweep has holes: what happened there, the smallest force perhaps, is not known."""
+    """Warn of gaps in a sweep: what happened there, perhaps the smallest force, is unknown."""
     lost = lost_rows(rows)
     if not lost.any():
         return []
@@ -113,7 +113,7 @@ def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
 
 
 def _level_objection(plan: SweepPlan, error: float) -> str:
-    """That what was held was too far from its level in a large part of the sweep; no loop holds it through a jump."""
+    """Object if the held quantity was too far from its level in a large part of the sweep; no loop holds it through a jump."""
     if error <= plan.accepted_level_error:
         return ""
     held = "displacement" if plan.level_unit == "m" else "force"
@@ -126,7 +126,7 @@ def _level_objection(plan: SweepPlan, error: float) -> str:
 def _held(
     bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, transient: Transient
 ) -> tuple[HeldCourse | None, list[str]]:
-    """Least and largest of what a loop held, over its level, and where; and warnings about it."""
+    """Return the extremes of the held quantity over its level, with their frequencies, and warnings about them."""
     if plan.amplitude_law is AmplitudeLaw.VOLTAGE:
         return None, []
     held = _course(bench, plan, rows, transient) / target.level
@@ -150,7 +150,7 @@ def _held(
 
 
 def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transient) -> np.ndarray:
-    """float[n]: what was held, over the transient's instants: the force, its RMS over two periods, or the displacement."""
+    """Return the held quantity at the transient's instants, float[n]: force, its RMS over two periods, or displacement."""
     if plan.amplitude_law is AmplitudeLaw.FORCE:
         return np.asarray(np.abs(transient.force))
     roles = [channel.role for channel in bench.channels]
@@ -168,9 +168,9 @@ def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transien
 
 
 def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
-    """Fundamentals over time of recorded rows: every input, its skew taken out, and the output as channel ``voltage``.
+    """Return the fundamentals over time of recorded rows: every input without its skew, and the output as channel ``voltage``.
 
-    Where samples were lost there are no instants. Raises `identification.IdentificationError` where none is left.
+    There are no instants where samples were lost. Raises `identification.IdentificationError` if no instant is left.
     """
     lost = lost_rows(rows)
     inputs = bridged(rows) if lost.any() else rows["inputs"]
@@ -187,7 +187,7 @@ def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
 
 
 def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float) -> Transient:
-    """Without the instants within whose window samples were lost."""
+    """Remove the instants within whose window samples were lost."""
     if not lost.any():
         return transient
     count = np.concatenate([[0], np.cumsum(lost)])
@@ -206,7 +206,7 @@ def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float)
 
 
 def recorded_sweeps(recording: Recording) -> dict[int, Transient]:
-    """Fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
+    """Return the fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
 
     The output is channel ``voltage``.
     """

@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 DATA_TYPE = {"m": 8, "m/s": 11, "m/s2": 12, "m/s^2": 12, "N": 13, "s": 17, "Hz": 18}
-"""Specific data type of a quantity by its SI unit; 0 is unknown."""
+"""Specific data type of a quantity, by its SI unit; 0 means unknown."""
 
 Degree = tuple[int, int]
 """Node and direction."""
@@ -28,13 +28,14 @@ _UP = 3  # +Z: the bench does not say where its sensors point
 _SCALAR = 0
 _EVEN = 1e-9
 WIDTH = 80
-"""Characters of an ID line."""
+"""Number of characters of an ID line."""
 
 
 def degrees_of_freedom(channels: Sequence[Channel]) -> dict[str, Degree]:
-    """Node and direction of channels by name: motions count from 1 in their order, the force has the drive point's node.
+    """Return node and direction of channels by name.
 
-    Everything else comes after, as a scalar. All directions are +Z.
+    Motions are numbered from 1 in their order, and the force has the node of the drive point. All other channels follow as
+    scalars. All directions are +Z.
     """
     motions = [channel for channel in channels if channel.role in ("drive", "response")]
     out = {channel.name: (number, _UP) for number, channel in enumerate(motions, 1)}
@@ -50,7 +51,7 @@ def degrees_of_freedom(channels: Sequence[Channel]) -> dict[str, Degree]:
 
 
 def axis(prefix: str, label: str, unit: str) -> dict[str, Any]:
-    """Fields of dataset 58 that describe an axis (``abscissa``, ``ordinate``, ``orddenom`` or ``z_axis``)."""
+    """Return the fields of dataset 58 that describe an axis (``abscissa``, ``ordinate``, ``orddenom`` or ``z_axis``)."""
     return {
         f"{prefix}_spec_data_type": DATA_TYPE.get(unit, 0),
         f"{prefix}_axis_lab": label[:20] or "NONE",
@@ -59,7 +60,7 @@ def axis(prefix: str, label: str, unit: str) -> dict[str, Any]:
 
 
 def evenly(x: Any) -> bool:
-    """Whether the first value and the step, as a header keeps them (six digits), give all values again."""
+    """Whether all values follow from the first value and the step as stored in a header (six digits)."""
     if len(x) < 2:
         return bool(float(f"{x[0]:.5e}") == x[0])
     first, step = float(f"{x[0]:.5e}"), float(f"{x[1] - x[0]:.5e}")
@@ -67,7 +68,7 @@ def evenly(x: Any) -> bool:
 
 
 def channel_lines(channels: Sequence[Channel]) -> list[str]:
-    """Three ID lines that name the channels of the nodes; ``NONE`` where they are too long for that."""
+    """Return three ID lines that name the channels of the nodes; ``NONE`` if the names are too long."""
     text = ";".join(f"{channel.name}|{channel.role}|{channel.unit}" for channel in channels)
     if len(text) > 3 * WIDTH or not text.isascii():
         return ["NONE"] * 3
@@ -75,7 +76,7 @@ def channel_lines(channels: Sequence[Channel]) -> list[str]:
 
 
 def channels_in(lines: Sequence[str]) -> tuple[Channel, ...] | None:
-    """Inverse of `channel_lines`; None for other lines."""
+    """Parse the output of `channel_lines`; return None for other lines."""
     text = "".join(line.ljust(WIDTH) if line != "NONE" else "" for line in lines).strip()
     parts = [entry.split("|") for entry in text.split(";")]
     if not all(len(part) == 3 for part in parts):

@@ -15,10 +15,10 @@ __all__ = ["modes_in"]
 
 
 def modes_in(datasets: Sequence[Dataset], assumed: str = "", drive: str = "") -> LinearModes:
-    """The normal modes (dataset 55, analysis type 2), mass-normalised by their modal mass.
+    """Return the normal modes (dataset 55, analysis type 2), mass-normalised by their modal mass.
 
-    ``drive`` is the driven degree of freedom (``1+Z``), wanted where the file was not written by this package. Raises
-    `ImportFailed` without modes or drive point, on modal masses that are not above zero, complex shapes.
+    ``drive`` is the driven degree of freedom (``1+Z``), required if the file was not written by this package. Raises
+    `ImportFailed` if there are no modes or no drive point, for modal masses that are not above zero, and for complex shapes.
     """
     modes = sorted((d for d in datasets if d["type"] == 55 and d["analysis_type"] == 2), key=lambda d: d["freq"])
     if not modes:
@@ -48,7 +48,7 @@ def modes_in(datasets: Sequence[Dataset], assumed: str = "", drive: str = "") ->
 
 
 def _degrees(nodes: Any, columns: Any, drive: str) -> tuple[tuple[Channel, ...], Any]:
-    """Channels and shapes of all degrees of freedom that move in any mode."""
+    """Return channels and shapes of all degrees of freedom that move in any mode."""
     moving = [(k, j) for j in range(columns.shape[2]) for k in range(3) if np.any(columns[:, k, j])]
     names = [f"{int(nodes[j])}+{'XYZ'[k]}" for k, j in moving]
     if drive not in names:

@@ -1,4 +1,4 @@
-"""Datasets of a universal file, checked for being whole, and the time data in them."""
+"""Read the datasets of a universal file, check that they are complete, and extract their time data."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -21,9 +21,9 @@ _DIRECTION = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 
 
 def read_uff(path: Path) -> list[Dataset]:
-    """Datasets 55, 58, 151 and 164 of a universal file, in their order.
+    """Return datasets 55, 58, 151 and 164 of a universal file, in their order.
 
-    Raises `ImportFailed`: missing, no universal file, cut short, or a dataset that cannot be read.
+    Raises `ImportFailed` if the file is missing, not a universal file or cut short, or if a dataset cannot be read.
     """
     import pyuff
 
@@ -57,7 +57,7 @@ def _dataset(file: Any, number: int, kind: int, path: Path) -> Dataset:
 
 
 def degree_of(dataset: Dataset, prefix: str) -> str:
-    """Node and direction as text, ``3+Z``."""
+    """Return node and direction as text, such as ``3+Z``."""
     direction = int(dataset[f"{prefix}_dir"])
     sign = _DIRECTION.get(abs(direction), f"?{direction}")
     return f"{dataset[f'{prefix}_node']}{sign.replace('+', '-') if direction < 0 else sign}"
@@ -67,9 +67,10 @@ _SPARE = 0.01  # a recorder stops a few samples early or late
 
 
 def time_data_in(datasets: Sequence[Dataset], assumed: str = "") -> dict[str, Any]:
-    """The time functions (type 1) by name, one column a record, in SI where they have units; ``sets`` is the list of all.
+    """Return the time functions (type 1) by name, with one column per record, in SI if they have units.
 
-    ``sample_rate_hz`` and ``units`` (of each name) go along. Raises `ImportFailed` without any, or on rates that disagree.
+    The dictionary also has ``sets`` (list of all functions), ``sample_rate_hz`` and ``units`` (by name). Raises `ImportFailed`
+    if there are none, or if their rates disagree.
     """
     functions = [dataset for dataset in datasets if dataset["type"] == 58 and dataset["func_type"] == 1]
     if not functions:
@@ -109,13 +110,13 @@ def time_data_in(datasets: Sequence[Dataset], assumed: str = "") -> dict[str, An
 
 
 def _columns(records: Sequence[Any]) -> Any:
-    """Records side by side, cut to the shortest."""
+    """Put records side by side, cut to the length of the shortest."""
     shortest = min(map(len, records))
     return np.column_stack([record[:shortest] for record in records])
 
 
 def _rate(function: Dataset) -> float:
-    """Sample rate: the header's, or line 5's where that is the same to the header's six digits."""
+    """Return the sample rate of line 5 if it agrees with the header to the header's six digits, else that of the header."""
     if function["abscissa_spacing"] != 1 or function["abscissa_inc"] <= 0.0:
         raise ImportFailed(f"{function['where']}: is not evenly sampled; wanted is a step above zero")
     rate = 1.0 / float(function["abscissa_inc"])

@@ -1,4 +1,4 @@
-"""Frequency responses in the datasets of a universal file."""
+"""Read frequency responses from the datasets of a universal file."""
 
 import re
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ __all__ = ["responses_in"]
 
 
 def _names(dataset: Dataset) -> tuple[str, str]:
-    """Names of response and reference: those that this package writes, else entity, else node and direction."""
+    """Return the names of response and reference as written by this package, otherwise node and direction."""
     parts = dataset["id1"].split(" / ")
     if dataset["id4"].startswith("vibrolock") and len(parts) == 2:
         return parts[0], parts[1]
@@ -23,10 +23,10 @@ def _names(dataset: Dataset) -> tuple[str, str]:
 
 
 def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> Any:
-    """The functions of type 4: a `FrequencyResponseMatrix`, or the levels of a stepped sine that this package wrote.
+    """Return the functions of type 4 as a `FrequencyResponseMatrix`, or as the levels of a stepped sine of this package.
 
-    A response whose node and axis are those of a reference is the drive point; opposite directions turn its sign.
-    Raises `ImportFailed` on missing or double paths, unequal frequencies, or unclear units.
+    A response with the node and axis of a reference is the drive point. Raises `ImportFailed` for missing or duplicate paths,
+    unequal frequencies, or unclear units.
     """
     functions = [dataset for dataset in datasets if dataset["type"] == 58 and dataset["func_type"] == 4]
     units = file_units(datasets, assumed)
@@ -74,7 +74,7 @@ def _estimator(function: Dataset) -> str:
 
 
 def _path(function: Dataset, units: FileUnits, output: str, source: str) -> tuple[Any, tuple[Channel, Channel]]:
-    """One response in SI, and its two channels."""
+    """Return one response in SI, and its two channels."""
     where = function["where"]
     (out_unit, out_factor), (in_unit, in_factor) = (
         units.of(function, axis, where) for axis in ("ordinate", "orddenom")
@@ -93,7 +93,7 @@ def _path(function: Dataset, units: FileUnits, output: str, source: str) -> tupl
 
 
 def _stepped_sines(datasets: Sequence[Dataset], functions: Sequence[Dataset]) -> tuple[FrequencyResponse, ...]:
-    """The levels of a stepped sine as this package writes them: response over force, and the force."""
+    """Return the levels of a stepped sine as this package writes them: response over force, and the force."""
     forces = {d["func_id"]: d for d in datasets if d["type"] == 58 and d["func_type"] == 0}
     out = []
     for function in functions:

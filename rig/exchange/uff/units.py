@@ -1,4 +1,4 @@
-"""Units of what a universal file holds, by the labels of its axes and by its dataset 164."""
+"""Units of the data in a universal file, from the labels of its axes and from its dataset 164."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,27 +11,27 @@ __all__ = ["FileUnits", "file_units"]
 _TOLERANCE = 1e-3
 _LENGTH = {8: "m", 11: "m/s", 12: "m/s2"}
 _FORCE = (9, 13)
-_APART = ("g", "1", "V")  # labels that no system of units speaks of
+_APART = ("g", "1", "V")  # labels that do not depend on the system of units
 _CODES = ("", "SI", "BG", "MG", "BA", "MM", "CM", "IN", "GM", "US")
 
 
 class FileUnits:
-    """Factors to SI of the quantities of a file.
+    """Factors from the quantities of a file to SI.
 
     Parameters
     ----------
     dataset
-        Dataset 164, None where the file has none.
+        Dataset 164; None if the file has none.
     assumed
-        What decides where labels and dataset 164 disagree or say nothing: ``labels``, ``file`` (dataset 164), ``si``, or
-        empty: then that is refused.
+        Source that decides if labels and dataset 164 disagree or are missing: ``labels``, ``file`` (dataset 164) or ``si``. If
+        empty, such a file is refused.
     """
 
     def __init__(self, dataset: Mapping[str, Any] | None, assumed: str = "") -> None:
         self._dataset, self._assumed = dataset, assumed
 
     def of(self, function: Mapping[str, Any], prefix: str, where: str) -> tuple[str, float]:
-        """SI unit of an axis (``ordinate``, ``orddenom``) and the factor to it; raises `ImportFailed` where it is unclear."""
+        """Return the SI unit of an axis (``ordinate``, ``orddenom``) and the factor to it; raise `ImportFailed` if unclear."""
         code = int(function.get(f"{prefix}_spec_data_type", 0))
         label = str(function.get(f"{prefix}_axis_units_lab", "")).strip()
         quantity = _LENGTH.get(code, "N" if code in _FORCE else "")
@@ -56,7 +56,7 @@ class FileUnits:
         return filed
 
     def mass_factor(self, where: str) -> float:
-        """Factor from the file's unit of mass, its force over its acceleration, to kg."""
+        """Return the factor from the file's unit of mass (its force over its acceleration) to kg."""
         if self._assumed == "si":
             return 1.0
         if self._dataset is None:
@@ -70,14 +70,14 @@ class FileUnits:
         return _CODES[code] if 0 <= code < len(_CODES) else f"code {code}"
 
     def _filed(self, code: int, quantity: str) -> tuple[str, float] | None:
-        """By dataset 164, which divides to give SI; None where it says nothing of the quantity."""
+        """Return unit and factor by dataset 164, whose factors divide to give SI; None if it does not define the quantity."""
         if self._dataset is None or not quantity:
             return None
         return quantity, 1.0 / float(self._dataset["force" if code in _FORCE else "length"])
 
 
 def file_units(datasets: Sequence[Mapping[str, Any]], assumed: str = "") -> FileUnits:
-    """Units of a file; raises `ImportFailed` where it has several datasets 164 that differ."""
+    """Return the units of a file; raise `ImportFailed` if it has several datasets 164 that differ."""
     found = [dataset for dataset in datasets if dataset["type"] == 164]
     factors = {(dataset["length"], dataset["force"]) for dataset in found}
     if len(factors) > 1 or any(length <= 0.0 or force <= 0.0 for length, force in factors):

@@ -1,7 +1,8 @@
-"""Objects as datasets of a universal file.
+"""Write objects as datasets of a universal file.
 
-Frequency responses are functions of type 4, time data of type 1, modes dataset 55. Whatever is a table over points or
-modes without a type of its own (backbones, nonlinear modes) is a function of type 0 per column over the number of the row.
+Frequency responses are functions of type 4, time data are functions of type 1, and modes are dataset 55. Tables over points or
+modes that have no type of their own (backbones, nonlinear modes) are written as functions of type 0: one function per column,
+over the row number.
 """
 
 import warnings
@@ -24,15 +25,15 @@ _PROGRAM = "vibrolock"
 
 
 def write_uff(items: Sequence[Contents], path: Path) -> None:
-    """Write header, units (SI) and the datasets of all items to an empty file; may raise anything pyuff does.
+    """Write header, units (SI) and the datasets of all items to an empty file; may raise any error of pyuff.
 
-    Raises `RecordingError` for a kind that has no form in universal files, and for NaN in a function.
+    Raises `RecordingError` for a kind that universal files cannot represent, and for NaN in a function.
     """
     import pyuff
 
     class Writer(pyuff.UFF):  # type: ignore[misc]
         def refresh(self) -> bool:
-            """Not read the whole file again after every dataset."""
+            """Do nothing, instead of reading the whole file again after every dataset."""
             return False
 
     writer = Writer(str(path))
@@ -61,14 +62,14 @@ _DATES = ("db_created", "db_saved", "file_written")
 
 
 def _ascii(text: str) -> str:
-    """A line of at most 80 plain characters, ``NONE`` for none."""
+    """Return a line of at most 80 ASCII characters; ``NONE`` if it would be empty."""
     return text.encode("ascii", "replace").decode().replace("\n", " ")[:WIDTH].strip() or "NONE"
 
 
 def _function(kind: int, number: int, title: str, item: Contents, x: Any, data: Any) -> dict[str, Any]:
-    """A function without its degrees of freedom; one whose header keeps its abscissa has it evenly spaced."""
+    """Return a function without its degrees of freedom. Its abscissa is marked as even if the header can represent it."""
     even = evenly(x)
-    abscissa = x if len(x) > 1 else np.array([x[0], x[0] + 1.0])  # the writer wants a step
+    abscissa = x if len(x) > 1 else np.array([x[0], x[0] + 1.0])  # the writer needs a step
     out = {"type": 58, "func_type": kind, "func_id": number, "ver_num": 1, "load_case_id": 0, "binary": 0}
     texts = {"id1": _ascii(title), "id2": _ascii(item.title), "id4": _ascii(f"{_PROGRAM} {item.kind}"), "id5": "NONE"}
     texts["id3"] = datetime.now().strftime("%d-%b-%y %H:%M:%S")
@@ -89,7 +90,7 @@ def _channels(item: Contents, name: str = "channels") -> list[Channel]:
 
 
 def _time_data(item: Contents) -> Iterator[dict[str, Any]]:
-    """Type 1, one function a channel, binary; line 5 keeps the sample rate, of which the header has six digits."""
+    """Yield one binary function of type 1 per channel. Line 5 has the full sample rate; the header has only six digits."""
     channels, rate = _channels(item), item.attributes["sample_rate_hz"]
     degrees = degrees_of_freedom(channels)
     x = item.arrays["time_s"]
@@ -111,7 +112,7 @@ def _time_data(item: Contents) -> Iterator[dict[str, Any]]:
 
 
 def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
-    """Type 4, one function per output and input; covariances are left to MAT and CSV."""
+    """Yield one function of type 4 per output and input. Covariances are written only to MAT and CSV."""
     outputs, inputs = _channels(item, "outputs"), _channels(item, "inputs")
     degrees = degrees_of_freedom([*outputs, *inputs])
     x = item.arrays["frequency_hz"]
@@ -136,7 +137,7 @@ def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
 
 
 def _table(item: Contents) -> Iterator[dict[str, Any]]:
-    """Type 0, one function a column over the number of the row from 1; rows that are NaN are left out."""
+    """Yield one function of type 0 per column, over the row number from 1. Rows that are NaN are left out."""
     number = 0
     for name in item.rows:
         for title, unit, values in _complex_columns(item, name):
@@ -159,7 +160,7 @@ def _complex_columns(item: Contents, name: str) -> Iterator[tuple[str, str, Any]
 
 
 def _frequency_responses(item: Contents) -> Iterator[dict[str, Any]]:
-    """Per level: type 4 (response over force) and, as type 0, the force, both over the measured frequencies."""
+    """Yield for each level: response over force (type 4) and force (type 0), over the measured frequencies."""
     ends = np.cumsum(item.arrays["points_per_level"])
     for number, end in enumerate(ends):
         rows = slice(end - item.arrays["points_per_level"][number], end)
@@ -179,7 +180,7 @@ def _frequency_responses(item: Contents) -> Iterator[dict[str, Any]]:
 
 
 def _modes(item: Contents) -> Iterator[dict[str, Any]]:
-    """Dataset 55, one normal mode each: modal mass 1 kg, the shape in +Z; lines 3 to 5 tell the nodes' channels."""
+    """Yield one dataset 55 per normal mode: modal mass 1 kg, shape in +Z; lines 3 to 5 name the channels of the nodes."""
     channels = _channels(item)
     degrees = degrees_of_freedom(channels)
     lines = channel_lines(channels)

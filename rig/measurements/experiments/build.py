@@ -1,4 +1,4 @@
-"""From a recording to experiments: which points, which channels, at which rate."""
+"""Build experiments from a recording: select points, channels and sample rate."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -28,12 +28,12 @@ from rig.recording.reader import Recording
 __all__ = ["KINDS", "default_rate_hz", "experiments", "rows_from_rest"]
 
 KINDS = tuple(name for name, campaign in CAMPAIGNS.items() if campaign.experiments)
-"""Kinds of recordings that hold experiments."""
+"""Kinds of recordings from which experiments can be built."""
 
 SAMPLES_PER_PERIOD = 25
-"""Of the highest excited frequency: the paper has 22.9 and 28.4."""
+"""Samples per period of the highest excited frequency. The paper has 22.9 and 28.4."""
 FEWEST_SAMPLES_PER_PERIOD = 2.5
-"""Of the highest excited frequency: below, its lines are cut off with what would fold."""
+"""Fewest samples per period of the highest excited frequency. With fewer, the anti-alias filter cuts off its lines."""
 _SAME_RATIO = 1e-12
 _ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)
 
@@ -48,38 +48,38 @@ def experiments(
     transient_periods: float | None = None,
     segment_periods: int = 30,
 ) -> tuple[Experiment, ...]:
-    """The accepted points of a recording as training or test data, in the order of the plan.
+    """Return the accepted points of a recording as training or test data, in the order of the plan.
 
-    A multisine's realisation becomes one settled period, begun where the signal begins, with as much of the period before
-    ahead of it as ``transient_periods`` says. A sweep is taken whole, with all that led to it from rest
-    ahead of it; one in which samples were lost in pieces.
-    Of a point of a backbone, stepped phase, stepped sine or response-controlled test ``segment_periods`` periods are
-    taken, whatever number of samples they have: their initial state is to be estimated.
+    A multisine's realisation becomes one settled period that begins where the signal begins. The last ``transient_periods`` of
+    the periodic signal are put ahead of it. A sweep is taken whole, preceded by all rows that led to it from rest; if samples
+    were lost, it is taken in pieces. Of a point of a backbone, stepped-phase, stepped-sine or response-controlled test,
+    ``segment_periods`` periods are taken, with any number of samples; the initial state of such a segment has to be estimated.
 
     Parameters
     ----------
     recording
         An open recording.
     inputs, outputs
-        Names or roles of channels; ``voltage`` is the output of the rig. Without ``outputs``: all motions, and the force where
-        that is no input.
+        Names or roles of channels; ``voltage`` is the output of the rig. Without ``outputs``: all motions, and the force if it
+        is not an input.
     rate_hz
-        Sample rate of the experiments, at most the recording's; `default_rate_hz` if not given. A multisine's period must
-        be whole samples then; elsewhere the ratio of the two rates one of whole numbers up to 1000.
+        Sample rate of the experiments, at most that of the recording; by default `default_rate_hz`. At this rate a multisine's
+        period must be a whole number of samples. For other recordings the ratio of the two rates must be one of whole numbers
+        up to 1000.
     periods
-        Of a multisine: the ``mean`` over its periods, or ``all`` of them.
+        For a multisine: the ``mean`` over its periods, or ``all`` of them.
     transient_periods
-        Of a multisine, put ahead: as many as its plan waited for before it recorded, one at least, if not given. Fewer than
-        a vibration takes to decay cost accuracy.
+        For a multisine: number of periods put ahead; by default as many as the plan waited before recording, at least one.
+        Fewer periods than a vibration takes to decay reduce the accuracy.
     segment_periods
-        Of a settled point, at most.
+        For a settled point: largest number of periods.
 
     Raises
     ------
     RecordingError
-        For a recording of a kind that holds no experiments.
+        If the kind of recording cannot give experiments.
     identification.IdentificationError
-        Where nothing is left, a channel is not there, or the rate does not fit.
+        If no data is left, a channel does not exist, or the rate does not fit.
     """
     if recording.kind not in KINDS:
         raise RecordingError(f"{recording.path}: holds a {recording.kind}, wanted is a {' or a '.join(KINDS)}")
@@ -135,7 +135,7 @@ def experiments(
 def _records(
     recording: Recording, signals: Signals, points: Sequence[Point[Any]], rate_hz: float, segment_periods: int
 ) -> Iterable[Experiment]:
-    """Experiments of all that is no multisine."""
+    """Yield the experiments of a recording that is not a multisine."""
     for point in points:
         rows, name = point_rows(recording, point.number), _called(recording.path.stem, point)
         if _made_of(recording) == "sweeps":
@@ -153,9 +153,10 @@ def _records(
 
 
 def rows_from_rest(recording: Recording, number: int, ratio: Fraction) -> np.ndarray:
-    """The rows before a point, by its stored ``number`` from 0, from the last one without an output on: how it was approached.
+    """Return the rows that lead to a point, from the last row without output before it.
 
-    With as many more as it takes for a sample at the new rate to fall on the point's first.
+    ``number`` is the stored number of the point, from 0. Further rows are included so that a sample at the new rate falls on
+    the first row of the point.
     """
     step = ratio.limit_denominator(LARGEST_FACTOR).denominator
     for part in reversed(recording.parts):
@@ -175,10 +176,10 @@ def rows_from_rest(recording: Recording, number: int, ratio: Fraction) -> np.nda
 
 
 def default_rate_hz(recording: Recording) -> float:
-    """A round number of samples per second, the nearest below 25 a period of the highest frequency that is excited.
+    """Return a round sample rate just below 25 samples per period of the highest excited frequency.
 
-    At most the recording's own, and for a multisine such that a period has a whole number of samples. Raises
-    `IdentificationError` where no point was accepted.
+    The rate is at most that of the recording. For a multisine it gives a whole number of samples per period. Raises
+    `IdentificationError` if no point was accepted.
     """
     bench = bench_of_recording(recording)
     plan = recording.configuration["plan"]
@@ -195,7 +196,7 @@ def default_rate_hz(recording: Recording) -> float:
 
 
 def _highest_hz(recording: Recording) -> float:
-    """The highest frequency that is excited."""
+    """Return the highest excited frequency, Hz."""
     plan = recording.configuration["plan"]
     if _made_of(recording) == "realisations":
         return float(plan["highest_hz"])
@@ -209,7 +210,7 @@ def _made_of(recording: Recording) -> str | None:
 
 
 def _accepted(recording: Recording, result: type[Any] | None = None) -> list[Point[Any]]:
-    """The accepted points that the plan in force asks for, without the first one repeated at the end."""
+    """Return the accepted points of the current plan, without the repetition of the first point."""
     points = points_of(recording) if result is None else points_of(recording, result)
     found = [point for point in of_the_result(points) if point.accepted]
     if not found:

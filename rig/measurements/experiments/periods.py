@@ -1,4 +1,4 @@
-"""Multisine realisations as experiments: a settled period each, resampled without any error where the rates allow it."""
+"""Multisine realisations as experiments: one settled period each, resampled without error if the rates allow it."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -25,9 +25,9 @@ class WantedPeriods:
     rate_hz: float
     """Sample rate of the experiments, Hz."""
     periods: Periods
-    """The mean over the periods of a realisation, or all of them."""
+    """Whether to use the mean over the periods of a realisation, or all of them."""
     transient_periods: float
-    """Periods that are put ahead and do not count."""
+    """Number of periods put ahead that do not count in errors."""
 
 
 def realisation(
@@ -38,10 +38,10 @@ def realisation(
     wanted: WantedPeriods,
     name: str,
 ) -> Experiment:
-    """The mean over a realisation's periods, or all of them one after the other, begun where the signal begins.
+    """Return the mean over a realisation's periods, or all periods in sequence, begun where the signal begins.
 
-    Periods in which samples were lost are left out. Raises `IdentificationError` where none is left, or a period is no
-    whole number of samples at the wanted rate.
+    Periods with lost samples are left out. Raises `IdentificationError` if no period is left, or if a period is not a whole
+    number of samples at the wanted rate.
     """
     bench, rate_hz = signals.bench, wanted.rate_hz
     played = plan.model_copy(update={"periods": result_of(point).periods})
@@ -69,7 +69,7 @@ def realisation(
 
 
 def samples_of_a_period(plan: MultisinePlan, bench: Bench, rate_hz: float) -> int:
-    """Samples of a period at another rate; `IdentificationError` where that is no whole number."""
+    """Return the samples of a period at another rate; raise `IdentificationError` if this is not a whole number."""
     exact = plan.design(bench.sample_rate_hz).period_samples * rate_hz / bench.sample_rate_hz
     size = round(exact)
     if size < 1 or abs(exact - size) > 1e-6:
@@ -81,9 +81,10 @@ def samples_of_a_period(plan: MultisinePlan, bench: Bench, rate_hz: float) -> in
 
 
 def _resampled(recorded: np.ndarray, bench: Bench, size: int, offset: np.ndarray) -> np.ndarray:
-    """float[n_channels + 1, n_periods, n] with ``size`` samples a period: its lines below the new Nyquist frequency alone.
+    """Resample to ``size`` samples per period, keeping only the lines below the new Nyquist frequency.
 
-    Exact for what lies there, and nothing folds back; the channels' skew is taken out, and the mean where it is an offset.
+    The result is float[n_channels + 1, n_periods, n]. It is exact for these lines, and nothing aliases. The skew of the
+    channels is removed, and so is the mean of channels where it is a sensor offset.
     """
     count = recorded.shape[-1]
     lines = np.fft.rfft(recorded, axis=-1)[..., : size // 2 + 1]
@@ -91,5 +92,5 @@ def _resampled(recorded: np.ndarray, bench: Bench, size: int, offset: np.ndarray
     lines[:-1] *= skew_turn(bench, frequency_hz)[:, None]
     lines[offset, :, 0] = 0.0
     if size % 2 == 0 and size < count:
-        lines[..., -1] = 0.0  # the Nyquist frequency itself: half of it would have folded
+        lines[..., -1] = 0.0  # half of the line at the Nyquist frequency would have aliased
     return np.asarray(np.fft.irfft(lines, size, axis=-1) * (size / count))

@@ -1,4 +1,4 @@
-"""Records that are no whole periods as experiments: sweeps, and the settled points of everything that is held or locked."""
+"""Records without a whole number of periods as experiments: sweeps and settled points."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,19 +16,19 @@ from rig.measurements.experiments.signals import Signals
 __all__ = ["segment", "sweep_pieces"]
 
 AT_REST = 0.01
-"""Share of its largest value that a signal may have, RMS, in the first period of a record that begins at rest."""
+"""Largest RMS in the first period of a record that begins at rest, relative to the largest value of the signal."""
 FEWEST_PERIODS = 8
-"""Periods without which a settled point says nothing: its initial state takes some, and is to be known."""
+"""Fewest periods of a useful settled point: some of them are needed to estimate the initial state."""
 SHORTEST_PIECE = 20
-"""Periods of a sweep's first frequency that a piece of it has at least."""
+"""Shortest length of a piece of a sweep, in periods of the sweep's first frequency."""
 
 
 def segment(
     signals: Signals, point: Point[Any], rows: np.ndarray, *, rate_hz: float, periods: int, name: str
 ) -> Experiment | None:
-    """The first so many periods of a settled point, in its longest stretch without lost samples; None if that is too short.
+    """Return the first periods of a settled point, from its longest stretch without lost samples; None if it is too short.
 
-    Its state before the first sample is to be estimated.
+    The state before the first sample has to be estimated.
     """
     fs, frequency_hz = signals.bench.sample_rate_hz, vibration_of(point).frequency_hz
     static = spectrum_of(point).harmonics[:, 0].real
@@ -54,9 +54,10 @@ def sweep_pieces(
     rate_hz: float,
     name: str,
 ) -> Iterator[Experiment]:
-    """A whole sweep, or its pieces between lost samples; from rest where it begins there, else from an estimated state.
+    """Yield a whole sweep, or its pieces between lost samples, beginning at rest or in an estimated state.
 
-    ``before``: how many of the rows lead to the sweep; they are simulated and do not count. ``level``: that of the plan.
+    ``before`` is the number of rows that lead to the sweep; they are simulated but do not count in errors. ``level`` is the
+    level in the plan.
     """
     fs = signals.bench.sample_rate_hz
     shortest = SHORTEST_PIECE * fs / start_hz
@@ -75,14 +76,14 @@ def sweep_pieces(
 
 
 def _stretches(rows: np.ndarray) -> list[slice]:
-    """Stretches of rows between lost samples, in the order of time."""
+    """Return the stretches of rows between lost samples, in the order of time."""
     sound = np.concatenate([[False], ~lost_rows(rows), [False]])
     ends = np.flatnonzero(np.diff(sound.astype(np.int8)))
     return [slice(int(first), int(end)) for first, end in zip(ends[::2], ends[1::2], strict=True)]
 
 
 def _slower(signals: Signals, values: np.ndarray, rate_hz: float, *, begins_at_rest: bool) -> np.ndarray:
-    """In step and decimated, without the ends that filters have spoilt; a beginning at rest is not spoilt."""
+    """Remove the skew and decimate; drop the ends that the filters have spoilt. A beginning at rest is not spoilt."""
     fs = signals.bench.sample_rate_hz
     values, spoilt = signals.in_step(values)
     values = values[:, 0 if begins_at_rest else spoilt : values.shape[1] - spoilt]

@@ -1,4 +1,4 @@
-"""Which recorded signals an experiment holds, in which order, without the channels' skew and sensors' offsets."""
+"""Recorded signals of an experiment: selection, order, and correction for the channels' skew and the sensors' offsets."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,27 +12,27 @@ from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 __all__ = ["SKEW_EDGE", "Signals"]
 
 SKEW_EDGE = 32
-"""Samples at either end of a record that feel its ends once a fraction of a sample is taken out, beside the skew itself."""
+"""Samples at either end of a record that are spoilt when a fraction of a sample of skew is removed, in addition to the skew."""
 _KAISER_BETA = 8.6
 _HELD_AT_ZERO = ("velocity", "acceleration")
 
 
 @dataclass(frozen=True)
 class Signals:
-    """The signals chosen of a bench: every input channel in its order, then the output ``voltage``."""
+    """Signals chosen from a bench. The rows are all input channels in the order of the bench, then the output ``voltage``."""
 
     bench: Bench
-    """The bench as it was."""
+    """The bench as it was recorded."""
     inputs: tuple[int, ...]
-    """Rows that go into a model."""
+    """Rows that are inputs of a model."""
     outputs: tuple[int, ...]
-    """Rows that come out of it."""
+    """Rows that are outputs of a model."""
 
     @classmethod
     def chosen(cls, bench: Bench, inputs: Sequence[str], outputs: Sequence[str] | None) -> "Signals":
-        """By name, or by role; ``outputs`` None: all motions, and the force unless it is an input.
+        """Choose signals by name or role; ``outputs`` None: all motions, and the force unless it is an input.
 
-        Raises `IdentificationError` for a name that is not there, none at all, and one on both sides.
+        Raises `IdentificationError` for an unknown name, for an empty choice, and for a channel that is both input and output.
         """
         channels = (*channels_of(bench), VOLTAGE)
         into = _rows(channels, "inputs", inputs)
@@ -48,35 +48,35 @@ class Signals:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """All of them."""
+        """All channels, including the output ``voltage``."""
         return (*channels_of(self.bench), VOLTAGE)
 
     @property
     def input_channels(self) -> tuple[Channel, ...]:
-        """What goes in."""
+        """Channels that are inputs of a model."""
         return tuple(self.channels[row] for row in self.inputs)
 
     @property
     def output_channels(self) -> tuple[Channel, ...]:
-        """What comes out."""
+        """Channels that are outputs of a model."""
         return tuple(self.channels[row] for row in self.outputs)
 
     def of(self, rows: np.ndarray) -> np.ndarray:
-        """float[n_channels + 1, n]: recorded rows as they are."""
+        """Return recorded rows unchanged as float[n_channels + 1, n]."""
         return np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
 
     @property
     def offset(self) -> np.ndarray:
-        """bool[n_channels + 1]: channels whose mean over a vibration is the sensor's, for no motion goes on and on."""
+        """bool[n_channels + 1]: channels whose mean over a vibration is a sensor offset, because no motion lasts forever."""
         return np.array([c.role in ("drive", "response") and c.motion in _HELD_AT_ZERO for c in self.channels])
 
     @property
     def skew(self) -> np.ndarray:
-        """float[n_channels + 1]: samples by which each lags."""
+        """float[n_channels + 1]: samples by which each channel lags."""
         return np.array([*(channel.skew_samples for channel in self.bench.channels), 0.0])
 
     def in_step(self, signals: np.ndarray) -> tuple[np.ndarray, int]:
-        """The signals with every channel moved forward by its skew, and how many samples at either end are spoilt by it."""
+        """Advance every channel by its skew; also return how many samples at either end are spoilt."""
         skew = self.skew
         if not skew.any():
             return signals, 0
@@ -85,7 +85,7 @@ class Signals:
 
 
 def _rows(channels: tuple[Channel, ...], what: str, wanted: Sequence[str]) -> tuple[int, ...]:
-    """Rows of channels by name, or by role where no channel has that name."""
+    """Return the rows of channels by name, or by role if no channel has that name."""
     found: list[int] = []
     for name in (wanted,) if isinstance(wanted, str) else wanted:
         rows = [row for row, channel in enumerate(channels) if channel.name == name]
@@ -100,7 +100,7 @@ def _rows(channels: tuple[Channel, ...], what: str, wanted: Sequence[str]) -> tu
 
 
 def _advanced(signal: np.ndarray, samples: float) -> np.ndarray:
-    """A signal ``samples`` later: whole samples by shifting, the rest by a windowed sinc; zero beyond its ends."""
+    """Advance a signal by ``samples``: whole samples by shifting, the rest by a windowed sinc; zero beyond its ends."""
     if samples == 0.0:
         return signal
     whole = int(np.round(samples))

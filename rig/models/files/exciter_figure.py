@@ -1,4 +1,4 @@
-"""Figure of an exciter model: force per volt when blocked, dynamic stiffness, with 95 % bands."""
+"""Figure of an exciter model: blocked force per volt and dynamic stiffness, with 95 % bands."""
 
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ _DECADES = 5.0
 
 
 def draw_exciter(page: "Figure", exciter: Exciter) -> None:
-    """Draw what the exciter does to a structure over the band it was identified in."""
+    """Draw blocked force per volt and dynamic stiffness over the band in which the exciter was identified."""
     low = exciter.lowest_hz if np.isfinite(exciter.lowest_hz) else 5.0
     high = exciter.highest_hz if np.isfinite(exciter.highest_hz) else 500.0
     frequency = np.geomspace(low, high, 400)
@@ -53,7 +53,7 @@ def draw_exciter(page: "Figure", exciter: Exciter) -> None:
 
 
 def _draws(exciter: Exciter) -> list[Exciter]:
-    """Exciters with parameters drawn from their covariance; none where it is not known."""
+    """Return exciters with parameters drawn from their covariance; an empty list if the covariance is unknown."""
     covariance = np.asarray(exciter.covariance)
     if not np.isfinite(covariance).all():
         return []

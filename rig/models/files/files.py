@@ -1,4 +1,4 @@
-"""Models, predictions and imported measurements in files: written whole, read back as what they were."""
+"""Save models, predictions and imported measurements in files, and load them again."""
 
 import warnings
 from collections.abc import Iterator
@@ -37,15 +37,16 @@ _ALL = (
     PREDICTIONS,
 )
 KINDS = {kind.name: kind for kind in _ALL}
-"""Every kind of file that is no recording, by its name in the file."""
+"""Every kind of file other than recordings, by its name in the file."""
 
 _MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
 
 
 def save(thing: Any, path: Path) -> None:
-    """Write a model, a prediction or an imported measurement, whole or not at all.
+    """Write a model, a prediction or an imported measurement. The file is written completely or not at all.
 
-    Linear modes alone are written as a modal analysis, a fit or a model alone as an identified PNLSS model.
+    Linear modes without responses are written as a modal analysis. A fit or a model without further results is written as an
+    identified PNLSS model.
     """
     if isinstance(thing, LinearModes):
         thing = ModalAnalysis(thing)
@@ -60,7 +61,7 @@ def save(thing: Any, path: Path) -> None:
 
 
 def load(path: Path) -> Any:
-    """What `save` wrote; `RecordingError` where the file holds a recording or is damaged."""
+    """Return the object that `save` wrote; raise `RecordingError` if the file is a recording or damaged."""
     name, arrays, attributes = read_arrays(path)
     if name not in KINDS:
         raise RecordingError(f"{path}: is a file of kind {name}; known are {', '.join(KINDS)}")
@@ -70,17 +71,17 @@ def load(path: Path) -> Any:
 
 @contextmanager
 def understood(path: Path, kind: str) -> Iterator[None]:
-    """Turn what missing arrays, wrong shapes and wrong types in a file lead to into one `RecordingError` that names it."""
+    """Convert errors due to missing arrays, wrong shapes or types in a file to one `RecordingError` that names the file."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", ComplexWarning)  # an imaginary part must not get lost
+            warnings.simplefilter("error", ComplexWarning)  # an imaginary part must not be dropped silently
             yield
     except (*_MISFITS, ComplexWarning) as error:
         raise RecordingError(f"{path}: does not hold what makes a {kind} ({error_text(error)})") from error
 
 
 def load_as(kind: FileKind, path: Path) -> Any:
-    """The same where one kind alone will do; `RecordingError` for any other."""
+    """Load a file that must be of one kind; raise `RecordingError` for any other kind."""
     found = kind_of(path)
     if found != kind.name:
         raise RecordingError(f"{path}: is a file of kind {found}, wanted is one of kind {kind.name}")

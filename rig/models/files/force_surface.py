@@ -1,4 +1,4 @@
-"""Files of force surfaces: the measured levels, from which the surface is fitted anew whenever it is asked for."""
+"""Files of force surfaces. They contain the measured levels; the surface is fitted again on each use."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ __all__ = ["FORCE_SURFACE", "MeasuredSurface"]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSurface:
-    """The levels of a response-controlled test, the surface through them, and what of the plan is not in them."""
+    """Levels of a response-controlled test, the surface through them, and notes on missing points of the plan."""
 
     responses: tuple[FrequencyResponse, ...]
     notes: tuple[str, ...] = ()
 
     @cached_property
     def surface(self) -> ForceSurface:
-        """Fitted to the levels; `IdentificationError` where they do not make one."""
+        """Surface fitted to the levels; raises `IdentificationError` if they do not define one."""
         return force_surface(self.responses)
 
 
@@ -70,7 +70,7 @@ def _summarise(measured: MeasuredSurface) -> dict[str, Any]:
 
 
 def _points_at(responses: Sequence[FrequencyResponse], amplitudes_m: np.ndarray) -> list[int]:
-    """Number of measured points of every level."""
+    """Return the number of measured points of every level."""
     nearest = [int(np.argmin(np.abs(amplitudes_m - response.level))) for response in responses]
     return [
         sum(response.frequency_hz.size for response, at in zip(responses, nearest, strict=True) if at == index)

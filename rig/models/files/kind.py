@@ -1,4 +1,4 @@
-"""What a file that is no recording may hold: one description per kind, and everything that is asked of it."""
+"""Description of a kind of file other than recordings: everything that the program needs to know about the kind."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -22,16 +22,17 @@ class FileKind:
     name: str
     """Name in the file."""
     holds: type
-    """Type of what is in it."""
+    """Type of the object in the file."""
     pack: Callable[[Any], tuple[Arrays, Attributes]]
-    """From the object to arrays and JSON-able attributes."""
+    """Converts the object to arrays and JSON-able attributes."""
     unpack: Callable[[Arrays, Attributes], Any]
-    """The inverse; `IdentificationError` where something is missing."""
+    """Converts arrays and attributes back to the object; raises `IdentificationError` if something is missing."""
     summarise: Callable[[Any], dict[str, Any]]
-    """What ``rig show --json`` prints, without the kind."""
+    """Returns the dictionary that ``rig show --json`` prints, without the kind."""
     say: Callable[[dict[str, Any]], None]
-    """Print a summary for a person."""
+    """Prints a summary for a person."""
     draw: str
-    """``module:function`` that draws the object on an empty page, ``(page, object)``; loaded when a figure is wanted."""
+    """``module:function`` that draws the object on an empty page, ``(page, object)``. It is imported only when a figure is
+    drawn."""
     figure_in: tuple[float, float] = (9.0, 6.4)
     """Width and height of the page, inches."""

@@ -1,4 +1,4 @@
-"""Files of linear modal analyses: the modes, and what they were found in."""
+"""Files of linear modal analyses: the modes, and the responses in which they were identified."""
 
 from typing import Any
 

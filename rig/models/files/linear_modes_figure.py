@@ -1,4 +1,4 @@
-"""Figure of a linear modal analysis: responses with their fit, stabilisation, mode shapes, MAC."""
+"""Figure of a linear modal analysis: responses with their fit, stabilisation diagram, mode shapes, MAC."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ _POOLED_LINES = 21
 
 
 def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
-    """Draw modes with the responses and the stabilisation diagram, where the file has them.
+    """Draw the modes, and the responses and the stabilisation diagram if the file has them.
 
     ``page`` is an empty figure, about 11 by 8 inches.
     """
@@ -36,7 +36,7 @@ def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
 
 
 def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatrix | None) -> None:
-    """Amplitude and phase of measured responses and of the model; standard error of the measured ones."""
+    """Draw amplitude and phase of the measured responses and of the model, and the standard errors of the measured ones."""
     size, phase = page.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
     if responses is None:
         say_why_empty(size, "no frequency responses in the file")
@@ -69,25 +69,25 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
 
 
 def _unit(output: str, source: str) -> str:
-    """Unit of a response, as it is printed."""
+    """Return the unit of a response as it is printed."""
     return f"({output.replace('^2', '2').replace('s2', 's²')})/{source}"
 
 
 def _smooth(errors: np.ndarray) -> np.ndarray:
-    """Root of the mean square over neighbouring lines: the scatter of a standard error says nothing."""
+    """Root mean square over neighbouring lines; the scatter of a standard error from line to line is meaningless."""
     window = np.ones(min(_POOLED_LINES, errors.size))
     power = np.convolve(errors**2, window, mode="same") / np.convolve(np.ones(errors.size), window, mode="same")
     return np.asarray(np.sqrt(power))
 
 
 def _broken(angle_deg: np.ndarray) -> np.ndarray:
-    """An angle without the strokes where it turns over from 180 to -180."""
+    """Replace an angle by NaN where it wraps from 180 to -180, so that no vertical line is drawn there."""
     jump = np.abs(np.diff(angle_deg, prepend=angle_deg[:1])) > 180.0
     return np.where(jump, np.nan, angle_deg)
 
 
 def _around(modes: LinearModes) -> np.ndarray:
-    """Frequencies that show every peak of the model."""
+    """Return frequencies dense enough to show every peak of the model."""
     width = modes.damping_ratio * modes.frequency_hz
     return np.asarray((modes.frequency_hz[:, None] + width[:, None] * np.linspace(-12.0, 12.0, 97)).ravel())
 
@@ -98,7 +98,7 @@ def _stabilisation(
     diagram: StabilisationDiagram | None,
     responses: FrequencyResponseMatrix | None,
 ) -> None:
-    """Poles over the model's order, with the sum of the responses behind them."""
+    """Draw the poles over the model order, with the sum of the responses behind them."""
     if diagram is None:
         say_why_empty(axis, "no stabilisation diagram: modes were given")
         return
@@ -125,7 +125,7 @@ def _stabilisation(
 
 
 def _shapes(axis: "Axes", modes: LinearModes) -> None:
-    """Mass-normalised deflection of every mode, a group of bars for each channel, with 95 % intervals."""
+    """Draw the mass-normalised shape of every mode, one group of bars per channel, with 95 % intervals."""
     count = modes.frequency_hz.size
     width = 0.8 / count
     at = np.arange(len(modes.channels))
@@ -142,7 +142,7 @@ def _shapes(axis: "Axes", modes: LinearModes) -> None:
 
 
 def _mac(axis: "Axes", modes: LinearModes) -> None:
-    """MAC of every mode with every other."""
+    """Draw the MAC of every mode with every other mode."""
     unit = modes.shapes / np.linalg.norm(modes.shapes, axis=0)
     mac = (unit.T @ unit) ** 2
     axis.imshow(mac, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
@@ -160,7 +160,7 @@ def _mac(axis: "Axes", modes: LinearModes) -> None:
 
 
 def _legend_above(axis: "Axes", columns: int) -> None:
-    """Legend over the panel, where it hides nothing."""
+    """Put the legend above the panel, where it hides nothing."""
     axis.legend(
         fontsize=7,
         loc="lower center",

@@ -1,4 +1,4 @@
-"""Files of backbones that were measured elsewhere."""
+"""Files of backbones that were measured with other systems."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ def _say(summary: dict[str, Any]) -> None:
 
 
 def draw_backbone(page: "Figure", backbone: Backbone) -> None:
-    """Amplitude and force over the frequency."""
+    """Draw amplitude and force over the frequency."""
     size, force = page.subplots(1, 2)
     size.plot(backbone.frequency_hz, 1e3 * backbone.amplitude_m, "o-", color=MAIN, ms=4)
     size.set(xlabel="frequency, Hz", ylabel="drive point, mm")

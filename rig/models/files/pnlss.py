@@ -1,4 +1,4 @@
-"""Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one of them."""
+"""Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one experiment."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -17,24 +17,24 @@ __all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiedPnlss:
-    """A model, and how it was come by.
+    """A nonlinear state-space model and its origin.
 
     Parameters
     ----------
     model
         The model.
     fit
-        What it is the best iterate of; None for a model from elsewhere.
+        The fit of which the model is the best iterate; None for a model from another source.
     runs, linear_runs
-        Every experiment as the model simulates it, and as the linear start does; the latter may be empty.
+        Every experiment as simulated by the model, and by the linear start; the latter may be empty.
     spectra
-        Of one periodic experiment, validation data where there are any; None where there is none.
+        Spectra of one periodic experiment, of validation data if there is any; None if there is no periodic experiment.
     seconds
         Wall time of the identification; NaN if unknown.
     notes
-        What a user should know about the data, one line each.
+        Remarks on the data for the user, one line each.
     data
-        Fingerprint of the data of the fit, by which it is known again; empty if unknown.
+        Fingerprint that identifies the data of the fit; empty if unknown.
     uses
         ``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown.
     """
@@ -91,7 +91,7 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
 
 
 def poles_of(model: PnlssModel) -> list[dict[str, float]]:
-    """Natural frequencies (Hz) and damping ratios of the linear part, each pair of poles once, lowest first."""
+    """Natural frequencies (Hz) and damping ratios of the linear part, lowest first, one per pair of poles."""
     values = np.linalg.eigvals(model.a).astype(complex)
     s = np.log(values[(np.abs(values) > 0.0) & (values.imag >= 0.0)]) * model.sample_rate_hz
     rows = [{"frequency_hz": float(abs(p) / (2.0 * np.pi)), "damping_ratio": float(-p.real / abs(p))} for p in s]
@@ -99,7 +99,7 @@ def poles_of(model: PnlssModel) -> list[dict[str, float]]:
 
 
 def _features(features: Features) -> dict[str, Any]:
-    """How many of which kind."""
+    """Count the features of each kind."""
     degrees = Counter(int(degree) for degree in features.exponents.sum(axis=1))
     return {
         "monomials": {str(degree): degrees[degree] for degree in sorted(degrees)},
@@ -142,7 +142,7 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
 
 
 def _said(features: dict[str, Any]) -> str:
-    """Features in words."""
+    """Describe features in words."""
     parts = [f"{count} of degree {degree}" for degree, count in features["monomials"].items()]
     parts += [f"{features['saturating']} saturating"] if features["saturating"] else []
     return (", ".join(parts) or "none") + (", bounded" if features["bounded"] else "")
@@ -183,7 +183,7 @@ def _say(summary: dict[str, Any]) -> None:
 
 
 def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str:
-    """One error, and the linear start's in brackets."""
+    """Return one error of the model, with the error of the linear start in brackets."""
     own = "unbounded" if run["unbounded"] else number(run["errors"][name], ".3f", 100.0)
     return own if before is None else f"{own} ({number(before['errors'][name], '.2f', 100.0)})"
 

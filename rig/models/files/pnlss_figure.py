@@ -1,4 +1,4 @@
-"""Figure of a nonlinear state-space model: spectra of outputs and errors, course of the fit, errors and range by experiment."""
+"""Figure of a nonlinear state-space model: spectra of outputs and errors, history of the fit, errors over range."""
 
 from typing import TYPE_CHECKING, Any, cast
 
@@ -21,9 +21,9 @@ _FLOOR = 1e-6  # of the largest amplitude: what lies below is not shown
 
 
 def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
-    """Spectra on the left, one panel an output; on the right the fit's history, and the range that each run uses.
+    """Draw spectra on the left, one panel per output; on the right the fit's history and the range used by each run.
 
-    The history alone where a file holds nothing else, as those of a study.
+    If the file has neither spectra nor runs, as in a study, only the history is drawn.
     """
     model = found.model
     if found.spectra is None and not found.runs:
@@ -43,12 +43,12 @@ def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
 
 
 def _unit(channel: "Channel") -> str:
-    """Unit of a channel; none where it is unknown."""
+    """Return the unit of a channel; an empty string if it is unknown."""
     return "N" if channel.role == "force" else MOTION_UNIT.get(channel.motion, "") if channel.motion else ""
 
 
 def _spectra(area: Any, spectra: "ErrorSpectra | None", units: dict[str, str]) -> None:
-    """Amplitudes of what was measured, of the linear start's error and of the model's."""
+    """Draw the amplitudes of the measured outputs, of the linear start's error and of the model's error."""
     if spectra is None:
         say_why_empty(area.subplots(), "no periodic experiment, and so no spectra")
         return
@@ -75,12 +75,12 @@ def _spectra(area: Any, spectra: "ErrorSpectra | None", units: dict[str, str]) -
 
 
 def _positive(values: np.ndarray) -> np.ndarray:
-    """Zeros, which a logarithm has not, left out."""
+    """Replace values that a logarithmic axis cannot show by NaN."""
     return np.where(values > 0.0, values, np.nan)
 
 
 def _history(axis: "Axes", fit: "PnlssFit | None") -> None:
-    """Training and validation error over the iterations, and the chosen one."""
+    """Draw training and validation error over the iterations, and mark the chosen iteration."""
     from matplotlib.ticker import MaxNLocator
 
     if fit is None:
@@ -102,7 +102,7 @@ def _history(axis: "Axes", fit: "PnlssFit | None") -> None:
 
 
 def _runs(axis: "Axes", found: "IdentifiedPnlss") -> None:
-    """Largest error of any output over the range used, one mark an experiment."""
+    """Draw the largest error of any output over the range used, one mark per experiment."""
     bounded = [run for run in found.runs if run.bounded]
     if not bounded:
         say_why_empty(axis, "no bounded run" if found.runs else "no experiments")

@@ -1,4 +1,4 @@
-"""Figure of simulated multisines: errors of every output over the range that a run uses."""
+"""Figure of simulated multisines: error of every output over the range that a run uses."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ _MARKS = "os^Dv"
 
 
 def draw_runs(area: Any, predictions: Predictions) -> None:
-    """One mark per realisation and output; unbounded runs are counted, for they have no error."""
+    """Draw one mark per realisation and output. Unbounded runs have no error; they are only counted."""
     from matplotlib import colormaps
 
     axis = area.subplots()

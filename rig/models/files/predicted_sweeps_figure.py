@@ -1,4 +1,4 @@
-"""Figure of predicted sweeps: motion and force over the momentary frequency, as a recording shows them."""
+"""Figure of predicted sweeps: motion and force over the instantaneous frequency, with the recording if there is one."""
 
 from typing import Any
 
@@ -11,11 +11,11 @@ from rig.figures.style import MAIN, REJECTED, SECOND, engineering
 __all__ = ["draw_sweeps"]
 
 _MOST_SWEEPS = 4
-_MOST_SHOWN = 2.0  # times the recording, of what a run reaches that is lost
+_MOST_SHOWN = 2.0  # times the largest recorded value: an unbounded run is not shown beyond
 
 
 def draw_sweeps(area: Any, predictions: Predictions) -> None:
-    """One row per sweep, motion and force; of many the first four."""
+    """Draw one row per sweep with motion and force; at most four sweeps are drawn."""
     count = len(predictions.sweeps)
     shown = min(count, _MOST_SWEEPS)
     axes = area.subplots(shown, 2, squeeze=False)
@@ -29,7 +29,7 @@ def draw_sweeps(area: Any, predictions: Predictions) -> None:
 
 
 def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
-    """Amplitudes over the momentary frequency; smoothed like the recording, if there is one."""
+    """Draw amplitudes over the instantaneous frequency, smoothed like the recording if there is one."""
     sweep, recorded = predictions.sweeps[index], predictions.sweep_references[index]
     amplitude, force = np.abs(sweep.drive_m), np.abs(sweep.force)
     top = float(amplitude.max())
@@ -65,7 +65,7 @@ def _origin(origin: str) -> str:
 
 
 def _heading(predictions: Predictions, index: int) -> str:
-    """Name of the sweep, its error or how much of the identified range it uses."""
+    """Return the name of a sweep with its error, or with the part of the identified range that it uses."""
     sweep, error = predictions.sweeps[index], predictions.sweep_errors[index]
     name = sweep.origin.removeprefix("planned ") if error is None else error.name
     if sweep.unbounded_at_s is not None:

@@ -11,7 +11,7 @@ from rig.text.console import number, print_table
 __all__ = ["CUT", "PREDICTIONS"]
 
 CUT = "the response from "
-"""So begins the note of a response that was cut off, that of the first path before that of the other."""
+"""Beginning of the note on a response that was cut off. The note on the first path precedes that on the second."""
 
 
 def _steady(

@@ -1,4 +1,4 @@
-"""Figures of predictions beside what they are compared with: frequency responses and sweeps."""
+"""Figures of predictions with their references: frequency responses and sweeps."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ _MARGIN = 0.15
 
 
 def draw_predictions(page: "Figure", predictions: Predictions) -> None:
-    """Frequency responses on the left, sweeps on the right, whatever there is."""
+    """Draw the predictions that exist, from left to right: frequency responses, sweeps, multisines."""
     panels = {"steady": _steady_on, "sweeps": draw_sweeps, "runs": draw_runs}
     kinds = [kind for kind in panels if getattr(predictions, kind)]
     areas = np.atleast_1d(
@@ -41,7 +41,7 @@ def draw_predictions(page: "Figure", predictions: Predictions) -> None:
 
 
 def _steady_on(area: Any, predictions: Predictions) -> None:
-    """Amplitude and phase over frequency, the names of the curves above both."""
+    """Draw amplitude and phase over frequency, with the names of the curves above both."""
     size, phase = area.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
     top = max(response.amplitude_m().max() for response in predictions.steady)
     unit = engineering(np.array([top]))[1]
@@ -69,7 +69,7 @@ def _steady_on(area: Any, predictions: Predictions) -> None:
 
 
 def _name(predictions: Predictions, index: int) -> str | None:
-    """Name of a curve with its error; of many the first and the last alone, the shades lie between."""
+    """Return the name of a curve with its error. Of many curves only the first and the last are named."""
     count = len(predictions.steady)
     if count > _MOST_NAMED and 0 < index < count - 1:
         return None
@@ -81,7 +81,7 @@ def _name(predictions: Predictions, index: int) -> str | None:
 
 
 def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, colour: Any) -> None:
-    """The 95 % band as an area: between both ends of amplitude, and between both ends of frequency."""
+    """Draw the 95 % band as an area: between the limits of amplitude, and between the limits of frequency."""
     middle_hz = band.frequency_hz.mean(axis=0)
     size.fill(
         np.concatenate([middle_hz, middle_hz[::-1]]),
@@ -94,16 +94,16 @@ def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, 
 
 
 def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> None:
-    """The drive point's amplitude that the model was identified up to, where the curves come near it."""
+    """Draw the drive point's largest identified amplitude if the curves come near it."""
     highest = max(predictions.steady, key=lambda response: float(response.range_use.max()))
     where = int(np.argmax(highest.range_use))
     limit = scale * float(highest.amplitude_m()[where] / highest.range_use[where])
-    if limit < _NEAR * top and np.isfinite(highest.modal_amplitude).all():  # states are no amplitude of the drive point
+    if limit < _NEAR * top and np.isfinite(highest.modal_amplitude).all():  # models with states have no modal amplitude
         size.axhline(limit, color=REJECTED, lw=0.8, ls="--", label="identified up to")
 
 
 def _show_references(size: "Axes", predictions: Predictions) -> None:
-    """Where every response has a reference, what is shown is their range and a little more."""
+    """If every response has a reference, limit the frequency axis to the range of the references and a small margin."""
     found = [reference.frequency_hz for reference in predictions.steady_references if reference is not None]
     if len(found) == len(predictions.steady):
         every = np.concatenate(found)
@@ -112,7 +112,7 @@ def _show_references(size: "Axes", predictions: Predictions) -> None:
 
 
 def _explain(size: "Axes", predictions: Predictions) -> None:
-    """What lines and marks mean."""
+    """Add legend entries that explain lines and marks."""
     size.plot([], [], color=REJECTED, label="predicted, stable")
     if not all(response.stable.all() for response in predictions.steady):
         size.plot([], [], ":", color=REJECTED, label="predicted, unstable")
@@ -125,7 +125,7 @@ def _explain(size: "Axes", predictions: Predictions) -> None:
 
 
 def _branches(axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: Any, label: str | None) -> None:
-    """Every branch on its own; unstable parts dotted, parts beyond the identified range shaded."""
+    """Draw every branch separately; unstable parts are dotted, parts beyond the identified range are shaded."""
     for branch in np.unique(response.branch):
         on = response.branch == branch
         for which, line in ((response.stable[on], "-"), (~response.stable[on], ":")):
@@ -139,7 +139,7 @@ def _branches(axis: "Axes", response: SteadyPrediction, values: np.ndarray, colo
 
 
 def _with_neighbours(which: np.ndarray) -> np.ndarray:
-    """True where it or the point after it is: lines meet where stability changes."""
+    """True where a point or the one after it is selected, so that lines meet where stability changes."""
     return np.asarray(which | np.concatenate([which[1:], [False]]))
 
 

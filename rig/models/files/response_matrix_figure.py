@@ -17,7 +17,7 @@ _LINES = ("-", "--", ":", "-.")
 
 
 def draw_response_matrix(page: "Figure", matrix: FrequencyResponseMatrix) -> None:
-    """One colour for each output, one kind of line for each input; thin lines are standard errors."""
+    """Draw one colour per output and one line style per input; thin lines are standard errors."""
     size, phase = page.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
     errors = matrix.noise_std if matrix.total_covariance is None else matrix.total_std
     for row, output in enumerate(matrix.outputs):

@@ -1,1 +1,1 @@
-"""From recordings to models."""
+"""Identify models from recordings."""

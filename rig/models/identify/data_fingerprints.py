@@ -1,4 +1,4 @@
-"""Texts by which training data is known again, whatever its files are called."""
+"""Fingerprints that identify training data, independent of file names."""
 
 import hashlib
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ __all__ = ["features_of", "fingerprint", "uses_of"]
 
 
 def features_of(experiment: Experiment) -> str:
-    """What makes an experiment, to six digits, but for its weight: names and files may change."""
+    """Describe the data of an experiment to six digits, without its weight, names and files."""
     signals = np.vstack([experiment.inputs, experiment.outputs])
     sizes = [np.sqrt(np.mean(values**2)) for rows in (signals, np.diff(signals)) for values in rows]
     shape = f"{signals.shape} {experiment.counted_from} {experiment.period_samples} {experiment.initial_state}"
@@ -19,10 +19,10 @@ def features_of(experiment: Experiment) -> str:
 
 
 def fingerprint(experiment: Experiment) -> str:
-    """A short text that is the same for the same data alone."""
+    """Return a short text that identifies the data of an experiment."""
     return hashlib.sha256(features_of(experiment).encode()).hexdigest()[:16]
 
 
 def uses_of(training: Sequence[Experiment], validation: Sequence[Experiment]) -> dict[str, str]:
-    """What experiments are to a model, by their fingerprints: ``training`` or ``validation``."""
+    """Return the use of experiments in a model, ``training`` or ``validation``, by their fingerprints."""
     return {fingerprint(one): "validation" for one in validation} | {fingerprint(one): "training" for one in training}

@@ -1,4 +1,4 @@
-"""From recordings to models."""
+"""Identify models from recordings."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -54,10 +54,10 @@ __all__ = ["Request", "identify_model", "modes_in"]
 def identify_model(
     paths: Sequence[Path], request: Request, *, progress: Callable[[FitProgress], None] | None = None
 ) -> Any:
-    """The model in recordings or imported measurements; ``progress`` is called after every iteration of a PNLSS model's fit.
+    """Identify a model in recordings or imported measurements.
 
-    Raises `RecordingError` for files that hold something else, `identification.IdentificationError` where the data does not
-    allow it.
+    ``progress`` is called after every iteration when a PNLSS model is fitted. Raises `RecordingError` for files with other
+    contents, `identification.IdentificationError` if the data does not allow the identification.
     """
     for index, path in enumerate(paths):
         if any(path.exists() and other.exists() and path.samefile(other) for other in paths[:index]):
@@ -68,12 +68,12 @@ def identify_model(
 
 
 def modes_in(path: Path) -> LinearModes:
-    """The linear modes in a file of a modal analysis."""
+    """Load the linear modes from the file of a modal analysis."""
     return cast(ModalAnalysis, load_as(LINEAR_MODES, path)).modes
 
 
 def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
-    """From one or several backbones, or from stepped sines: imported, or response-controlled."""
+    """Identify a nonlinear mode from one or several backbones, or from stepped sines (imported or response-controlled)."""
     kinds = {kind_of(path): path for path in paths}
     modes = None if request.modes is None else modes_in(request.modes)
     if set(kinds) <= {FREQUENCY_RESPONSES.name, *STEPPED}:
@@ -94,7 +94,10 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
 
 
 def _stepped_mode(paths: Sequence[Path]) -> NonlinearMode:
-    """From levels of a held response; at others stepped sines give responses, through which a mode's amplitude passes."""
+    """Identify a nonlinear mode from levels of a held response; refuse stepped sines at force or voltage levels.
+
+    At such levels the amplitude of the mode varies along each response.
+    """
     stepped, missing = _stepped(paths)
     if all(item.controlled != "response" for item in stepped):
         raise ConfigurationError(
@@ -111,7 +114,7 @@ def _stepped_mode(paths: Sequence[Path]) -> NonlinearMode:
 
 
 def _stepped(paths: Sequence[Path]) -> tuple[list[FrequencyResponse], tuple[str, ...]]:
-    """Stepped sines, recorded or imported, and what of the recordings' plans is not in them."""
+    """Return stepped sines, recorded or imported, and notes on planned points that are missing."""
     measured: list[FrequencyResponse] = []
     notes: tuple[str, ...] = ()
     for path in paths:
@@ -130,16 +133,16 @@ def _stepped(paths: Sequence[Path]) -> tuple[list[FrequencyResponse], tuple[str,
 
 
 def _force_surface(paths: Sequence[Path], request: Request) -> MeasuredSurface:
-    """From levels of held displacement, those of all files together."""
+    """Build a force surface from levels of held displacement, taking all files together."""
     measured, missing = _stepped(paths)
     one_specimen(**{response.label: response.specimen for response in measured})
     found = MeasuredSurface(tuple(measured), missing)
-    found.surface  # noqa: B018  refused here, not when the file is read
+    found.surface  # noqa: B018 refused here, not when the file is read
     return found
 
 
 def _backbones(path: Path) -> tuple[Sequence[Backbone | ContinuousBackbone], tuple[str, ...]]:
-    """What was measured, every repeat of a continuous backbone by itself, and what of its plan is not in it."""
+    """Backbones in a recording, one for each repeat of a continuous backbone, and a note on planned points that are missing."""
     kind = kind_of(path)
     if kind in KINDS and isinstance(measured := load(path), Backbone):
         return (measured,), ()
@@ -154,7 +157,7 @@ def _backbones(path: Path) -> tuple[Sequence[Backbone | ContinuousBackbone], tup
 
 
 def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
-    """From multisines or frequency responses; levels are extrapolated to zero force."""
+    """Identify linear modes from multisines or frequency responses. Several levels are extrapolated to zero force."""
     estimator = cast(Estimator, request.estimator)
     read = [_matrices(path, estimator) for path in paths]
     pairs = [pair for found, _ in read for pair in found]
@@ -178,9 +181,9 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
 def _matrices(
     path: Path, estimator: Estimator
 ) -> tuple[list[tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]], tuple[str, ...]]:
-    """Responses by level: as they are shown, and as they are fitted; and what of the plan is not in them.
+    """Return the responses of each level, as they are shown and as they are fitted, and notes on missing planned points.
 
-    With the voltage as instrument the fit is to force and motions over the voltage.
+    With the voltage as instrument, the fit uses force and motions over the voltage.
     """
     kind = kind_of(path)
     if kind in kinds_that_yield(PeriodicSpectra):
@@ -202,7 +205,7 @@ def _over_voltage(measured: PeriodicSpectra, specimen: str) -> FrequencyResponse
 
 
 def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
-    """From one multisine: its highest level."""
+    """Identify an exciter from the highest level of one multisine recording."""
     if len(paths) != 1:
         raise ConfigurationError(f"`kind` exciter: {len(paths)} files given, allowed is one multisine recording")
     kind = kind_of(paths[0])

@@ -1,4 +1,4 @@
-"""From recordings to nonlinear state-space models: data, what is held out, the fit, and its errors."""
+"""Identify nonlinear state-space models from recordings: data, validation data, fit and errors."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -29,10 +29,10 @@ Progress = Callable[[FitProgress], None]
 
 
 def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Progress | None = None) -> IdentifiedPnlss:
-    """The model in recordings, all taken together; after Ctrl-C what was reached, which `PnlssOptions.resume` goes on with.
+    """Identify one model from all recordings together.
 
-    Raises `RecordingError` for files that hold something else, `identification.IdentificationError` where the data does not
-    allow it.
+    After Ctrl-C, return the state reached; `PnlssOptions.resume` continues from it. Raises `RecordingError` for files with
+    other contents, `identification.IdentificationError` if the data does not allow the identification.
     """
     begun = time.perf_counter()
     earlier = None if options.resume is None else _earlier(options.resume)
@@ -65,7 +65,7 @@ def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Pro
 
 
 def _earlier(path: Path) -> IdentifiedPnlss:
-    """The fit that is to go on."""
+    """Load the fit to be continued."""
     if not path.exists():
         raise RecordingError(f"{path}: there is nothing to resume; leave `resume` out")
     found: IdentifiedPnlss = load_as(PNLSS, path)
@@ -75,7 +75,7 @@ def _earlier(path: Path) -> IdentifiedPnlss:
 
 
 def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssData) -> None:
-    """Refuse to go on with other data: what chose the iterate might become what it is fitted to."""
+    """Refuse to continue with other data: validation data, which chose the iterate, might become training data."""
     if earlier.data and earlier.data != data.fingerprint:
         uses = [run.use for run in earlier.runs]
         raise ConfigurationError(
@@ -89,7 +89,7 @@ def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssD
 
 
 def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPnlss:
-    """The fit, its errors on all data, and spectra of the last periodic experiment, of validation where there is one."""
+    """Add to a fit its errors on all data, and the spectra of the last periodic experiment, preferably of validation data."""
     every = [(one, "training") for one in data.training] + [(one, "validation") for one in data.validation]
     begins = iter(fit.initial_states)
     states = [next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every]

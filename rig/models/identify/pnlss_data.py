@@ -1,4 +1,4 @@
-"""Training data of nonlinear state-space models: experiments of all files at one rate, and what is held out."""
+"""Training and validation data of nonlinear state-space models: experiments of all files at one sample rate."""
 
 import hashlib
 from collections.abc import Sequence
@@ -24,25 +24,25 @@ from rig.recording.reader import Recording
 __all__ = ["PnlssData", "pnlss_data"]
 
 _EVERY = 4
-"""One of so many settled points chooses the iterate."""
+"""Every how many settled points one is used as validation data."""
 _FEWEST_POINTS = 5
-"""Settled points of a recording from which on one of them does."""
+"""Fewest settled points of a recording from which validation points are taken."""
 
 
 @dataclass(frozen=True, eq=False)
 class PnlssData:
-    """What a fit is given."""
+    """Data of a fit."""
 
     training: tuple[Experiment, ...]
-    """Experiments that it is fitted to."""
+    """Experiments to which the model is fitted."""
     validation: tuple[Experiment, ...]
-    """Experiments that choose the iterate."""
+    """Experiments by which the iterate is chosen."""
     notes: tuple[str, ...]
-    """What a user should know of them, one line each."""
+    """Remarks on the data for the user, one line each."""
 
     @property
     def fingerprint(self) -> str:
-        """A text that is the same for the same data in the same use, weighted alike, alone."""
+        """Fingerprint of the data, including use and weight of each experiment."""
         digest = hashlib.sha256()
         for use, several in (("training", self.training), ("validation", self.validation)):
             for one in several:
@@ -51,10 +51,11 @@ class PnlssData:
 
 
 def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: IdentifiedPnlss | None) -> PnlssData:
-    """Experiments of all files at one rate, and those that choose the iterate; rate and channels are those of ``earlier``.
+    """Return the experiments of all files at one sample rate, split into training and validation data.
 
-    Raises `RecordingError` for files that hold something else, `ConfigurationError` for files and options that do not go
-    together, `identification.IdentificationError` where the data does not allow it.
+    If there is an ``earlier`` model, its sample rate and channels are used. Raises `RecordingError` for files with other
+    contents, `ConfigurationError` for files and options that do not fit together, `identification.IdentificationError` if the
+    data does not allow the identification.
     """
     _check_files(paths, options.validation, needs_lines=earlier is None)
     channels = options.channels
@@ -101,7 +102,7 @@ def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: Identified
 
 
 def _check_alive(experiments: Sequence[Experiment]) -> None:
-    """Refuse an output that stands still in any experiment: no error can be relative to it."""
+    """Refuse an output that is zero throughout an experiment, because relative errors of it are undefined."""
     for one in experiments:
         for channel, values in zip(one.output_channels, one.counted_outputs, strict=True):
             if not np.any(values):
@@ -111,7 +112,7 @@ def _check_alive(experiments: Sequence[Experiment]) -> None:
 
 
 def _check_files(paths: Sequence[Path], validation: Sequence[Path], *, needs_lines: bool) -> None:
-    """Refuse files of other kinds, of other specimens, and those that would choose the iterate on what it is fitted to."""
+    """Refuse files of other kinds, of other specimens, and validation files that are also used for training."""
     kinds = {path: kind_of(path) for path in (*paths, *validation)}
     for path, kind in kinds.items():
         if kind not in KINDS:
@@ -145,7 +146,7 @@ def _benches(paths: Sequence[Path]) -> str:
 
 
 def _common_rate_hz(paths: Sequence[Path]) -> float:
-    """The highest of what the recordings ask for, and no more than the slowest of them was recorded at."""
+    """Return the highest rate that any recording needs, limited to the lowest rate at which any was recorded."""
     rates, most = [], float("inf")
     for path in paths:
         with Recording(path) as recording:
@@ -155,14 +156,15 @@ def _common_rate_hz(paths: Sequence[Path]) -> float:
 
 
 def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment], list[Experiment]]:
-    """What chooses the iterate apart from the others: the last realisations of each level, and every fourth settled point.
+    """Separate validation data: the last realisations of each level, and every fourth settled point.
 
-    One realisation stays. Without settled points an iterate would be taken that is good at the multisine's levels alone.
+    At least one realisation of each level stays in training. Without settled points in validation, the chosen iterate would be
+    good only at the multisine's levels.
     """
     out = [one for same in _alike(found) for one in same[max(1, len(same) - count) :] if count]
     settled = [
         one for one in found if not one.period_samples and one.initial_state == "estimated"
-    ]  # no sweep from rest
+    ]  # without sweeps from rest
     if count and len(settled) >= _FEWEST_POINTS:
         out += settled[_EVERY // 2 : -1 : _EVERY]
     chosen = {id(one) for one in out}
@@ -170,7 +172,7 @@ def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment]
 
 
 def _alike(found: Sequence[Experiment]) -> list[list[Experiment]]:
-    """Realisations, by level and period."""
+    """Group realisations by level and period."""
     alike: dict[tuple[float, int], list[Experiment]] = {}
     for one in found:
         if one.period_samples:
@@ -179,7 +181,7 @@ def _alike(found: Sequence[Experiment]) -> list[list[Experiment]]:
 
 
 def _relative(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
-    """Weighted so that errors of all count relative to their own outputs, whatever the level: by the mean square ratio."""
+    """Weight experiments by the mean square of their outputs, so that errors count relative to them at every level."""
     power = np.array([np.mean(one.counted_outputs**2, axis=1) for one in experiments])
     pooled = np.mean(power, axis=0)
     pooled = np.where(pooled > 0.0, pooled, 1.0)

@@ -1,4 +1,4 @@
-"""What a nonlinear state-space model is to be identified from, and how."""
+"""Options for the identification of a nonlinear state-space model."""
 
 import math
 from dataclasses import dataclass, fields
@@ -14,36 +14,38 @@ _INPUTS = ("force", "voltage")
 
 @dataclass(frozen=True, kw_only=True)
 class PnlssOptions:
-    """Options of ``rig identify --model pnlss``; None for what is usual.
+    """Options of ``rig identify --model pnlss``. None selects the default.
 
-    Raises `ConfigurationError` on values that are not allowed.
+    Raises `ConfigurationError` for values that are not allowed.
     """
 
     states: int | None = None
     """Number of states, two per mode of vibration; 2 if None."""
     degrees: str | None = None
-    """Degrees of the monomials, with commas, none if empty; if None ``2,3``, and none beside saturating features."""
+    """Degrees of the monomials, separated by commas; empty: none. Default: ``2,3``, or none if there are saturating features.
+    """
     rate_hz: float | None = None
     """Sample rate of the model."""
     input: str | None = None
     """``force`` or ``voltage``."""
     outputs: str | None = None
-    """Names of the outputs, with commas; all motions if None, and the force where the voltage is the input."""
+    """Names of the outputs, separated by commas. Default: all motions, and the force if the voltage is the input."""
     output_polynomials: bool | None = None
-    """Whether monomials act on the outputs too; yes if None."""
+    """Whether monomials also act on the outputs; yes if None."""
     saturating: int | None = None
-    """Number of saturating features, in the place of the monomials unless degrees are given; none if None."""
+    """Number of saturating features. They replace the monomials unless degrees are given; none if None."""
     iterations: int | None = None
-    """Most iterations of the fit; 100 if None."""
+    """Largest number of iterations of the fit; 100 if None."""
     validation: tuple[Path, ...] = ()
-    """Recordings on which the iterate is chosen."""
+    """Recordings by which the iterate is chosen."""
     hold_out: int | None = None
-    """Realisations of each level, the last ones, on which it is chosen instead, and from five settled points of a recording
-    on every fourth of these; 1 if None, nothing with 0."""
+    """Number of last realisations of each level by which the iterate is chosen instead. If a recording has at least five
+    settled points, every fourth of them is used as well. 1 if None; with 0 nothing is held out."""
     relative: bool | None = None
-    """Whether errors of all experiments count relative to their own outputs; else as they are, which large levels rule."""
+    """Whether the errors of each experiment count relative to its outputs. Otherwise absolute errors count, and large levels
+    dominate."""
     resume: Path | None = None
-    """A file of an earlier fit of the same data, that goes on."""
+    """File of an earlier fit to the same data, which is continued."""
 
     def __post_init__(self) -> None:
         for name, value, least in (
@@ -58,7 +60,7 @@ class PnlssOptions:
             raise ConfigurationError(f"`rate_hz` = {self.rate_hz:g}: allowed is any number above 0, Hz")
         if self.input not in (None, *_INPUTS):
             raise ConfigurationError(f"`input` = {self.input!r}: allowed are {', '.join(_INPUTS)}")
-        self.chosen_degrees  # noqa: B018  refused here, not when it is asked for
+        self.chosen_degrees  # noqa: B018 refused here, not when it is asked for
         if self.validation and self.hold_out:
             raise ConfigurationError("`hold_out`: is instead of `validation`; leave one of the two out")
         if self.resume is not None:
@@ -69,7 +71,7 @@ class PnlssOptions:
 
     @property
     def chosen_degrees(self) -> tuple[int, ...]:
-        """The degrees as numbers; none for an empty text, or where saturating features take their place."""
+        """Degrees as numbers; empty for an empty text, or if saturating features replace the monomials."""
         try:
             found = tuple(sorted({int(part) for part in (self.degrees or "").split(",") if part.strip()}))
         except ValueError:
@@ -85,7 +87,7 @@ class PnlssOptions:
 
     @property
     def saturating_features(self) -> int | tuple[int, int]:
-        """Their number as `identification.identify_pnlss` takes it: linear outputs have none of these either."""
+        """Number of saturating features as `identification.identify_pnlss` takes it. Linear outputs have none of them."""
         return (self.saturating or 0, 0) if self.output_polynomials is False else self.saturating or 0
 
     @property
@@ -95,5 +97,5 @@ class PnlssOptions:
         return {"inputs": (self.input or "force",), "outputs": outputs}
 
     def given(self) -> dict[str, bool]:
-        """Which fields were given."""
+        """Return which options were given."""
         return {field.name: getattr(self, field.name) not in (None, ()) for field in fields(self)}

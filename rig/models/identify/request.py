@@ -1,4 +1,4 @@
-"""What is to be identified, and how; options that mean nothing together are refused."""
+"""Request for an identification. Options that do not fit together are refused."""
 
 import math
 from dataclasses import dataclass, field
@@ -22,26 +22,26 @@ _OPTIONS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What is to be identified, and how."""
+    """What to identify, and how."""
 
     kind: str = "nonlinear-mode"
     """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter`` or ``pnlss``."""
     modes: Path | None = None
-    """Linear model whose mode shapes a nonlinear mode uses."""
+    """Linear model whose mode shapes are used for a nonlinear mode."""
     estimator: str = "instrument"
-    """Of the responses of a linear model: ``instrument``, ``H1`` or ``H2``."""
+    """Estimator of the responses for a linear model: ``instrument``, ``H1`` or ``H2``."""
     band_hz: tuple[float, float] | None = None
-    """Lines that a linear or exciter model is fitted to."""
+    """Band of the lines to which a linear or exciter model is fitted, Hz."""
     resistance_ohm: float | None = None
-    """Of an exciter's coil, cable and amplifier together, where a meter has told it."""
+    """Resistance of an exciter's coil, cable and amplifier together, if it was measured with a meter, ohm."""
     amplifier_gain: float | None = None
-    """Of its voltage amplifier (V/V), for the resistance; 1 if None."""
+    """Gain of the exciter's voltage amplifier (V/V), needed with the resistance; 1 if None."""
     stinger_stiffness_n_m: float | None = None
-    """Of its stinger, where it is known."""
+    """Stiffness of the exciter's stinger, if known, N/m."""
     count: int | None = None
-    """Number of modes of a linear model; found if None."""
+    """Number of modes of a linear model; determined automatically if None."""
     pnlss: PnlssOptions = field(default_factory=PnlssOptions)
-    """Of a nonlinear state-space model."""
+    """Options for a nonlinear state-space model."""
 
     def __post_init__(self) -> None:
         if self.kind not in _OPTIONS:

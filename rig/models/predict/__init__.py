@@ -1,1 +1,1 @@
-"""From models to predictions, beside the recordings they are compared with."""
+"""Predictions by models, compared with recordings."""

@@ -1,4 +1,4 @@
-"""Predictions of nonlinear state-space models: steady vibrations, recorded sweeps, recorded multisines."""
+"""Predictions by nonlinear state-space models: steady vibrations, recorded sweeps, recorded multisines."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,10 +36,10 @@ __all__ = ["pnlss_predictions"]
 
 
 def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequence[Reference]) -> Predictions:
-    """What is asked for, with errors where there is something to compare with; unbounded runs are results like others.
+    """Return the requested predictions, with errors where there is a reference. Unbounded runs are also results.
 
-    Raises `ConfigurationError` for what a nonlinear state-space model does not answer, `identification.IdentificationError`
-    where it has no periodic vibration, or channels that do not fit.
+    Raises `ConfigurationError` for requests that a nonlinear state-space model cannot answer,
+    `identification.IdentificationError` if it has no periodic vibration or its channels do not fit.
     """
     found: IdentifiedPnlss = load_as(PNLSS, path)
     model = found.model
@@ -77,7 +77,7 @@ def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequen
 
 
 def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
-    """Refuse what is asked of a nonlinear mode alone, and what the model's channels do not allow."""
+    """Refuse options that only a nonlinear mode understands, and requests that the model's channels do not allow."""
     given = {
         "zero_crossings": request.zero_crossings is not None,
         "modes": request.modes is not None,
@@ -115,7 +115,7 @@ def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
 
 
 def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
-    """What was chosen where nothing was said."""
+    """Return a note on the held force if it was chosen by default."""
     if request.held is not None or held != "pure-sine":
         return ()
     return (
@@ -125,7 +125,7 @@ def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
 
 
 def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedRun], tuple[str, ...]]:
-    """Every realisation of a recording, simulated, what it was to the model, and notes."""
+    """Simulate every realisation of a recording; return the runs with their use in the identification, and notes."""
     model = identified.model
     with Recording(path) as recording:
         if recording.kind not in kinds_that_yield(PeriodicSpectra):
@@ -149,6 +149,6 @@ def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedR
 
 
 def _strangers(model: PnlssModel, references: Sequence[FrequencyResponse]) -> list[str]:
-    """References of another specimen."""
+    """Return a note on each specimen of the references other than the model's."""
     others = {one.specimen for one in references} - {"", model.specimen}
     return [f"the model is of {model.specimen}, a reference of {one}: not the same specimen" for one in sorted(others)]

@@ -1,4 +1,4 @@
-"""Steady vibrations of nonlinear state-space models, beside the stepped sines that they are compared with."""
+"""Steady vibrations of nonlinear state-space models, compared with stepped sines."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -23,31 +23,31 @@ __all__ = ["Held", "Reference", "compared", "default_held"]
 
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 _MARGIN = 0.02
-"""How far beyond a reference's frequencies a response is followed."""
+"""Relative margin by which a response is followed beyond the frequencies of a reference."""
 _STEPS = 5
-"""From one point of a reference to the next."""
+"""Number of steps from one point of a reference to the next."""
 _ALIKE = 0.01
-"""Relative difference of amplitudes below which two vibrations are one."""
+"""Relative difference of amplitudes below which two vibrations count as the same."""
 _HARMONIC = 0.01
-"""Second harmonic of a reference's force, over its fundamental, from which a force without any is said to be another."""
+"""Second harmonic of a reference's force over its fundamental above which a predicted force without harmonics is noted."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A measured response, and how it is to be compared."""
+    """A measured response and how it is compared."""
 
     measured: FrequencyResponse
-    """What was measured."""
+    """The measured response."""
     over: Over
-    """What it is compared over."""
+    """Quantity over which it is compared."""
     over_asked: bool = False
-    """Whether that was asked for."""
+    """Whether the user asked for that quantity."""
     second_harmonic: float | None = None
-    """Second harmonic of the force over its fundamental, where the response is largest; None if unknown."""
+    """Second harmonic of the force over its fundamental at the largest response; None if unknown."""
 
 
 def default_held(model: PnlssModel, exciter: Exciter | None) -> Held:
-    """What of a force the model can hold."""
+    """Return the quantity of the force that the model can hold constant."""
     force_driven = any(channel.role == "force" for channel in model.inputs)
     return "pure-sine" if force_driven and exciter is None else "fundamental"
 
@@ -55,7 +55,7 @@ def default_held(model: PnlssModel, exciter: Exciter | None) -> Held:
 def compared(
     model: PnlssModel, exciter: Exciter | None, reference: Reference
 ) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
-    """At the level that was held, where the model can hold it, else at the force that each point had."""
+    """Predict a reference at its held level if the model can hold it, otherwise at the force of each point, and compare."""
     measured, over = reference.measured, reference.over
     held, notes = default_held(model, exciter), []
     low, high = (
@@ -87,10 +87,11 @@ def compared(
 def _point_by_point(
     model: PnlssModel, exciter: Exciter | None, held: Held, measured: FrequencyResponse
 ) -> SteadyPrediction:
-    """The vibration at each point's own force; where several are found, the one whose amplitude is nearest to the measured.
+    """Predict the vibration at the force of each point.
 
-    Tried are the one that rest leads to, and the ones next to that of the point before, at once and in steps, without which a
-    steep branch is lost. Points without any are left out.
+    If several vibrations are found, the one whose amplitude is nearest to the measured one is taken. The search starts from
+    rest, and from the previous point, both directly and in steps; without the steps a steep branch would be lost. Points
+    without any vibration are left out.
     """
     states: list[SteadyStates] = []
     several = 0
@@ -143,7 +144,7 @@ def _point_by_point(
 
 
 def _between(begin: tuple[float, float], end: tuple[float, float]) -> list[tuple[float, float]]:
-    """Frequencies and forces on the way from one point to the next, without the first."""
+    """Return frequencies and forces in steps from one point to the next, without the first."""
     return [
         (begin[0] + share * (end[0] - begin[0]), begin[1] + share * (end[1] - begin[1]))
         for share in (np.arange(1, _STEPS + 1) / _STEPS).tolist()
@@ -151,7 +152,7 @@ def _between(begin: tuple[float, float], end: tuple[float, float]) -> list[tuple
 
 
 def _said(points: int, several: int, stable: np.ndarray, range_use: np.ndarray) -> tuple[str, ...]:
-    """What to know of vibrations that were taken point by point."""
+    """Return notes on vibrations that were predicted point by point."""
     missing, unstable = points - stable.size, int(np.count_nonzero(~stable))
     notes = [f"at {missing} of {points} points no vibration was found"] if missing else []
     if several:

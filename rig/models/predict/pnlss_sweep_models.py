@@ -1,4 +1,4 @@
-"""A nonlinear state-space model in a sweep, alone or with the exciter that drives it: simulated, then demodulated."""
+"""Sweeps of a nonlinear state-space model, alone or with its exciter: simulated, then demodulated."""
 
 from dataclasses import dataclass
 
@@ -24,22 +24,22 @@ __all__ = ["PnlssSweepModels", "SweepGiven"]
 Float = NDArray[np.float64]
 
 _SHOWN = 10.0
-"""Of an unbounded run is shown what is below this many times the largest recorded amplitude, or that of training."""
+"""An unbounded run is shown while it is below this many times the largest recorded amplitude, or the largest in training."""
 _SHORT_PERIODS = 20
-"""Periods at the first frequency below which a run that ended has nothing to be seen."""
+"""A run that became unbounded within fewer periods of the first frequency is too short to show anything."""
 _LOWEST = 0.8
-"""Of the lowest frequency of a sweep: from there on the exciter's reaction is exact."""
+"""Part of the lowest frequency of a sweep above which the exciter's reaction is exact."""
 
 
 @dataclass(frozen=True, eq=False)
 class SweepGiven:
-    """What a model is driven with: rows of its inputs, or one of voltage, and the phase at the samples from ``first`` on."""
+    """Excitation of a model: rows of its inputs, or one row of voltage, and the phase at the samples from ``first`` on."""
 
     inputs: Float
     first: int
     theta: Float
     frequencies_hz: tuple[float, float]
-    """First and last frequency."""
+    """First and last frequency, Hz."""
     largest: float
     """Largest output at the drive point that is worth showing."""
     initial_state: Float | None
@@ -48,20 +48,20 @@ class SweepGiven:
 
 @dataclass(frozen=True, eq=False)
 class PnlssSweepModels:
-    """What sweeps are simulated with."""
+    """Models with which sweeps are simulated."""
 
     model: PnlssModel
-    """The model."""
+    """The nonlinear state-space model."""
     exciter: Exciter | None
-    """What drives a force-driven model from the voltage; without it the recorded force does."""
+    """Exciter that drives a force-driven model from the voltage; without it, the recorded force drives the model."""
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
-        """What drives."""
+        """Channels that drive the simulation."""
         return self.model.inputs if self.exciter is None else (VOLTAGE,)
 
     def predict(self, given: SweepGiven) -> SweepPrediction:
-        """The simulated sweep as fundamentals; of an unbounded one what came before."""
+        """Return the fundamentals of the simulated sweep; of an unbounded run, only those before it diverged."""
         model, first, rate_hz = self.model, given.first, self.model.sample_rate_hz
         force, force_channel, run, notes = self._simulated(given)
         row = find_role(model.outputs, "drive")
@@ -97,7 +97,7 @@ class PnlssSweepModels:
         )
 
     def _simulated(self, given: SweepGiven) -> tuple[Float, Channel, Simulation, list[str]]:
-        """The force at the drive point, imposed or predicted, its channel, the run, and notes."""
+        """Return the force at the drive point (imposed or predicted), its channel, the run, and notes."""
         model = self.model
         channels = {channel.role: (row, channel) for row, channel in enumerate(model.outputs)}
         if self.exciter is not None:
@@ -116,7 +116,7 @@ class PnlssSweepModels:
         return run.outputs[row], channel, run, []
 
     def _outside(self, given: SweepGiven) -> list[str]:
-        """Frequencies that the model was never shown."""
+        """Return a note if the sweep covers frequencies outside the training data."""
         band = self.model.excited_hz
         if not band or (band[0] * 0.999 <= min(given.frequencies_hz) and max(given.frequencies_hz) <= band[1] * 1.001):
             return []
@@ -127,7 +127,7 @@ class PnlssSweepModels:
 def _fundamentals(
     theta: Float, signals: Float, channels: tuple[Channel, Channel], rate_hz: float, first_hz: float
 ) -> Transient:
-    """Demodulated as a recording is; a single instant at rest where a run ended before there was a period to see."""
+    """Demodulate like a recording; return a single instant at rest if the run ended before the first usable period."""
     try:
         return demodulate(theta, signals, channels, sample_rate_hz=rate_hz)
     except IdentificationError:

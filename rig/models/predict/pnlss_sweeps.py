@@ -1,4 +1,4 @@
-"""Sweeps, recorded ones and planned ones, as a nonlinear state-space model simulates them, from force or from voltage."""
+"""Recorded and planned sweeps, simulated by a nonlinear state-space model from force or voltage."""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -37,10 +37,10 @@ Float = NDArray[np.float64]
 
 
 def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swept]:
-    """Every accepted sweep of a recording, simulated from rest: from its force, or from its voltage.
+    """Simulate every accepted sweep of a recording, from its force or from its voltage.
 
-    Raises `RecordingError` where the file holds something else, `identification.IdentificationError` where channels or rate
-    do not fit.
+    The simulation starts from rest where the data does. Raises `RecordingError` if the file has other contents,
+    `identification.IdentificationError` if channels or rate do not fit.
     """
     with Recording(path) as recording:
         if recording.kind not in kinds_that_yield(Transient):
@@ -58,7 +58,10 @@ def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swep
 
 
 def planned_pnlss_sweeps(plan_source: str, models: PnlssSweepModels) -> Iterator[Swept]:
-    """Every level of a plan's sweep; `ConfigurationError` where it is none of constant voltage, or too fast for the model."""
+    """Simulate every level of a planned sweep.
+
+    Raises `ConfigurationError` if the plan is no sweep at constant voltage, or too fast for the sample rate of the model.
+    """
     plan, rate_hz = planned(plan_source), models.model.sample_rate_hz
     highest = max(plan.start_hz, plan.stop_hz)
     if FEWEST_SAMPLES_PER_PERIOD * highest >= rate_hz:
@@ -84,7 +87,7 @@ def planned_pnlss_sweeps(plan_source: str, models: PnlssSweepModels) -> Iterator
 
 
 def _waveform(plan: SweepPlan, rate_hz: float) -> tuple[Float, Float, int]:
-    """Phase and envelope of a planned sweep with ramp and hold ahead of it, at the model's rate, and where it begins."""
+    """Return phase and envelope of a planned sweep with its ramp and hold, at the model's rate, and its first sample."""
     first = round((plan.ramp_periods + plan.hold_periods) / plan.start_hz * rate_hz)
     time_s = np.arange(first + round(plan.duration_s * rate_hz)) / rate_hz
     swept = np.maximum(time_s - time_s[first], 0.0)
@@ -100,13 +103,13 @@ def _waveform(plan: SweepPlan, rate_hz: float) -> tuple[Float, Float, int]:
 
 
 def _largest_in_training(model: PnlssModel, row: int) -> float:
-    """About the largest that an output can be within the range of the training data; infinite where that is unknown."""
+    """Estimate the largest value of an output within the range of the training data; infinite if that is unknown."""
     found = float(np.sum(np.abs(model.c[row]) * model.state_range) + np.sum(np.abs(model.d[row]) * model.input_range))
     return found if np.isfinite(found) and found > 0.0 else float("inf")
 
 
 def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tuple[SweepGiven, tuple[str, ...]]:
-    """A sweep by its stored number, at the model's rate, with the oscillator's phase at its counted samples."""
+    """Return a recorded sweep at the model's rate, by its stored number, with the oscillator's phase at the counted samples."""
     bench, model, name = bench_of_recording(recording), models.model, f"sweep {number + 1}"
     try:
         signals = Signals.chosen(bench, [c.name for c in models.inputs], [c.name for c in model.outputs])

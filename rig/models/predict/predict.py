@@ -1,4 +1,4 @@
-"""From models to predictions, beside the recordings they are compared with."""
+"""Predictions by models, compared with recordings."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -53,11 +53,11 @@ _DRAWS = 40
 
 
 def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
-    """Predictions of a nonlinear mode, PNLSS model or force surface, with errors where there is something to compare with.
+    """Predict with a nonlinear mode, a PNLSS model or a force surface, with errors where there is a reference.
 
-    Raises `RecordingError` for files that hold something else, `ConfigurationError` for plans that cannot be predicted,
-    `identification.IdentificationError` where the model cannot answer, in particular beyond twice the largest amplitude
-    that it was identified with.
+    Raises `RecordingError` for files with other contents, `ConfigurationError` for plans that cannot be predicted,
+    `identification.IdentificationError` if the model cannot answer, in particular beyond twice the largest amplitude with which
+    it was identified.
     """
     kind = kind_of(model)
     if kind not in (NONLINEAR_MODE.name, PNLSS.name, FORCE_SURFACE.name):
@@ -98,7 +98,7 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
 
 
 def _check_mode(request: PredictionRequest) -> None:
-    """Refuse what is asked of other models than a nonlinear mode."""
+    """Refuse requests that a nonlinear mode cannot answer."""
     if request.exciter is None and request.planned:
         raise ConfigurationError("`planned`: gives a voltage, which needs an exciter; add `exciter`")
     if request.exciter is not None and not (request.sweeps or request.planned):
@@ -110,7 +110,7 @@ def _check_mode(request: PredictionRequest) -> None:
 
 
 def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:
-    """References of another specimen."""
+    """Return a note on each specimen of the references other than the model's."""
     others = {item[1].specimen for item in steady if item[1] is not None} - {"", mode.specimen}
     return [
         f"the model is of {mode.specimen}, a reference of {other}: not the same specimen" for other in sorted(others)
@@ -129,11 +129,11 @@ def _steady(
 
 
 def _band(mode: NonlinearMode, force_n: float, request: PredictionRequest) -> ResponseBand | None:
-    """What the model's standard errors make of a response; None where they are unknown, or a draw leaves the range."""
+    """Return the uncertainty band of a response; None if standard errors are unknown or a draw leaves the range."""
     held = cast(HeldForce, request.held or "fundamental")
     try:
         if _steady(mode, force_n, None, request).range_use.max() > FLAGGED_BEYOND:
-            return None  # what the extrapolation may be off by is not in the errors
+            return None  # the standard errors do not include the error of extrapolation
         return response_band(mode, force_n, force=held, draws=_DRAWS, allow_extrapolation=request.allow_extrapolation)
     except IdentificationError:
         return None
@@ -142,7 +142,7 @@ def _band(mode: NonlinearMode, force_n: float, request: PredictionRequest) -> Re
 def _compared(
     mode: NonlinearMode, measured: FrequencyResponse, modes: LinearModes | None, request: PredictionRequest
 ) -> _Compared:
-    """At constant force where the force was controlled, else at the force that each point had."""
+    """Predict a reference at constant force if its force was controlled, otherwise at the force of each point, and compare."""
     if measured.controlled == "force":
         wanted = replace(request, held="fundamental")
         predicted, band = _steady(mode, measured.level, modes, wanted), _band(mode, measured.level, wanted)
@@ -155,18 +155,18 @@ def _compared(
 
 
 def _over(measured: FrequencyResponse, request: PredictionRequest) -> Over:
-    """What a reference is compared over."""
+    """Return the quantity over which a reference is compared."""
     return cast(Over, request.over or ("phase" if _turns_back(measured.frequency_hz) else "frequency"))
 
 
 def _turns_back(frequency_hz: np.ndarray) -> bool:
-    """Whether a branch has more than one vibration at a frequency: then only the phase tells them apart."""
+    """Whether the frequency turns back along a branch. Then only the phase distinguishes vibrations at the same frequency."""
     steps = np.diff(frequency_hz)
     return bool((steps > 0.0).any() and (steps < 0.0).any())
 
 
 def _references(path: Path, request: PredictionRequest) -> list[Reference]:
-    """Stepped sines with the second harmonic of their force, as far as it was recorded."""
+    """Return stepped sines with the second harmonic of their force, if it was recorded."""
     ratios: dict[tuple[float, float], float] = {}
     if kind_of(path) in STEPPED:
         with Recording(path) as recording:

@@ -1,4 +1,4 @@
-"""What is to be predicted, and with what; options that mean nothing together are refused."""
+"""Request for predictions. Options that do not fit together are refused."""
 
 import math
 from dataclasses import dataclass
@@ -16,32 +16,34 @@ __all__ = ["PredictionRequest"]
 
 @dataclass(frozen=True, kw_only=True)
 class PredictionRequest:
-    """What is to be predicted, with what."""
+    """What to predict, and with which models."""
 
     forces_n: tuple[float, ...] = ()
-    """Constant forces of frequency responses."""
+    """Constant forces for which frequency responses are predicted, N."""
     voltages_v: tuple[float, ...] = ()
-    """Constant voltages of frequency responses."""
+    """Constant voltages for which frequency responses are predicted, V."""
     held: str | None = None
-    """What of the force is constant: ``fundamental``, ``rms`` or ``pure-sine``; if not given, the first that the model can."""
+    """Constant quantity of the force: ``fundamental``, ``rms`` or ``pure-sine``; by default the first that the model allows."""
     sweeps: tuple[Path, ...] = ()
     """Recordings whose sweeps are predicted."""
     multisines: tuple[Path, ...] = ()
     """Recordings whose realisations a PNLSS model simulates."""
     planned: tuple[str, ...] = ()
-    """Plans of sweeps that are yet to be made, by name or file."""
+    """Plans of future sweeps, by name or file."""
     zero_crossings: str | None = None
-    """Imposed force from its zero crossings, the founding paper's way: ``half-periods`` or ``periods``; else demodulated."""
+    """Read the imposed force from its zero crossings, as in the founding paper: ``half-periods`` or ``periods``. By default the
+    force is demodulated."""
     exciter: Path | None = None
-    """Exciter model: sweeps are predicted from the voltage, else from the recorded force."""
+    """Exciter model. With it sweeps are predicted from the voltage, otherwise from the recorded force."""
     modes: Path | None = None
-    """Linear model: the other modes take part, responses of the other sensors are predicted."""
+    """Linear model. With it the other modes are included, and responses of the other sensors are predicted."""
     references: tuple[Path, ...] = ()
     """Stepped sines that are predicted at their own force and compared."""
     over: str | None = None
-    """What they are compared over: ``frequency`` or ``phase``; if not given, the phase where the frequency turns back."""
+    """Quantity over which references are compared: ``frequency`` or ``phase``; by default the phase if the frequency turns
+    back."""
     allow_extrapolation: bool = False
-    """Whether to answer beyond twice the largest modal amplitude identified."""
+    """Whether to predict beyond twice the largest identified modal amplitude."""
 
     def __post_init__(self) -> None:
         if not (self.forces_n or self.voltages_v or self.sweeps or self.multisines or self.planned or self.references):

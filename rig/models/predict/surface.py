@@ -1,4 +1,4 @@
-"""Frequency responses at constant force cut from a force surface, as predictions."""
+"""Predictions of frequency responses at constant force, cut from a force surface."""
 
 from collections.abc import Sequence
 
@@ -24,12 +24,11 @@ _INTERVAL = 1.96
 def surface_predictions(
     measured: MeasuredSurface, request: PredictionRequest, references: Sequence[FrequencyResponse]
 ) -> Predictions:
-    """Curves at the forces asked for, and at those of ``references``, with their errors over the phase.
+    """Return the curves at the requested forces and at those of ``references``, with errors over the phase.
 
-    Over the frequency they would not do: where the lowest level ends a curve, points of the branch beyond have no counterpart.
-
-    Raises `ConfigurationError` for what a force surface cannot answer, `RecordingError` for references that did not hold
-    the force's fundamental, `identification.IdentificationError` for forces beyond the measured levels.
+    The frequency is not suitable for the comparison: where a curve ends at the lowest level, points of the branch beyond have
+    no counterpart. Raises `ConfigurationError` for requests that a force surface cannot answer, `RecordingError` for references
+    whose fundamental force was not held, `identification.IdentificationError` for forces beyond the measured levels.
     """
     _check(request)
     for measured_at in references:
@@ -59,7 +58,7 @@ def surface_predictions(
 
 
 def _check(request: PredictionRequest) -> None:
-    """Refuse what is asked of a nonlinear mode alone."""
+    """Refuse options that only a nonlinear mode understands."""
     given = {
         "held": request.held not in (None, "fundamental"),
         "sweeps": bool(request.sweeps),
@@ -77,7 +76,7 @@ def _check(request: PredictionRequest) -> None:
 
 
 def _as_prediction(curve: ConstantForceCurve, measured: MeasuredSurface) -> SteadyPrediction:
-    """The same curve; its modal amplitude is unknown, for no mode shape is needed."""
+    """Convert a curve to a prediction. Its modal amplitude is unknown, because a force surface needs no mode shape."""
     response = curve.response
     amplitude = response.amplitude_m
     turned = amplitude * np.exp(-1j * np.radians(response.phase_lag_deg))
@@ -101,7 +100,7 @@ def _as_prediction(curve: ConstantForceCurve, measured: MeasuredSurface) -> Stea
 
 
 def _interpolated(curve: ConstantForceCurve) -> tuple[str, ...]:
-    """What half of the levels would make of the curve."""
+    """Return a note on how much the curve changes if every second level is left out."""
     if not np.isfinite(curve.amplitude_change).any():
         return ()
     amplitude = 100.0 * float(np.nanmax(curve.amplitude_change))
@@ -113,7 +112,7 @@ def _interpolated(curve: ConstantForceCurve) -> tuple[str, ...]:
 
 
 def _band(curve: ConstantForceCurve) -> ResponseBand:
-    """95 % intervals from the scatter of the measured points."""
+    """Return 95 % intervals computed from the scatter of the measured points."""
     response = curve.response
     top = int(np.argmax(response.amplitude_m))
     ends = _INTERVAL * np.array([[-1.0], [1.0]])

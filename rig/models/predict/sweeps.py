@@ -1,4 +1,4 @@
-"""Sweeps, recorded ones and planned ones, as a nonlinear-mode model predicts them."""
+"""Recorded and planned sweeps, predicted by a nonlinear mode."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -38,26 +38,26 @@ __all__ = [
 ]
 
 CROSSINGS = ("half-periods", "periods")
-"""Between which zero crossings a force can be read: all of them, or those in the same direction."""
+"""Zero crossings between which a force is read: all of them, or only those in the same direction."""
 
 
 @dataclass(frozen=True)
 class SweepModels:
-    """What sweeps are predicted with."""
+    """Models and options with which sweeps are predicted."""
 
     mode: NonlinearMode
     """The nonlinear mode."""
     modes: LinearModes | None
-    """The other modes."""
+    """Linear model with the other modes."""
     exciter: Exciter | None
-    """Exciter; without it the recorded force is imposed."""
+    """Exciter model; without it, the recorded force is imposed."""
     zero_crossings: str | None
-    """Between which zero crossings that force is read, one of `CROSSINGS`; None if it is demodulated."""
+    """Zero crossings between which the imposed force is read, one of `CROSSINGS`; None if the force is demodulated."""
     allow_extrapolation: bool
-    """Whether to answer beyond twice the largest modal amplitude identified."""
+    """Whether to predict beyond twice the largest identified modal amplitude."""
 
     def predict(self, given: Transient | HalfPeriods | VoltageSweep) -> SweepPrediction:
-        """`identification.predict_sweep` with these."""
+        """Call `identification.predict_sweep` with these models."""
         return predict_sweep(
             self.mode,
             given,
@@ -69,20 +69,20 @@ class SweepModels:
 
 @dataclass(frozen=True)
 class Swept:
-    """A predicted sweep, the recorded one if there is one, and what a user should know about the two."""
+    """A predicted sweep, the recorded sweep if there is one, and remarks on both."""
 
     prediction: SweepPrediction
     """The prediction."""
     recorded: Transient | None
-    """Force and drive point as recorded."""
+    """Force and drive-point motion as recorded."""
     error: PredictionError | None
-    """How far apart they are."""
+    """Difference between prediction and recording."""
     notes: tuple[str, ...]
-    """Models that may not belong to the rig."""
+    """Remarks, for example on models that may not belong to the rig."""
 
 
 def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
-    """Every sweep of a recording; `RecordingError` where it holds something else."""
+    """Predict every sweep of a recording; raise `RecordingError` if the file has other contents."""
     with Recording(path) as recording:
         if recording.kind not in kinds_that_yield(Transient):
             raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
@@ -99,7 +99,7 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
 
 
 def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
-    """Every level of a plan's sweep; `ConfigurationError` where it is no sweep, or not linear in time."""
+    """Predict every level of a planned sweep; raise `ConfigurationError` if it is no sweep, or not linear in time."""
     plan = planned(plan_source)
     if plan.rate_hz_per_s is None:
         raise ConfigurationError(
@@ -112,7 +112,7 @@ def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
 
 
 def planned(plan_source: str) -> SweepPlan:
-    """A plan of sweeps of constant voltage; `ConfigurationError` for any other."""
+    """Load a plan of sweeps at constant voltage; raise `ConfigurationError` for any other plan."""
     plan = load_plan(plan_source)
     if not isinstance(plan, SweepPlan):
         raise ConfigurationError(f"{plan_source}: is a plan of kind {plan.kind}, wanted is a sweep")
@@ -124,11 +124,11 @@ def planned(plan_source: str) -> SweepPlan:
 
 
 def strangers(bench: Bench, specimen: str, exciter: Exciter | None, source: str) -> tuple[str, ...]:
-    """Models of another rig: an exciter may move on to another structure, but that only its user knows."""
+    """Return notes on models of another rig. An exciter may be moved to another structure, but only its user knows that."""
     notes = []
     if specimen not in ("", bench.specimen.name):
         notes.append(f"the model is of {specimen}, {source} of {bench.specimen.name}: not the same specimen")
-    here = f"{bench.name}, {bench.specimen.name}"  # as the identification of an exciter calls it
+    here = f"{bench.name}, {bench.specimen.name}"  # format in which the identification of an exciter writes its source
     if exciter is not None and exciter.source not in ("", here):
         notes.append(
             f"the exciter model is of {exciter.source}, {source} of {here}: right only if amplifier, exciter and "
@@ -138,7 +138,7 @@ def strangers(bench: Bench, specimen: str, exciter: Exciter | None, source: str)
 
 
 def _between_crossings(recording: Recording, number: int, which: str) -> HalfPeriods:
-    """The force of a recorded sweep between its zero crossings."""
+    """Return the force of a recorded sweep between its zero crossings."""
     bench = bench_of_recording(recording)
     column = next(index for index, channel in enumerate(bench.channels) if channel.role == "force")
     force = bridged(point_rows(recording, number))[:, column]
@@ -146,6 +146,6 @@ def _between_crossings(recording: Recording, number: int, which: str) -> HalfPer
 
 
 def force_and_drive(sweep: Transient) -> Transient:
-    """What a comparison shows of a sweep."""
+    """Return only the channels of a sweep that a comparison shows, force and drive."""
     rows = [row for row, channel in enumerate(sweep.channels) if channel.role in ("force", "drive")]
     return replace(sweep, channels=tuple(sweep.channels[row] for row in rows), fundamentals=sweep.fundamentals[rows])
