@@ -26,7 +26,7 @@ Real = NDArray[np.float64]
 _DEFAULT_SHARE = 0.5
 _SPAN = (0.7, 1.3)
 _DENSE_WIDTHS = 12.0
-"""Half width of the dense part of the frequency grid on either side of the resonance, in half-widths of the resonance."""
+"""Half width of the dense part of the frequency grid, which holds half of the points, in half-widths of the resonance."""
 _SAME = 1e-3
 
 

@@ -20,7 +20,7 @@ from rig.text.contents import Contents
 __all__ = ["ImportFailed", "read_mat", "structures_of_ours", "write_mat"]
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
-_LONGEST = 31  # characters of a field's name that every reader of version 5 takes
+_LONGEST = 31  # largest number of characters of a field name that every reader of version 5 accepts
 _PATIENCE_S, _SLOWEST_BYTES_S = 60.0, 5e6
 
 

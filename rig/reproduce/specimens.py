@@ -43,7 +43,8 @@ class Specimen:
     backbone: str = "backbone-fine"
     """Plan of the backbone whose points can be used for training together with the multisines."""
     exciter: str = "exciter"
-    """Plan of the multisine for the exciter model, which predicts a constant force as an exciter makes it."""
+    """Plan of the multisine for the exciter model. With this model, a constant force has the harmonics that an exciter makes.
+    """
 
 
 SPECIMENS = {

@@ -30,7 +30,7 @@ def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float)
         amplitudes = (densities[0], force_n, densities[1], force_n * accelerance)
         return low_pass_from_densities(omega, *amplitudes, lag_std_deg=LAG_STD_DEG)
 
-    quickest = fluctuation(1e6 * lowest_n)  # bounded by the frequency alone
+    quickest = fluctuation(1e6 * lowest_n)  # limited by the frequency alone
     needed_n = 1e6 * lowest_n * quickest.lag_std_deg / LAG_STD_DEG
     if needed_n <= lowest_n:
         choice = fluctuation(lowest_n)

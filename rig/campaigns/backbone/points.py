@@ -53,7 +53,7 @@ __all__ = [
     "recorded_backbone",
 ]
 
-NEAR = 0.1  # in the logarithm of the amplitude, of what a point of the slow flow is made
+NEAR = 0.1  # a point counts as reached within this distance of its final amplitude, as a logarithm
 
 BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),

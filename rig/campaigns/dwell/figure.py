@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw"]
 
-NEAR = 0.2  # of a limit, from which on it is drawn: further away it would hide the course
+NEAR = 0.2  # part of a limit from which on the limit is drawn: a distant limit would flatten the curve
 
 
 def draw(page: "Figure", recording: Recording) -> None:

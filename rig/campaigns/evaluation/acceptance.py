@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 MOTIONS = ("drive", "response")
-FAILING = 0.25  # of the largest motion: noise of a sensor is far below, and one that dies within a record above
+FAILING = 0.25  # of the largest motion: sensor noise drifts far less, a sensor that dies within a record more
 
 
 def first_of(objections: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 __all__ = ["Misfit", "Seen", "told"]
 
-ALIKE = 1.5  # channels that are off by the same factor, to this, share one cause
+ALIKE = 1.5  # ratios within this factor, up or down, count as equal: the channels share one cause
 
 
 class Seen(Enum):

@@ -11,7 +11,7 @@ from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 
 __all__ = ["motions_of", "ratios_of", "resistance_of", "rms_ratios_of", "shapes_of", "softened", "spread_of"]
 
-DETUNED = 20.0  # factor on the allowance at resonance, per unit of relative error of the squared frequency
+DETUNED = 20.0  # growth of the allowance per relative deviation of the squared frequency
 
 
 def ratios_of(point: Point[Any], drive: int) -> np.ndarray:

@@ -72,7 +72,7 @@ class Plan(Configured):
     kind: str
     """Kind of campaign."""
     description: str = ""
-    """What the plan is for."""
+    """Purpose of the plan."""
     bench: str = Field(min_length=1)
     """Name of a shipped bench or a TOML file."""
 

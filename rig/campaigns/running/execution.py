@@ -104,7 +104,7 @@ class Execution:
         for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
-        with held():  # from the last sample to the end in the journal
+        with held():  # from the last sample to the end record in the journal
             with asking(self.loop.request_stop):
                 try:
                     for rows in self.loop.run():

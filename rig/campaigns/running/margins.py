@@ -29,7 +29,7 @@ class Margin(NamedTuple):
     level: float
     """Level of the point."""
     share: float
-    """Peak over what is allowed, 1 at the limit."""
+    """Peak over the allowed value; 1 at the limit."""
     key: str
     """Key or range of the bench that defines the limit."""
 

@@ -36,7 +36,7 @@ def set_aside(output: Path) -> Iterator[None]:
     moved: list[Path] = []
     try:
         if journal.exists():
-            with exclusive(journal):  # refuses while another run is writing it
+            with exclusive(journal):  # refuses if another run is writing it
                 moved.append(_moved(journal))
         if output.exists():
             moved.append(_moved(output))
@@ -61,7 +61,7 @@ def put_back(output: Path) -> str:
     """
     journal = journal_path(output)
     if journal.exists():
-        with exclusive(journal):  # refuses while that run is still writing
+        with exclusive(journal):  # refuses if that run is still writing
             if _holds_a_part(journal):
                 return ""
             journal.unlink()

@@ -21,7 +21,7 @@ __all__ = ["draw", "draw_stepped_sine"]
 
 Float = NDArray[np.float64]
 
-_JUMP = 1.5  # times the amplitude of the point before
+_JUMP = 1.5  # times the amplitude of the previous point
 
 
 def draw(page: "Figure", recording: Recording) -> None:

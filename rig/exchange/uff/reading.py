@@ -35,7 +35,7 @@ def read_uff(path: Path) -> list[Dataset]:
     try:
         file = pyuff.UFF(str(path))
         types = [int(number) for number in file.get_set_types()]
-    except Exception as error:  # pyuff raises nothing more special
+    except Exception as error:  # pyuff raises no more specific error
         raise ImportFailed(f"{path}: is a damaged universal file ({error})") from None
     return [_dataset(file, number, kind, path) for number, kind in enumerate(types) if kind in _KNOWN]
 

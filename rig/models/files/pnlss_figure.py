@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_pnlss"]
 
 _MOST_OUTPUTS = 3
-_FLOOR = 1e-6  # of the largest amplitude: what lies below is not shown
+_FLOOR = 1e-6  # of the largest amplitude: smaller values are not shown
 
 
 def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
