@@ -61,7 +61,7 @@ app.command()(doctor)
 
 
 def main() -> None:
-    """Run the command and exit: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if interrupted elsewhere."""
+    """Run the command and exit: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if interrupted otherwise."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     say_what_is_imported()

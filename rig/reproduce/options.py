@@ -15,7 +15,7 @@ __all__ = ["INPUTS", "PAPER", "PARTS", "Options"]
 PAPER = "paper"
 """Value of ``models`` that selects the numbers of models in the paper."""
 _SATURATING = 60
-"""Fewest iterations with saturating features, because their weights begin at random."""
+"""Fewest default iterations with saturating features, because their weights begin at random."""
 INPUTS = ("force", "voltage")
 PARTS = ("steady", "sweeps")
 """Parts of a study that can be left out."""

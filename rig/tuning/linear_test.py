@@ -36,7 +36,7 @@ class LinearTest:
     level_rms_v: float
     """Level that was used, V RMS."""
     responses: FrequencyResponseMatrix
-    """Force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
+    """Responses per volt, with covariance: force, drive acceleration, and the accelerations of all response channels."""
     lead_samples: float
     """Samples from an output to its effect in the inputs: block, queue and filters of the device."""
     coherence: tuple[float, float]

@@ -18,11 +18,12 @@ WINDOW = (0.35875, -0.48829, 0.14128, -0.01168)  # Blackman-Harris: side lobes 9
 
 
 def alien_force(bench: Bench, pieces: Sequence[np.ndarray]) -> float:
-    """Part of the force's RMS that is no harmonic and stands out of the noise; from whole records or pieces of one record.
+    """Part of the force's RMS that is no harmonic and stands out of the noise, from whole records or pieces of one record.
 
     The spectral lines between the harmonics of the output frequency count if they exceed 15 times the noise, which is the
-    median of all lines between harmonics. Therefore neither a noisy force sensor nor harmonics beyond the evaluated ones count.
-    Lines within ``MAIN_LOBE`` bins of a harmonic are ignored. Returns NaN if every piece is shorter than `FEWEST_PERIODS`.
+    median of all lines between harmonics. Therefore neither the noise of a force sensor nor harmonics above the evaluated ones
+    count. Lines within ``MAIN_LOBE`` bins of a harmonic are ignored. Returns NaN if every piece is shorter than
+    `FEWEST_PERIODS`.
     """
     spectra = [found for rows in pieces if (found := _spectrum(bench, rows)) is not None]
     if not spectra:

@@ -186,7 +186,7 @@ class Point(Generic[Result]):
     asked_frequency_hz: float | None = None
     """Frequency that the plan asks for, Hz."""
     asked_phase_lag_deg: float | None = None
-    """Lag of the drive-point acceleration behind the force that the plan asks for, deg."""
+    """Lag that the plan asks for, of the drive-point acceleration behind the force, deg."""
     realisation: int | None = None
     """Number of a multisine's realisation, from 0."""
     repeats_first: bool = False

@@ -44,7 +44,7 @@ class Seen:
     """Evaluation of the responses to one level."""
 
     enough: bool
-    """Whether the responses stand out of the noise sufficiently."""
+    """Whether the responses stand out of the noise clearly enough."""
     share_of_limits: float
     """Largest peak relative to its limit (`share_of_limits`)."""
     wanted_rise: float = LARGEST_RISE
@@ -68,7 +68,7 @@ class LevelSearch:
     safe_share: float
     """Share of every limit that expected peaks may reach."""
     least_rise: float
-    """Factor below which a further level is not worth its time."""
+    """Smallest factor by which it is worth raising the level again."""
     most_levels: int
     """Largest number of levels tried."""
 

@@ -92,7 +92,7 @@ class PnlssOptions:
 
     @property
     def channels(self) -> dict[str, Any]:
-        """Inputs and outputs as `rig.measurements.experiments.experiments` takes them."""
+        """Inputs and outputs in the form that `rig.measurements.experiments.experiments` takes."""
         outputs = None if self.outputs is None else [name.strip() for name in self.outputs.split(",") if name.strip()]
         return {"inputs": (self.input or "force",), "outputs": outputs}
 
