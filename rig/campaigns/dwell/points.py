@@ -119,7 +119,7 @@ def measure_mean(
 def watch_drift(
     plan: DwellPlan, known: Sequence[Point[DwellResult]], point: Point[DwellResult]
 ) -> tuple[Point[DwellResult], str]:
-    """Complete a mean by cycles, time and changes; also return why the test ends, or an empty string.
+    """Add cycles, time and changes to a mean; also return why the test ends, or an empty string.
 
     The changes are relative to the first accepted mean. Cycles and seconds refer to the middle of the mean and count from the
     first mean, over all parts of a recording. Failed means count too; the ramp and the settling at the beginning of a part do
