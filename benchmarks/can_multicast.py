@@ -18,7 +18,7 @@ from itertools import pairwise
 import can
 
 from rig.wire.can.bus import PythonCanBus
-from rig.wire.can.frames import Frame
+from rig.wire.can.frames import BusTiming, Frame
 
 RATE_HZ = 5000.0
 STALL_S = 0.2
@@ -26,7 +26,7 @@ GROUP = "239.74.163.2"  # any will do where there is only loopback
 
 
 def multicast_bus() -> PythonCanBus:
-    return PythonCanBus("udp_multicast", GROUP, True, 1_000_000, 2_000_000)
+    return PythonCanBus("udp_multicast", GROUP, BusTiming(True, 1_000_000, 2_000_000))
 
 
 def send(seconds: float) -> None:

@@ -21,11 +21,11 @@ import cantools
 import numpy as np
 
 from benchmarks.can_multicast import RATE_HZ, STALL_S, multicast
-from rig.wire.can.dbc import compile_text
-from rig.wire.can.frames import Frame
+from rig.wire.can.frames import BusTiming, Frame
+from rig.wire.can.layout import compile_text
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.can.slcan_lines import encode_line
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 
 ROUNDS = 60
 BATCH = 16
@@ -83,7 +83,7 @@ def adapter() -> dict[str, float]:
     frame = Frame(0x310, bytes(range(64)), True)
     text = encode_line(frame)
     one, other = open_pseudo_terminal(), open_pseudo_terminal()
-    ours = SlcanBus(one.path, True)
+    ours = SlcanBus(one.path, BusTiming(True))
     ours.open()
     with can.Bus(interface="slcan", channel=other.path, bitrate=1_000_000, sleep_after_open=0.0) as theirs:
 

@@ -31,10 +31,10 @@ from rig.bench import Bench, DriverChoice, load_bench
 from rig.drivers import make_daq
 from rig.emulator.emulated import Emulator
 from rig.errors import RigError
+from rig.recording.conversion import finalise
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 
 RUN = """
 import sys

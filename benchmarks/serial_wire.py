@@ -24,7 +24,7 @@ from rig.wire.messages import Output, Samples, Stream
 from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import frame
 from rig.wire.serial.link import SerialLink
-from rig.wire.serial.pty import PseudoTerminal, open_pseudo_terminal
+from rig.wire.serial.port import PseudoTerminal, open_pseudo_terminal
 
 BLOCKS = (1, 5, 10)
 KINDS = ("bare", "link", "host")

@@ -1,8 +1,11 @@
 """The control law of a phase-locked vibration test: numbers in, numbers out."""
 
-from controller.law import Law, OpenLoop
-from controller.layout import AmplitudeLaw, Detector, ForceLoop, FrequencyLaw, LockState
-from controller.lock.rule import LockRule
+from controller.amplitude import AmplitudeLaw
+from controller.detector import Detector
+from controller.force import ForceLoop
+from controller.frequency import FrequencyLaw
+from controller.law import Law, OpenLoop, control_state
+from controller.lock import LockRule, LockState
 from controller.pll import PhaseLockedLoop
 from controller.presets import preset
 
@@ -16,5 +19,6 @@ __all__ = [
     "LockState",
     "OpenLoop",
     "PhaseLockedLoop",
+    "control_state",
     "preset",
 ]

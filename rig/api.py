@@ -29,7 +29,7 @@ __all__ = ["Run", "resume", "run"]
 
 
 class Run:
-    """A recording that was just made, and its measurements. Without an output file it lives as long as this object."""
+    """A new recording and its measurements. Without an output file the recording is removed with this object."""
 
     def __init__(self, recording: Recording, folder: "TemporaryDirectory[str] | None" = None) -> None:
         self.recording = recording
@@ -86,7 +86,7 @@ class Run:
         )
 
     def close(self) -> None:
-        """Let go of the file; a temporary one is removed."""
+        """Close the file; a temporary one is removed."""
         self.recording.close()
         if self._folder is not None:
             self._folder.cleanup()
@@ -120,9 +120,9 @@ def run(
     ``bench`` replaces the bench that the plan names. ``seed`` draws the noise of a virtual rig; the same seed gives the
     same recording bit for bit on the same machine. ``realtime`` holds a virtual rig back to the wall clock.
 
-    A bench on which something physical moves is armed by a person: ``arm`` is True, or a callable that is given a
-    `rig.arming.arming.ArmingRequest` and answers. ``operator`` (the user if not given), ``specimen_serial`` and
-    ``notes`` are recorded.
+    A bench on which something physical moves must be armed by a person: ``arm`` is True, or a callable that receives a
+    `rig.arming.arming.ArmingRequest` and returns whether to go on. ``operator`` (the user if not given),
+    ``specimen_serial`` and ``notes`` are recorded.
 
     Raises `rig.errors.ConfigurationError` for a plan or bench that is not allowed, `rig.errors.RecordingError` for a
     file that cannot be written, `rig.errors.DaqError` for a device that cannot be started, `rig.errors.NotArmed`. A run that
@@ -167,13 +167,13 @@ def resume(
     retry_tripped: bool = False,
     trust_code: bool = False,
 ) -> Run:
-    """Go on with a recording: points that were accepted stay, the others are measured in a further part.
+    """Continue a recording: accepted points stay, the others are measured in a further part.
 
-    A changed ``plan`` of the same kind and bench takes the place of the one in force. Points that it asks for and that were
-    accepted by any plan before are not measured again; those that it does not ask for stay in the file and count no more.
-    ``seed`` draws the noise of the further part; without it, one that no part had. ``arm`` to ``notes``: as for `run`.
+    A changed ``plan`` of the same kind and bench replaces the plan in force. Points that it asks for and that were accepted
+    under any earlier plan are not measured again; points that it does not ask for stay in the file but no longer count.
+    ``seed`` draws the noise of the further part; if None, a seed that no part had. ``arm`` to ``notes``: as for `run`.
     A level that tripped, and any higher one, is not tried again unless ``retry_tripped``. Functions of the user's own that
-    the bench in the recording names are code that whoever wrote it has chosen: they are imported with ``trust_code`` only.
+    the recorded bench names are code chosen by the author of the file: they are imported only with ``trust_code``.
 
     Raises `rig.errors.ConfigurationError` for a plan that cannot follow or asks for a level that tripped,
     `rig.errors.RecordingError` for a file that cannot be read or written.

@@ -177,7 +177,11 @@ class _ContentCache(FunctionCache):
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         self._open()
-        return super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+        try:
+            return super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+        except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
+            self.flush()
+            return None
 
 
 _folder: Path | None = None

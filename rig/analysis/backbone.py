@@ -1,15 +1,16 @@
 """The backbone of a bench: vibrations at phase resonance over the level, by harmonic balance of the coupled rig."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.backbone_figure import draw_backbone
 from rig.analysis.levels import By, level_range, samples_for
-from rig.analysis.study import Study
+from rig.analysis.study import Study, length_unit, roomy
 from rig.analysis.subject import Subject, refusing
 from rig.errors import ConfigurationError
+from rig.figures.style import MAIN, SECOND
 from rig.text.console import number, print_table
 from simulators.analysis import (
     HysteresisLoop,
@@ -18,11 +19,13 @@ from simulators.analysis import (
     hysteresis_loops,
     phase_resonance_backbone,
 )
+from simulators.sites.friction import FrictionSite
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["Backbone", "backbone", "neglected"]
+__all__ = ["Backbone", "backbone", "draw_backbone", "neglected"]
 
 _WORTH_A_NUMBER = 0.001
 _ROUNDING_J = 1e-15
@@ -58,7 +61,7 @@ class Backbone(Study):
         return {"points": self.responses, "frequency_shift": self.responses.frequency_shift, "loops": loops}
 
     def print_tables(self) -> None:
-        """One line per level, as of a measured backbone."""
+        """Print one line per level, in the form of a measured backbone."""
         r = self.responses
         ratios = [r.force_harmonic_ratio(h) if h < r.force_harmonics_n.shape[1] else None for h in (2, 3)]
         print_table(
@@ -128,10 +131,86 @@ def backbone(
 
 
 def neglected(found: PeriodicResponses) -> str:
-    """How much of the force lies above the harmonics that were balanced."""
+    """Remark on the part of the force above the balanced harmonics."""
     highest = found.force_harmonics_n.shape[1] - 1
     percent = 100.0 * float(np.max(found.neglected_share))
     text = f"up to {percent:.2g} %" if percent >= _WORTH_A_NUMBER else f"less than {_WORTH_A_NUMBER:g} %"
     return (
         f"force above harmonic {highest} is left out: {text} of the fundamental; balance more harmonics to include it"
     )
+
+
+def draw_backbone(
+    page: "Figure",
+    found: PeriodicResponses,
+    loops: dict[int, tuple[HysteresisLoop, ...]],
+    joints: Sequence[FrictionSite],
+) -> None:
+    """Four panels over the level, and one more per level that has loops."""
+    upper: Figure | SubFigure = page
+    lower: SubFigure | None = None
+    if loops:
+        upper, lower = page.subfigures(2, 1, squeeze=False, height_ratios=(2.0, 1.05))[:, 0]
+    (frequency, damping), (amplitude, harmonics) = upper.subplots(2, 2)
+    scale, unit = length_unit(float(np.max(found.amplitude_m)))
+    x = scale * found.amplitude_m
+    frequency.plot(x, found.modal_frequency_hz, "o-", ms=4, color=MAIN)
+    frequency.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
+    damping.plot(x, 100 * found.damping_ratio, "o-", ms=4, color=MAIN, label="active power of the fundamental")
+    total = 100 * found.damping_ratio_total_power
+    damping.plot(x, total, "s--", ms=3.5, color=SECOND, label="active power of all harmonics")
+    damping.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping ratio, %")
+    roomy(damping, np.concatenate([100 * found.damping_ratio, total]), 0.2)
+    damping.legend(fontsize=8, loc="best")
+    amplitude.plot(found.force_n, x, "o-", ms=4, color=MAIN)
+    amplitude.set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement amplitude, {unit}")
+    _draw_harmonics(harmonics, found)
+    if lower is not None:
+        _draw_loops(lower, found, loops, joints)
+
+
+def _draw_harmonics(axis: "Axes", found: PeriodicResponses) -> None:
+    for harmonic, marker, colour in ((2, "^", MAIN), (3, "v", SECOND)):
+        if harmonic < found.force_harmonics_n.shape[1]:
+            ratio = found.force_harmonic_ratio(harmonic)
+            axis.plot(found.force_n, ratio, marker + "-", ms=4, color=colour, label=f"|F{harmonic}|/|F1|")
+    axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of the force")
+    axis.set_ylim(bottom=0.0)
+    axis.legend(fontsize=8)
+
+
+def _draw_loops(
+    part: "Figure | SubFigure",
+    found: PeriodicResponses,
+    loops: dict[int, tuple[HysteresisLoop, ...]],
+    joints: Sequence[FrictionSite],
+) -> None:
+    """One panel per level with the loops of all joints; those of the second half are dashed, because pairs may coincide."""
+    axes = np.atleast_1d(part.subplots(1, len(loops)))
+    for axis, (point, several) in zip(axes, loops.items(), strict=True):
+        largest = max(float(np.max(np.abs(loop.coordinate))) for loop in several)
+        scale, words, force = _units(joints, largest)
+        for place, (joint, loop) in enumerate(zip(joints, several, strict=True)):
+            axis.plot(
+                scale * loop.coordinate,
+                loop.force,
+                lw=1.2,
+                ls="-" if 2 * place < len(joints) else (0, (4, 3)),
+                color=f"C{place % 10}",
+                label=joint.at,
+            )
+        axis.set_title(f"at {found.force_n[point]:.3g} N", fontsize=9)
+        axis.set_xlabel(words)
+        axis.locator_params(nbins=5)
+    axes[0].set_ylabel(force)
+    part.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=8, fontsize=8)
+
+
+def _units(joints: Sequence[FrictionSite], largest: float) -> tuple[float, str, str]:
+    """Factor and axis labels for the joints' coordinate and force."""
+    if all(joint.relative_to_mode_1 for joint in joints):
+        return 1e3, "joint coordinate, 1e-3 kg$^{1/2}$ m", "joint force, N/kg$^{1/2}$"
+    if all(joint.quantity == "deflection" and not joint.relative_to_mode_1 for joint in joints):
+        scale, unit = length_unit(largest)
+        return scale, f"joint displacement, {unit}", "joint force, N"
+    return 1.0, "joint coordinate, SI units", "joint force, SI units"

@@ -1,25 +1,25 @@
-"""What a slow uncontrolled sweep at constant voltage sees: the force drops out at resonance and overshoots beside it."""
+"""Steady response to a constant voltage, up and down: the force drops at resonance, as a slow sweep without control sees it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.backbone import neglected
-from rig.analysis.forced_figure import draw_forced
 from rig.analysis.levels import highest_resonance, most_points, samples_for
-from rig.analysis.rows import joined, part, turned
-from rig.analysis.study import Study
+from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive, refusing
 from rig.errors import ConfigurationError
+from rig.figures.style import MAIN, REJECTED, SECOND
 from rig.text.console import number, print_table
 from simulators.analysis import NotConvergedError, PeriodicResponses, forced_response, phase_resonance_backbone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Forced", "forced"]
+__all__ = ["Forced", "draw_forced", "forced", "joined", "part", "turned"]
 
 Real = NDArray[np.float64]
 
@@ -136,7 +136,7 @@ def forced(
 
 
 def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
-    """Vibrations in the order of the grid as far as they are found, and why no further."""
+    """Vibrations in the order of the grid up to where none is found, and why none is."""
     try:
         with refusing():
             return forced_response(subject.rig, voltage_v, grid, **how), ""
@@ -149,7 +149,7 @@ def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any
 def _completed(
     up: PeriodicResponses, down: PeriodicResponses, up_ends: str, down_ends: str
 ) -> tuple[PeriodicResponses, PeriodicResponses, list[str]]:
-    """Directions completed by each other: beyond the end of its branch a sweep jumps to the one that is left."""
+    """Complete each direction by the other: at the end of its branch a sweep jumps to the other branch."""
     n_up, n_down = up.frequency_hz.size, down.frequency_hz.size
     jump = "the branch of {} frequency ends at {:.4f} Hz; beyond, the vibration of the other direction is taken"
     if up_ends and down_ends:
@@ -195,3 +195,52 @@ def _extremes(way: PeriodicResponses) -> dict[str, float]:
         "highest_hz": float(way.frequency_hz[highest]),
         "highest_share": float(force[highest] / force[0]),
     }
+
+
+def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses | None) -> None:
+    """Three panels over the frequency; the falling direction where it differs."""
+    force, response, lag = page.subplots(3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.0))
+    scale, unit = length_unit(float(np.max(up.amplitude_m)))
+    ways: list[tuple[PeriodicResponses, Any, str, str]] = [
+        (up, "-", MAIN, "frequency rising" if down is not None else "either direction")
+    ]
+    if down is not None:
+        ways.append((down, (0, (4, 2)), SECOND, "frequency falling"))
+    for way, style, colour, label in ways:
+        force.plot(way.frequency_hz, way.force_n, ls=style, color=colour, label=label)
+        response.plot(way.frequency_hz, scale * way.amplitude_m, ls=style, color=colour)
+        lag.plot(way.frequency_hz, way.phase_lag_deg, ls=style, color=colour)
+    force.set_ylabel("force (fundamental), N")
+    response.set_ylabel(f"displacement, {unit}")
+    for axis in (force, response):
+        axis.set_ylim(bottom=0.0)
+    lag.axhline(-90.0, color=REJECTED, lw=0.8)
+    lag.set(xlabel="frequency, Hz", ylabel="lag of accel., deg", yticks=(-180, -90, 0), ylim=(-190, 10))
+    page.legend(*force.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8)
+
+
+def turned(way: PeriodicResponses) -> PeriodicResponses:
+    """The same points in the opposite order."""
+    return part(way, slice(None, None, -1))
+
+
+def part(way: PeriodicResponses, rows: slice) -> PeriodicResponses:
+    """Some of the points."""
+    return _of_columns(lambda column: column[rows], way)
+
+
+def joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicResponses:
+    """The points of one after those of another."""
+    return _of_columns(lambda one, other: np.concatenate([one, other]), first, then)
+
+
+def _of_columns(make: Callable[..., Any], *ways: PeriodicResponses) -> PeriodicResponses:
+    """Responses of which each column is computed from the same columns of others."""
+    columns: dict[str, Any] = {}
+    for field in fields(PeriodicResponses):
+        those = [getattr(way, field.name) for way in ways]
+        if isinstance(those[0], dict):
+            columns[field.name] = {name: make(*(column[name] for column in those)) for name in those[0]}
+        elif those[0] is not None:
+            columns[field.name] = make(*those)
+    return PeriodicResponses(**columns)

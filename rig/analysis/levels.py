@@ -39,14 +39,14 @@ def level_range(
 
 
 def most_points(points: int, least: int) -> int:
-    """``points`` where it is a number of points that makes sense."""
+    """``points`` if it lies within the allowed range; raises `ConfigurationError` otherwise."""
     if not least <= points <= _MOST_POINTS:
         raise ConfigurationError(f"points = {points}: allowed is {least} to {_MOST_POINTS}")
     return points
 
 
 def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicResponses, int]:
-    """A backbone over the voltages of the bench, and the number of its last point that the bench may be driven at."""
+    """A backbone over the voltages of the bench, and the index of its last point within the bench's limits."""
     limit_v = subject.bench.limits.voltage_v
     volts = np.geomspace(_LOWEST_SHARE * limit_v, limit_v, _SEARCHED)
     try:

@@ -1,19 +1,71 @@
-"""A finished analysis: something that can be printed, drawn and turned into JSON."""
+"""`Study`: a finished analysis that can be printed, drawn and turned into JSON; and what its figures share."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.plain import plain
+import numpy as np
+from numpy.typing import NDArray
+
 from rig.analysis.subject import Subject
 from rig.errors import RecordingError
 from rig.text.printable import printable
+from simulators.analysis import PeriodicResponses
+from simulators.layout import Flag
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Study", "check_ending", "draw"]
+__all__ = [
+    "LEVEL_COLOURS",
+    "Study",
+    "check_ending",
+    "draw",
+    "length_unit",
+    "level_colour",
+    "plain",
+    "points_of",
+    "roomy",
+]
+
+
+def plain(value: Any) -> Any:
+    """``value`` with arrays as lists, dataclasses as dictionaries, and a complex number as ``[re, im]``."""
+    if isinstance(value, PeriodicResponses):
+        return points_of(value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        parts = np.stack([value.real, value.imag], axis=-1) if np.iscomplexobj(value) else value
+        return parts.tolist()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def points_of(responses: PeriodicResponses) -> list[dict[str, Any]]:
+    """One dictionary per point with everything that is known of it; flags by their names."""
+    columns: dict[str, Any] = {
+        field.name: getattr(responses, field.name)
+        for field in fields(responses)
+        if field.name != "flags" and getattr(responses, field.name) is not None
+    }
+    return [
+        {
+            **{
+                name: plain({key: item[k] for key, item in column.items()} if isinstance(column, dict) else column[k])
+                for name, column in columns.items()
+            },
+            "flags": [str(flag.name).lower() for flag in Flag if responses.flags[k] & int(flag)],
+        }
+        for k in range(responses.frequency_hz.size)
+    ]
+
 
 FIGURE_ENDINGS = (".png", ".pdf", ".svg")
 
@@ -103,3 +155,26 @@ def check_ending(figure: Path) -> None:
     """`RecordingError` unless ``figure`` ends like a figure that can be drawn."""
     if figure.suffix.lower() not in FIGURE_ENDINGS:
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+
+
+LEVEL_COLOURS = "viridis"
+
+
+def length_unit(largest_m: float) -> tuple[float, str]:
+    """Factor and name of the unit for displacements up to ``largest_m``."""
+    return (1e6, "µm") if largest_m < 5e-4 else (1e3, "mm")
+
+
+def level_colour(number: int, count: int) -> tuple[float, float, float, float]:
+    """Colour of one of several levels, dark to light."""
+    from matplotlib import colormaps
+
+    return colormaps[LEVEL_COLOURS](0.85 * number / max(1, count - 1))
+
+
+def roomy(axis: "Axes", values: NDArray[np.float64], least_share: float) -> None:
+    """Let the y axis span at least a share of its middle value, so that small changes look small."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    middle, half = 0.5 * (low + high), 0.55 * (high - low)
+    half = max(half, 0.5 * least_share * abs(middle))
+    axis.set_ylim(middle - half, middle + half)

@@ -1,4 +1,4 @@
-"""What is analysed: the virtual rig behind a bench, the mode under test, and what the bench may be asked for."""
+"""What is analysed: the virtual rig behind a bench, the mode under test, and the limits of the bench."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,7 +43,7 @@ class Demand:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A bench with the virtual rig behind it; of a rig that scatters the nominal specimen."""
+    """A bench and its virtual rig; of a rig that scatters, the nominal one."""
 
     bench: Bench
     rig: VirtualRig
@@ -69,7 +69,7 @@ class Subject:
         return (*(scatter if self.rig.scatters else ()), *(wear if self.rig.wear.wears else ()), *self.remarks)
 
     def demands(self, responses: PeriodicResponses) -> list[Demand]:
-        """What the points ask of the bench, beside what it allows."""
+        """Demands of the points on the bench, with their limits."""
         limits, omega = self.bench.limits, 2.0 * np.pi * responses.frequency_hz
         moving = [
             responses.sensor_harmonics[channel.name]
@@ -87,7 +87,7 @@ class Subject:
         ]
 
     def within(self, responses: PeriodicResponses) -> NDArray[np.bool_]:
-        """Points [n] that the bench may be asked for and that raise no flag."""
+        """Which points [n] lie within the limits and raise no flag."""
         inside = [demand.values <= _TOLERANCE * demand.limit for demand in self.demands(responses)]
         low, high = self.bench.limits.frequency_hz
         frequency = (responses.frequency_hz >= low) & (responses.frequency_hz <= high)
@@ -136,7 +136,7 @@ def positive(name: str, value: float) -> float:
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """What the physics refuses, as the bench's own error."""
+    """Turn a `ValueError` of the simulators into a `ConfigurationError`."""
     try:
         yield
     except ValueError as error:

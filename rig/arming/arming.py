@@ -20,26 +20,26 @@ CHECK = "check"
 
 @dataclass(frozen=True)
 class ArmingRequest:
-    """What a person is told before arming."""
+    """What a person is shown before arming."""
 
     bench: Bench
     """The bench."""
     what: str
     """Kind of campaign that is to run."""
     identity: dict[str, str]
-    """What stands behind the driver."""
+    """Identity of the device."""
     memory: BenchMemory
     """Last check and trip."""
     cautions: tuple[str, ...]
-    """What speaks against it, one line each."""
+    """Reasons against arming, one line each."""
     unseen: tuple[str, ...] = ()
-    """Those of them that only a person who is shown them takes back: a trip, a device that has latched."""
+    """Those reasons that only a person who has seen them can overrule: a trip, a device that has latched."""
     unguarded: str = ""
-    """Why a person has to stand by, and no switch or bench may arm: the output outlives the host; empty where it does not."""
+    """Why only a person may arm: the output outlives the host. Empty if it does not."""
 
     @property
     def unguarded_refusal(self) -> str:
-        """The line with which a switch, or a bench that arms itself, is refused where it is ``unguarded``."""
+        """The line that refuses a switch, or a bench that arms itself, if the output is ``unguarded``."""
         return (
             f"bench {self.bench.name}: {self.unguarded}; run at a terminal without `arm` and type the bench's name, or test "
             "such a stop and set [arming] hardware_emergency_stop = true"
@@ -63,16 +63,16 @@ class ArmingRequest:
 
 
 Arm = bool | Callable[[ArmingRequest], bool] | None
-"""A person's word: given beforehand, asked for by a callable, or neither."""
+"""Permission to move a rig: given beforehand (True), asked for by a callable, or not given (None, False)."""
 
 
 def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]:
-    """How the bench was armed and by whom, for the record; a person who is asked also takes back a trip.
+    """Arm the bench; return how and by whom, for the record. A person who arms it also clears a remembered trip.
 
-    A rig whose driver says ``virtual`` arms itself. ``[arming] automated`` does where nothing speaks against it. A word given
-    beforehand, ``arm`` True, does where no trip is remembered and the device has not latched: nobody has seen those. Neither
-    does where the output would outlive the host and no hardware emergency stop is declared. Raises `NotArmed`, which says how
-    to arm, before anything has moved.
+    A virtual rig needs no arming. ``[arming] automated`` arms a bench if there are no reasons against it. ``arm`` True arms it
+    unless a trip is remembered or the device has latched, because nobody has seen those. Neither suffices if the output would
+    outlive the host and no hardware emergency stop is declared. Raises `NotArmed`, which says how to arm, before anything has
+    moved.
     """
     if session.capabilities.virtual:
         return {"how": "virtual", "by": "", "at": now(), "cautions": []}
@@ -115,9 +115,9 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
 
 
 def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str]) -> tuple[str, ...]:
-    """What speaks against arming for ``what``: limits that do not fit the sensors, no check, or one that does not count.
+    """Reasons against arming for ``what``: limits that do not fit the sensors, no check, or a check that does not count.
 
-    A check itself needs neither: it moves the rig gently, and finds both.
+    A check has none: it moves the rig gently, and finds such faults.
     """
     check = memory.check
     if what == CHECK:
@@ -138,9 +138,9 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[
 
 
 def unguarded_text(bench: Bench, capabilities: Capabilities) -> str:
-    """Why a hardware emergency stop is asked for, for a caution; empty where none is.
+    """Why a hardware emergency stop is needed; empty if it is not.
 
-    A switch on an input channel (``[emergency_stop]``) does not count: the host reads it, and it is the host that is gone.
+    A switch on an input channel (``[emergency_stop]``) does not count, because the host reads it and may be dead.
     """
     if capabilities.safe_without_host or bench.arming.hardware_emergency_stop:
         return ""
@@ -151,7 +151,7 @@ def unguarded_text(bench: Bench, capabilities: Capabilities) -> str:
 
 
 def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:
-    """What nobody has looked at yet: a trip, or a run without an end; what the device has latched."""
+    """What no person has seen yet: a trip, a run without an end, flags latched in the device."""
     out: list[str] = []
     if memory.trip is not None:
         out.append(f"the last run tripped: {memory.trip.text}" if memory.trip.recording else memory.trip.text)
@@ -161,7 +161,7 @@ def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:
 
 
 def asked_once(arm: Arm) -> Arm:
-    """The same word for several parts of one recording: a person is asked before the first only, and after a trip again."""
+    """Permission for several parts of one recording: a person is asked before the first part, and again after a trip."""
     if not callable(arm):
         return arm
     answers: list[bool] = []

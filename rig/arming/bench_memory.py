@@ -1,7 +1,7 @@
-"""What is remembered of a bench from run to run: its last check, and a trip after which a person has to look.
+"""What is remembered of a bench from run to run: its last check, and a trip that a person has to look at.
 
 One small JSON file a bench in the user's state folder (``$XDG_STATE_HOME/vibrolock/benches``), replaced whole. Nothing is kept
-of virtual rigs.
+about virtual rigs.
 """
 
 import hashlib
@@ -56,17 +56,17 @@ class RememberedTrip:
     text: str
     """What tripped."""
     recording: str
-    """Path of the recording; empty where it is not a run that tripped, but a file that cannot be read."""
+    """Path of the recording; empty if no run tripped but this memory could not be read."""
 
 
 @dataclass(frozen=True)
 class BenchMemory:
-    """All that is remembered of a bench."""
+    """What is remembered of a bench."""
 
     check: RememberedCheck | None = None
     """Its last check."""
     trip: RememberedTrip | None = None
-    """The trip that the next run needs a person for."""
+    """The last trip, until a person has armed the bench again."""
 
 
 def memory_path(bench: Bench) -> Path:
@@ -80,10 +80,10 @@ def memory_path(bench: Bench) -> Path:
 
 
 def fingerprint(bench: Bench, identity: Mapping[str, str]) -> str:
-    """Of what a check depends on: channels, emergency stop, driver, rate, range, and which device it was.
+    """Digest of what a check depends on: channels, emergency stop, driver, rate, range, and the device.
 
-    ``identity`` is what the driver says of the device, of which ``serial_number`` counts, if it has one. The port may change,
-    the wiring may not.
+    Of ``identity``, the driver's description of the device, only ``serial_number`` counts. The port may change, the channels
+    may not.
     """
     kept = {"channels", "sample_rate_hz", "output_range_v", "emergency_stop"}
     table = bench.model_dump(mode="json", include=kept)
@@ -93,7 +93,7 @@ def fingerprint(bench: Bench, identity: Mapping[str, str]) -> str:
 
 
 def memory_of(bench: Bench) -> BenchMemory:
-    """What is remembered; a file that cannot be read counts as a trip, for it may have held one."""
+    """What is remembered of a bench. A file that cannot be read counts as a trip, because it may have held one."""
     path = memory_path(bench)
     try:
         if not path.exists():
@@ -113,13 +113,13 @@ def memory_of(bench: Bench) -> BenchMemory:
 
 
 def _check_time(at: str) -> None:
-    """Raise `ValueError` or `TypeError` for what is no moment, or one of an unknown time zone."""
+    """Raise `ValueError` or `TypeError` for what is not a time, or a time without time zone."""
     if datetime.fromisoformat(at).tzinfo is None:
         raise ValueError(f"at = {at!r}: has no time zone")
 
 
 def remember(bench: Bench, **changes: Any) -> None:
-    """Replace ``check`` or ``trip`` of what is remembered; `RecordingError` where it cannot be written."""
+    """Replace ``check`` or ``trip`` in the memory; raise `RecordingError` if it cannot be written."""
     path = memory_path(bench)
     memory = replace(memory_of(bench), **changes)
     try:

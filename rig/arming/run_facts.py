@@ -1,4 +1,4 @@
-"""Who runs a test, on which specimen, with what remarks: facts that stand with every part of a recording."""
+"""Operator, specimen and notes of a test: facts recorded with every part of a recording."""
 
 import getpass
 import os
@@ -14,17 +14,17 @@ __all__ = ["About", "calibration_remarks", "user_name"]
 
 @dataclass(frozen=True)
 class About:
-    """What a person adds to a run.
+    """Facts that a person adds to a run.
 
     Raises `ConfigurationError` for text that cannot be printed in one line.
     """
 
     operator: str | None = None
-    """Who runs it; without one ``VIBROLOCK_OPERATOR`` or the user of the operating system."""
+    """Who runs the test; if None, ``VIBROLOCK_OPERATOR`` or the user of the operating system."""
     specimen_serial: str = ""
     """Serial number of the specimen."""
     notes: tuple[str, ...] = ()
-    """Anything else, one line each."""
+    """Notes, one line each."""
     purpose: str = ""
     """What the run belongs to: ``check`` or ``tuning``; empty for a campaign on its own."""
 
@@ -35,7 +35,7 @@ class About:
                 raise ConfigurationError(f"{name} = {text!r}: allowed is printable text in one line")
 
     def facts(self) -> dict[str, Any]:
-        """As they are recorded."""
+        """The facts as they are recorded."""
         return {
             "operator": self.operator or user_name(),
             "specimen_serial": self.specimen_serial,

@@ -13,7 +13,7 @@ __all__ = ["Campaign"]
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """One kind of campaign; it stands in its own folder, and in one line of `rig.campaigns.kinds`."""
+    """One kind of campaign: the end of `points.py` in its own folder, and one line in `rig.campaigns.kinds`."""
 
     plan: type[Plan]
     """Model of its plans."""

@@ -1,13 +1,13 @@
 """The kinds of campaigns: one line for each, which stands in its own folder."""
 
-from rig.campaigns.backbone.campaign import BACKBONE
-from rig.campaigns.continuous_backbone.campaign import CONTINUOUS_BACKBONE
-from rig.campaigns.dwell.campaign import DWELL
-from rig.campaigns.multisine.campaign import MULTISINE
-from rig.campaigns.response_controlled.campaign import RESPONSE_CONTROLLED
-from rig.campaigns.stepped_phase.campaign import STEPPED_PHASE
-from rig.campaigns.stepped_sine.campaign import STEPPED_SINE
-from rig.campaigns.sweep.campaign import SWEEP
+from rig.campaigns.backbone.points import BACKBONE
+from rig.campaigns.continuous_backbone.points import CONTINUOUS_BACKBONE
+from rig.campaigns.dwell.points import DWELL
+from rig.campaigns.multisine.points import MULTISINE
+from rig.campaigns.response_controlled.points import RESPONSE_CONTROLLED
+from rig.campaigns.stepped_phase.points import STEPPED_PHASE
+from rig.campaigns.stepped_sine.points import STEPPED_SINE
+from rig.campaigns.sweep.points import SWEEP
 
 __all__ = ["KINDS", "kinds_that_yield"]
 

@@ -1,4 +1,4 @@
-"""From the recording of a check to its findings; another check may stand beside it as reference."""
+"""From the recording of a check to its findings, with or without an earlier check as reference."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +14,7 @@ from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
 from rig.check.findings import Finding, failed
-from rig.check.judging import driven_findings
-from rig.check.latency import latency_findings
+from rig.check.judging import driven_findings, latency_findings
 from rig.check.reference import reference_findings
 from rig.check.responses import Mode, Responses, responses_of
 from rig.check.silence import silent_findings
@@ -27,13 +26,13 @@ from rig.tick.safety.layout import EndReason
 __all__ = ["PURPOSE", "Assessment", "assess", "is_check", "responses_in"]
 
 PURPOSE = "check"
-SKIPPED = 0.1  # of the silence: what the converter and its filters begin with
+SKIPPED = 0.1  # part of the silence at its beginning, left out for the transient of the filters
 CUT_SHORT = "the multisine was not played to its end"
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """What a check has found."""
+    """Result of a check."""
 
     bench: Bench
     """The bench as it was."""
@@ -42,22 +41,22 @@ class Assessment:
     level_rms_v: float | None
     """Level of the multisine that was evaluated, V RMS."""
     findings: tuple[Finding, ...]
-    """All that was looked at."""
+    """Findings, good and bad."""
     responses: Responses | None
-    """What was measured; None where the run was cut short."""
+    """Measured responses; None if the run was cut short."""
     mode: Mode | None
     """The mode under test."""
     reference: Responses | None
-    """What was measured in the reference."""
+    """Responses of the reference."""
 
     @property
     def verdict(self) -> Literal["passed", "failed"]:
-        """``failed`` where anything has."""
+        """``failed`` if any finding has failed."""
         return "failed" if self.failed else "passed"
 
     @property
     def failed(self) -> tuple[str, ...]:
-        """What failed."""
+        """Labels of the findings that failed."""
         return failed(self.findings)
 
 
@@ -67,7 +66,7 @@ def is_check(recording: Recording) -> bool:
 
 
 def assess(recording: Recording, reference: Recording | None = None) -> Assessment:
-    """Findings of a recorded check; `RecordingError` where one of the two is none."""
+    """Findings of a recorded check; raises `RecordingError` if a recording is not that of a check."""
     bench = bench_of_recording(recording)
     plan = _plan(recording)
     findings = [
@@ -95,12 +94,12 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
 
 
 def _limits(bench: Bench) -> list[Finding]:
-    """What of the bench's numbers does not fit; a bench that was refused has no recording to be read here."""
+    """Warnings on numbers of the bench that do not fit together."""
     return [Finding("limits", "", "warn", one.value, one.unit, one.allowed, one.line) for one in objections(bench)]
 
 
 def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> list[Finding]:
-    """What the check has not looked at: amplifier and shaker above the voltage that was played."""
+    """Note that amplifier and shaker were not tested above the voltage that was played."""
     if level_rms_v is None:
         return []
     part = recording.parts[-1]
@@ -113,7 +112,7 @@ def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> 
 
 
 def responses_in(recording: Recording) -> Responses | None:
-    """What the multisine of a check tells; None where it was not played to its end."""
+    """Responses from the multisine of a check; None if it was not played to its end."""
     if not is_check(recording):
         raise RecordingError(f"{recording.path}: is not the recording of a check")
     bench, plan = bench_of_recording(recording), _plan(recording)
@@ -145,7 +144,7 @@ def _silence(recording: Recording, bench: Bench, plan: MultisinePlan) -> np.ndar
 
 
 def _how_it_ended(recording: Recording, bench: Bench) -> list[Finding]:
-    """A finding where the run did not end by itself; it names the channel that tripped."""
+    """A finding if the run was ended early, with the channel that tripped."""
     end = recording.parts[-1].end
     if end is None:
         return [Finding("run", "", "fail", text="the recording was cut short")]

@@ -20,7 +20,7 @@ __all__ = ["draw_check", "write_check"]
 COLOURS = (MAIN, SECOND, "#4f8f4f", "#8064a2", "#c9a227", "#3aa6a6")
 MOST_LINES, WIDTH, LINE_IN = 22, 72, 0.128
 VERDICTS = {"fail": SECOND, "warn": "#b07d00", "not tested": "#707070"}
-"""Colours of what is not in order, the worst first."""
+"""Colours of the verdicts other than ok, the worst first."""
 
 
 def write_check(found: Assessment, figure: Path) -> None:
@@ -38,7 +38,7 @@ def write_check(found: Assessment, figure: Path) -> None:
 
 
 def draw_check(page: "Figure", found: Assessment) -> None:
-    """Accelerations per force, phase of the velocity, force per volt, dashed those of the reference; what is not in order.
+    """Accelerations per force, phase of the velocity, force per volt (dashed: the reference), and a list of faults.
 
     The velocity of a passive structure's drive point keeps within 90 degrees of the force.
     """
@@ -92,7 +92,7 @@ def _dead(found: Assessment) -> set[str]:
 
 
 def _per_force(found: Assessment) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Responses to the force, and by name those of the reference on the same lines."""
+    """Responses to the force, and those of the reference on the same lines, by name."""
     if found.responses is None:
         return np.zeros((0, 0)), {}
     force = found.responses.names[found.bench.index_of("force")]
@@ -118,7 +118,7 @@ def _draw_force(axis: "Axes", found: Assessment) -> None:
 
 
 def _say_findings(axis: "Axes", found: Assessment) -> None:
-    """What is not in order, the worst first, with what to do about it."""
+    """List the findings that are not ok, the worst first, with what to do about them."""
     from matplotlib.transforms import ScaledTranslation
 
     axis.set_axis_off()

@@ -1,4 +1,4 @@
-"""What a check finds, one line for each thing that was looked at."""
+"""`Finding`: the result of one test of a check."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,20 +11,20 @@ Verdict = Literal["ok", "warn", "fail", "not tested"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
+    """The result of one test."""
 
     name: str
-    """What: ``noise``, ``polarity`` and so on."""
+    """Name of the test: ``noise``, ``polarity`` and so on."""
     channel: str
-    """The channel; empty where it concerns the whole bench."""
+    """The channel; empty if the test is of the whole bench."""
     verdict: Verdict
-    """How it is."""
+    """The verdict."""
     value: float | None = None
-    """The number."""
+    """The measured value."""
     unit: str = ""
     """Its unit."""
     allowed: str = ""
-    """What it may be."""
+    """The allowed range, in words."""
     text: str = ""
     """What to do about it, or why it was not tested."""
 
@@ -35,12 +35,12 @@ class Finding:
 
 
 def graded(value: float, ok: tuple[float, float], tolerated: tuple[float, float]) -> Verdict:
-    """``ok`` within the inner range, ``warn`` within the outer one, else ``fail``; a number that is none fails."""
+    """``ok`` within the inner range, ``warn`` within the outer one, else ``fail``; NaN fails."""
     if ok[0] <= value <= ok[1]:
         return "ok"
     return "warn" if tolerated[0] <= value <= tolerated[1] else "fail"
 
 
 def failed(findings: Iterable[Finding]) -> tuple[str, ...]:
-    """Labels of what failed."""
+    """Labels of the findings that failed."""
     return tuple(finding.label for finding in findings if finding.verdict == "fail")

@@ -1,19 +1,71 @@
-"""Findings from the driven part of a check: what lives, what is reversed or swapped, how large and how late it is."""
+"""Findings from the driven part of a check: which channels live, are reversed, swapped, wrong in size, or late."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
 from rig.check.responses import BAND, FITS, Mode, Responses, fit_mode
-from rig.check.wiring import ALIKE, best_assignment, by_magnitude
 
-__all__ = ["driven_findings"]
+__all__ = ["ALIKE", "best_assignment", "by_magnitude", "by_shape", "driven_findings", "latency_findings"]
+
+Float = NDArray[np.float64]
+ALIKE = 0.03  # log ratio below which two channels cannot be distinguished
+BETTER = 0.5  # part of the misfit as wired that another assignment must not exceed
+WRONG = 0.05  # RMS log ratio from which on the wiring is in doubt
+
+
+def by_magnitude(found: Float, expected: Float) -> Float:
+    """Cost [n, n] of taking channel i for j: squared log ratio of sizes [n] in sensor volts."""
+    return np.asarray((np.log(found)[:, None] - np.log(expected)[None, :]) ** 2)
+
+
+def by_shape(found: NDArray[np.complex128], expected: NDArray[np.complex128]) -> Float:
+    """Cost [n, n] of taking response i for j over all lines [n, n_lines]: mean squared log ratio of their sizes."""
+    sizes, known = np.log(np.abs(found)), np.log(np.abs(expected))
+    return np.asarray(np.mean((sizes[:, None] - known[None]) ** 2, axis=-1))
+
+
+def best_assignment(cost: Float) -> tuple[int, ...] | None:
+    """The assignment of channels that fits far better than the declared wiring; None if there is none."""
+    rows, columns = linear_sum_assignment(cost)
+    as_wired, best = float(np.mean(np.diag(cost))), float(np.mean(cost[rows, columns]))
+    if as_wired < WRONG**2 or best > BETTER**2 * as_wired or np.array_equal(rows, columns):
+        return None
+    return tuple(int(column) for column in columns)
+
+
+LATE_SAMPLES = 0.25
+
+
+def latency_findings(bench: Bench, responses: Responses, lead_fraction: float) -> list[Finding]:
+    """Delay of each loopback beyond the latency that the driver reports, from the slope of its phase over the band.
+
+    ``lead_fraction`` is the fraction of a sample by which the rows' outputs and inputs are not aligned.
+    """
+    rows = [i for i, channel in enumerate(bench.channels) if channel.loopback]
+    if not rows:
+        text = "no channel is declared with loopback = true"
+        return [Finding("latency", "", "not tested", text=text)]
+    return [_slope(bench, responses, row, lead_fraction) for row in rows]
+
+
+def _slope(bench: Bench, responses: Responses, row: int, lead_fraction: float) -> Finding:
+    value, omega = responses.per_volt[row], 2.0 * math.pi * responses.frequency_hz / bench.sample_rate_hz
+    phase = np.unwrap(np.angle(value))
+    late = -float(np.polyfit(omega, phase, 1, w=np.abs(value))[0]) - lead_fraction
+    bad = abs(late) > LATE_SAMPLES
+    text = "more than the driver says: its queue or filter delay, or this channel's skew_samples" if bad else ""
+    name = bench.channels[row].name
+    return Finding("latency", name, "fail" if bad else "ok", late, "samples", f"+-{LATE_SAMPLES:g}", text)
+
 
 LIVES, CLEAR = 0.5, 0.98  # coherence
-POWER = 0.5  # part of the power's absolute sum that must flow one way for the way to be told
+POWER = 0.5  # part of the absolute power that must flow one way for a verdict
 SIZE_OK, SIZE_TOLERATED = (0.9, 1.1), (0.67, 1.5)
 FREQUENCY_OK, FREQUENCY_TOLERATED = (0.98, 1.02), (0.9, 1.1)
 TURN_DEG = 3.0
@@ -21,7 +73,7 @@ DISTORTED = 0.05
 
 
 def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], Mode | None]:
-    """Findings from the responses alone and the bench's own facts, and the mode under test."""
+    """Findings from the responses and the bench's facts, and the mode under test."""
     lives = _coherence(bench, responses)
     dead = {finding.channel for finding in lives if finding.verdict == "fail"}
     out = [*lives, *_distortion(bench, responses, dead)]
@@ -65,7 +117,7 @@ def _coherence(bench: Bench, responses: Responses) -> list[Finding]:
 
 
 def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Finding]:
-    """Of the force alone: an amplifier that clips shows there, and so does a specimen that is nonlinear already."""
+    """Distortion of the force, which shows a clipping amplifier and a nonlinear specimen."""
     index = bench.index_of("force")
     name, value = responses.names[index], float(responses.distortion[index])
     if name in dead:
@@ -80,7 +132,7 @@ def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Find
 
 
 def _power(bench: Bench, responses: Responses) -> Finding:
-    """Power goes into a passive structure at its drive point: the mean of force times velocity is positive."""
+    """Direction of the power: into a passive structure, the mean of force times velocity is positive."""
     force, drive = bench.index_of("force"), bench.index_of("drive")
     part = responses.frequency_hz / bench.specimen.linear_frequency_hz
     around = (part > BAND[0]) & (part < BAND[1])
@@ -142,7 +194,7 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
 
 
 def _polarities(bench: Bench, known: Sequence[int], signs: np.ndarray) -> list[Finding]:
-    """Signs of the accelerations against the force; where most of them are against it, it is the force that is reversed."""
+    """Signs of the accelerations against the force; if most are wrong, the force is reversed."""
     force = bench.channels[bench.index_of("force")].name
     names = [bench.channels[i].name for i in known]
     turned = len(known) > 2 and int(np.sum(signs < 0.0)) > len(known) / 2
@@ -187,7 +239,7 @@ def _size(name: str, ratio: float) -> Finding:
 
 
 def _delays(bench: Bench, alive: Sequence[int], mode: Mode) -> list[Finding]:
-    """Phase of the residues, which normal modes have at 0 or 180 degrees: delay of a channel behind the force's."""
+    """Delay of each channel behind the force, from the phase of its residue (0 or 180 degrees for a normal mode)."""
     out = []
     for place, i in enumerate(alive):
         residue = complex(mode.residue[place])

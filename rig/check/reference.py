@@ -1,13 +1,12 @@
-"""Findings against an earlier check of the same bench: what has changed since, and what only a comparison tells."""
+"""Findings against an earlier check of the same bench: swapped or reversed channels and changed gains."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
-from rig.check.judging import SIZE_OK, SIZE_TOLERATED
+from rig.check.judging import SIZE_OK, SIZE_TOLERATED, best_assignment, by_shape
 from rig.check.responses import Responses
-from rig.check.wiring import best_assignment, by_shape
 
 __all__ = ["on_lines_of", "reference_findings"]
 
@@ -25,7 +24,7 @@ def on_lines_of(frequency_hz: NDArray[np.float64], reference: Responses) -> Comp
 
 
 def reference_findings(bench: Bench, found: Responses, reference: Responses, dead: set[str]) -> list[Finding]:
-    """Swapped and reversed channels and changed gains, of channels that both checks have and that live."""
+    """Findings on the channels that both checks have and that are not ``dead``."""
     both = [i for i, name in enumerate(found.names) if name in reference.names and name not in dead]
     both = [i for i in both if bench.channels[i].role != "monitor"]
     if not both:

@@ -28,7 +28,7 @@ def summary(found: Assessment) -> dict[str, Any]:
 
 
 def say(facts: dict[str, Any]) -> None:
-    """A `summary` for people: the table, then what to do."""
+    """Print a `summary`: the table of findings, then what to do about them."""
     facts = printable_strings(facts)
     level = facts["level_rms_v"]
     print(f"check of {facts['specimen']} (bench {facts['bench']})" + (f", {level:.3g} V RMS" if level else ""))

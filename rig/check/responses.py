@@ -1,4 +1,4 @@
-"""What the multisine tells: coherence of every channel, responses per volt and per newton, the mode under test.
+"""From the multisine: coherence of every channel, responses per volt and per newton, the mode under test.
 
 Near the mode under test the responses of all accelerations a_i to the force at the drive point share one pole,
 
@@ -30,7 +30,7 @@ ROUNDS = 12
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """What was measured, at the excited lines."""
+    """Measured responses at the excited lines."""
 
     names: tuple[str, ...]
     """Channels of the bench, in its order."""
@@ -50,7 +50,7 @@ class Responses:
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """The mode under test as the force and the accelerations show it."""
+    """The mode under test, from force and accelerations."""
 
     frequency_hz: float
     """Natural frequency."""

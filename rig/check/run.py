@@ -1,4 +1,4 @@
-"""The check of a bench: silence, then a multisine from a thousandth of the largest voltage upwards, as an ordinary run."""
+"""The check of a bench: an ordinary run with silence, then a multisine from a thousandth of the largest voltage upwards."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the channels read at 0 V: noise floor, offset, mains hum, channels that do not move or stand at their range."""
+"""Findings at 0 V: noise floor, offset, mains hum, channels that do not change or stand at the end of their range."""
 
 import math
 

@@ -194,10 +194,10 @@ def main() -> None:
     say_what_is_imported()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a terminal that knows no µ still says what there is to say
+            stream.reconfigure(errors="backslashreplace")  # also print to a terminal that cannot show µ
     try:
         status = app(arguments, prog_name="rig", standalone_mode=False)
-        if status == STOPPED:  # typer makes a status of Ctrl-C without a word
+        if status == STOPPED:  # typer turns Ctrl-C into this status without a message
             _complain("interrupted", STOPPED)
     except (KeyboardInterrupt, typer.Abort):
         status = _complain("interrupted", STOPPED)
@@ -205,13 +205,13 @@ def main() -> None:
         if (name := getattr(error, "signal", None)) is None:
             raise
         status = _complain(f"ended by {name}", int(error.code or 0))
-    except BrokenPipeError:  # whoever read our output has seen enough
+    except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
     except Exception as error:
         if debug:
             raise
-        wrong_use = getattr(error, "format_message", None)  # typer's errors, whichever click they come from
+        wrong_use = getattr(error, "format_message", None)  # an error of typer
         if wrong_use is not None and not wrong_use():
             status = 2  # a bare `rig` has shown its help
         elif wrong_use is not None:
@@ -229,7 +229,7 @@ def _complain(line: str, status: int) -> int:
 
 
 def _one_line(error: Exception) -> str:
-    """The error in one line; anything that is not ours is named with its type."""
+    """The error in one line; an error of other code is named with its type."""
     from identification.errors import IdentificationError
     from rig.errors import RigError
 

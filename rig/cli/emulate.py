@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["emulate"]
 
 SHORTEST_BLOCK_S = 0.002
-"""Of the bench that is written: what a host of ordinary scheduling keeps up with by the clock."""
+"""Shortest block of the bench that is written: a host with ordinary scheduling keeps up with it."""
 
 
 def emulate(
@@ -113,7 +113,7 @@ def _write_bench(path: Path, text: str) -> None:
 
 
 def _block(bench: "Bench", ready: "Ready") -> int:
-    """Samples of a block: the bench's where nobody is in a hurry, else at least 2 ms, as far as the wire's frames go."""
+    """Samples of a block: the bench's in lockstep; else at least 2 ms, if the wire's frames can hold it."""
     if ready.lockstep:
         return bench.block
     wanted = math.ceil(round(SHORTEST_BLOCK_S * bench.sample_rate_hz, 6))
@@ -121,7 +121,7 @@ def _block(bench: "Bench", ready: "Ready") -> int:
 
 
 def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> str:
-    """A bench that starts from the emulated one, with its block, and names the driver that reaches it."""
+    """A bench file based on the emulated bench, with block size and driver options that reach the emulator."""
     from rig.emulator.emulated import driver_options
 
     base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench

@@ -20,7 +20,7 @@ class _Notes(logging.Handler):
     """Prints a line of the log as a note."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        with contextlib.suppress(OSError):  # whoever read this has gone
+        with contextlib.suppress(OSError):  # the reader has closed the stream
             print(f"note: {record.getMessage()}", file=sys.stderr, flush=True)
 
 
@@ -32,7 +32,7 @@ def say_what_is_imported() -> None:
 
 
 def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> None:
-    """Refuse to write over a folder, in no folder, over what is read, or over what exists unless that was asked for."""
+    """Refuse an output that is a folder, lies in no folder, is a source, or exists, unless ``overwrite``."""
     from rig.errors import RecordingError
 
     if output.is_dir():

@@ -89,5 +89,5 @@ def reproduce_(
 
 
 def _say(line: str) -> None:
-    with contextlib.suppress(OSError):  # whoever read this has gone; the study goes on
+    with contextlib.suppress(OSError):  # the reader has closed the stream; the study goes on
         print(line, file=sys.stderr, flush=True)

@@ -74,7 +74,7 @@ def tune_(
 
 
 def _as_seen_from(bench: str, plan: Path) -> str:
-    """What the plan calls the bench: a file by its way from the plan's own folder."""
+    """Name of the bench in the plan; a file by its path relative to the plan's folder."""
     if not bench.endswith(".toml") or Path(bench).is_absolute():
         return bench
     return Path(os.path.relpath(bench, plan.parent)).as_posix()

@@ -21,7 +21,7 @@ __all__ = ["Finding", "check_driver", "require_arming"]
 
 @dataclass(frozen=True)
 class Finding:
-    """What one test of the contract has found; ``detail`` says why it failed or did not apply."""
+    """Result of one test of the contract; ``detail`` says why it failed or did not apply."""
 
     test: str
     duty: str

@@ -1,4 +1,4 @@
-"""A driver under test: what the contract is told of it, and the steps that its tests share."""
+"""A driver under test: what a driver provides for the contract, and steps that the tests share."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -14,18 +14,18 @@ __all__ = ["DriverUnderTest", "NotApplicable"]
 
 
 class NotApplicable(Exception):  # noqa: N818 (not an error)
-    """A test asks for a capability that the driver says it has not; a reason to skip, said aloud."""
+    """A test needs a capability that the driver does not have, and is skipped with this reason."""
 
 
 class DriverUnderTest(ABC):
-    """What the tests know of a driver. Override `make`; and ``amplitude_v``, ``tolerance_v`` for a physical bench."""
+    """The driver as the tests see it. Override `make`; and ``amplitude_v``, ``tolerance_v`` for a physical bench."""
 
     amplitude_v = 0.05
     """Largest output of any test, V."""
     tolerance_v = 0.02
-    """How still the inputs are with 0 V on the output, V RMS."""
+    """Noise of the inputs with 0 V on the output, V RMS."""
     blocks = (1, 4, 10)
-    """Block sizes that are tried, as far as the driver takes them."""
+    """Block sizes that are tried, if the driver allows them."""
 
     @abstractmethod
     def make(self) -> DAQ:
@@ -37,7 +37,7 @@ class DriverUnderTest(ABC):
         return daq if any(channel.loopback for channel in daq.channels) else None
 
     def witness(self, daq: DAQ | None) -> float | None:
-        """Largest voltage on the converter now, V, as others see it than the driver; None where nobody looks.
+        """Largest voltage on the converter now, V, seen independently of the driver; None if that is not possible.
 
         Without a ``daq``, once the process that drove is dead. A virtual rig is looked at directly; override this for a
         device whose output is written down or measured.
@@ -50,11 +50,11 @@ class DriverUnderTest(ABC):
         return None
 
     def unplug(self, daq: DAQ) -> bool:
-        """Take the device away while it is running; False where the contract does not know how."""
+        """Take the device away while it is running; False if that is not possible."""
         return False
 
     def skip(self, reason: str) -> None:
-        """What to do with a test that does not apply; pytest's skip where pytest runs the suite."""
+        """Skip a test that does not apply: by pytest if it is installed, else by `NotApplicable`."""
         try:
             import pytest
         except ImportError:

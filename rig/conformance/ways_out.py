@@ -1,4 +1,4 @@
-"""What is on the converter once a run is over: after 0 V, stop, close, an exception, and without the host."""
+"""Tests that the output is at 0 V after a run: after 0 V, stop, close, an exception, and without the host."""
 
 import json
 import os
@@ -90,7 +90,7 @@ class WaysOutTests(DriverUnderTest):
         )
 
     def _waited_for_0_v(self) -> float:
-        """What is on the output once it is still, or the time is over; without a witness by the loopback, opened anew."""
+        """Output once it is at 0 V or the time is over; without a witness it is read from the loopback of a new driver."""
         end = time.monotonic() + self.safe_within_s
         while time.monotonic() < end:
             seen = self.witness(None)
@@ -121,7 +121,7 @@ class WaysOutTests(DriverUnderTest):
 
     @contextmanager
     def _driven(self) -> Iterator[DAQ]:
-        """A driver whose output is at the amplitude, seen by somebody else than the driver."""
+        """A driver with its output at the amplitude, confirmed independently."""
         with self.make() as daq:
             daq.start(min(10, daq.capabilities.largest_block))
             if self.witness(daq) is None and _loopback_of(daq) is None:
@@ -135,7 +135,7 @@ class WaysOutTests(DriverUnderTest):
             yield daq
 
     def _require_still(self, daq: DAQ, when: str) -> None:
-        """At once, but for the way that a message takes to the device."""
+        """Require 0 V, after the time that a message takes to the device."""
         end = time.monotonic() + MESSAGE_S
         while (seen := self.witness(daq)) is not None and seen > STILL * self.amplitude_v and time.monotonic() < end:
             time.sleep(LOOKS_S)

@@ -8,7 +8,7 @@ from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.wire.can.bus import FrameBus, PythonCanBus
-from rig.wire.can.frames import DATA_BIT_RATE_HZ
+from rig.wire.can.frames import DATA_BIT_RATE_HZ, BusTiming
 from rig.wire.can.link import CanLink
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.link import Link
@@ -38,26 +38,23 @@ class CanOptions(WireOptions):
     backend: dict[str, Any] = Field(default_factory=dict)
     """Further keyword arguments of python-can's backend, such as its bit timing."""
 
+    @property
+    def timing(self) -> BusTiming:
+        """Frames and bit rates of the bus."""
+        return BusTiming(self.fd, self.bitrate, self.data_bitrate)
+
 
 def make_bus(options: CanOptions) -> FrameBus:
-    """The bus that the options name, not yet open."""
+    """The bus that the options describe, not yet open."""
     if options.interface == "slcan":
-        return SlcanBus(str(options.channel), options.fd, options.bitrate, options.data_bitrate, options.baud)
-    return PythonCanBus(
-        options.interface,
-        options.channel,
-        options.fd,
-        options.bitrate,
-        options.data_bitrate,
-        options.node,
-        options.backend,
-    )
+        return SlcanBus(str(options.channel), options.timing, options.baud)
+    return PythonCanBus(options.interface, options.channel, options.timing, options.node, options.backend)
 
 
 class CanDAQ(WireDAQ):
     """A device that speaks the wire protocol on a CAN bus.
 
-    Options: `CanOptions`. The seed is of no use to a real device.
+    Options: `CanOptions`. The seed is ignored.
     """
 
     def __init__(self, bench: Bench, seed: int = 0) -> None:
@@ -67,12 +64,4 @@ class CanDAQ(WireDAQ):
 
     def _make_link(self) -> Link:
         can = self._can
-        return CanLink(
-            make_bus(can),
-            len(self.channels),
-            can.fd,
-            can.node,
-            can.bitrate,
-            can.data_bitrate,
-            can.dbc,
-        )
+        return CanLink(make_bus(can), len(self.channels), can.timing, can.node, can.dbc)

@@ -11,12 +11,12 @@ __all__ = ["SerialDAQ", "SerialOptions"]
 
 
 class SerialOptions(WireOptions):
-    """Where the device is, beside what all wires share."""
+    """Port and baud rate, besides the options that all wires share."""
 
     port: str = Field(min_length=1)
     """Name of the port, such as ``/dev/ttyACM0``; names under ``/dev/serial/by-id`` stay with the device."""
     baud: int = Field(3_000_000, ge=9600, le=12_000_000)
-    """Bits per second, 8N1; what carries the stream. A USB device that is its own serial port has no use for it."""
+    """Bits per second, 8N1. A USB device that is its own serial port ignores it."""
 
 
 class SerialDAQ(WireDAQ):

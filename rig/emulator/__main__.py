@@ -1,4 +1,4 @@
-"""An emulator as a process of its own: settings come as JSON on standard input, facts and counts go out as JSON lines."""
+"""An emulator as a process: settings as JSON on standard input, facts and counts as JSON lines on standard output."""
 
 import json
 import os

@@ -1,16 +1,14 @@
-"""`Device`: the device's half of the protocol, over any link, in front of any plant, without a clock: time is handed in."""
+"""`Device`: the device's half of the protocol over any link, in front of any plant. It has no clock: time is an argument."""
 
 import math
 from collections import Counter
 
 import numpy as np
 
-from rig.emulator.description import Words
-from rig.emulator.faults import Faults
-from rig.emulator.parameters import Parameters
+from rig.emulator.faults import Faults, FaultySender
+from rig.emulator.parameters import Parameters, Words
 from rig.emulator.plant import Plant
 from rig.emulator.sampling import Sampling
-from rig.emulator.sending import FaultySender
 from rig.emulator.states import Life
 from rig.wire.link import Link
 from rig.wire.messages import (
@@ -36,11 +34,11 @@ BEAT_S = 1.0 / HEARTBEATS_HZ
 
 
 class Device:
-    """A device: messages go in, and what is due goes out.
+    """A device: it takes messages, and sends samples, answers and heartbeats when they are due.
 
-    Whoever runs it hands every message to `handle`, calls `advance` at the latest at ``wake_s``, and gives both the present
-    time in seconds of any clock that only goes forward. With ``lockstep`` a block is measured once the outputs due for it
-    have come, however long that takes: as fast as the host, without deadlines. Only the watchdog then minds the clock.
+    The caller passes every message to `handle` and calls `advance` no later than ``wake_s``, both with the present time in
+    seconds of a monotonic clock. With ``lockstep`` a block is measured as soon as the outputs due for it have arrived, so the
+    device runs as fast as the host; only the watchdog then depends on the clock.
     """
 
     def __init__(
@@ -49,7 +47,7 @@ class Device:
         self.plant, self.link = plant, link
         self.faults = faults or Faults()
         self.counts: Counter[str] = Counter()
-        """What happened since the device was switched on."""
+        """Counts of events since the device was switched on."""
         self._parameters = Parameters(words, self.faults)
         self._sampling = Sampling(plant, lockstep=lockstep)
         self._life = Life(self._sampling, self._parameters, self.counts, self._beat)
@@ -62,12 +60,12 @@ class Device:
 
     @property
     def words(self) -> Words:
-        """The parameters, as they are told."""
+        """The parameters as the device reports them."""
         return self._parameters.words
 
     @property
     def state(self) -> DeviceState:
-        """Where in its life it is."""
+        """Its present state."""
         return self._life.state
 
     @property
@@ -82,12 +80,12 @@ class Device:
 
     @property
     def wake_s(self) -> float:
-        """When `advance` wants to be called."""
+        """Time by which `advance` must be called."""
         life, sender = self._life, self._sender
         return min(self._sampling.due_s, self._beat_s + BEAT_S, life.bites_s, self._reset_s, sender.wake_s)
 
     def handle(self, message: Message, now_s: float) -> None:
-        """Do what a message asks for."""
+        """Carry out a message."""
         if now_s >= self._deaf_s:
             return
         self._mind_a_stall(now_s)
@@ -156,11 +154,11 @@ class Device:
         return self._life.start(now_s)
 
     def press_emergency_stop(self) -> None:
-        """The device's own emergency stop; it acts with the next `advance`, and may be pressed from a signal handler."""
+        """Press the device's own emergency stop, also from a signal handler; it acts at the next `advance`."""
         self._pressed = True
 
     def switch_off(self, now_s: float) -> None:
-        """Switch off: 0 V."""
+        """Switch off: output to 0 V."""
         self._life.stop(now_s)
 
     def _reset(self, now_s: float) -> None:
@@ -172,7 +170,7 @@ class Device:
         self._beat(now_s)
 
     def advance(self, now_s: float) -> None:
-        """Measure and send what is due, let the watchdog bite, send heartbeats."""
+        """Measure and send blocks that are due, check the watchdog, send heartbeats."""
         if self._pressed:
             self._pressed = False
             self._life.emergency_stop(now_s)

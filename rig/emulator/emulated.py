@@ -1,4 +1,4 @@
-"""Emulators from Python: started in a process of their own, reached by an ordinary bench."""
+"""Emulators from Python: each runs in its own process and is reached by an ordinary bench."""
 
 import json
 import os
@@ -19,14 +19,14 @@ __all__ = ["Emulator", "driver_options", "emulated"]
 
 ENDING_S = 10.0
 LOCKSTEP_S = 60.0
-"""Watchdog and time-out of a bench whose device waits for the host: nothing is in a hurry, and nothing waits for ever."""
+"""Watchdog and time-out of a bench whose device waits for the host, s."""
 
 HARDWARE_S = 1.0
-"""Watchdog of one that does not say that nothing moves: drivers take no longer one."""
+"""The same watchdog where the device does not say that nothing moves, s: drivers allow no longer one."""
 
 
 def driver_options(options: dict[str, Any], *, lockstep: bool, as_hardware: bool = False) -> dict[str, Any]:
-    """Options of a driver that reaches an emulator: patient ones where the device waits for the host."""
+    """Options of a driver that reaches an emulator; with long time-outs where the device waits for the host."""
     watchdog_s = HARDWARE_S if as_hardware else LOCKSTEP_S
     patience = {"watchdog_s": watchdog_s, "timeout_s": LOCKSTEP_S} if lockstep else {}
     return {**patience, **options}
@@ -35,7 +35,7 @@ def driver_options(options: dict[str, Any], *, lockstep: bool, as_hardware: bool
 class Emulator:
     """An emulator in a process of its own; a context manager.
 
-    ``bench`` reaches it. ``counted`` is known once it has ended: watchdog trips, held blocks, damaged frames and the like.
+    ``bench`` reaches it. ``counted`` is filled when it ends: watchdog trips, held blocks, damaged frames and so on.
     Errors: `ConfigurationError` or a `DaqError` for what the emulator refuses.
     """
 
@@ -56,7 +56,7 @@ class Emulator:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            start_new_session=True,  # Ctrl-C is the host's affair
+            start_new_session=True,  # Ctrl-C at the terminal reaches the host only
         )
         assert self.process.stdin is not None
         self.process.stdin.write(self._settings.model_dump_json() + "\n")
@@ -75,7 +75,7 @@ class Emulator:
         line = self.process.stdout.readline()
         if not line:
             self.stop()
-            raise errors.DaqRefused("the emulator ended without a word")
+            raise errors.DaqRefused("the emulator ended before it could be reached")
         said: dict[str, Any] = json.loads(line)
         if "error" in said:
             self.process.wait(ENDING_S)
@@ -125,7 +125,7 @@ def emulated(
     options: dict[str, Any] | None = None,
     **settings: Any,
 ) -> Iterator[Bench]:
-    """A bench that reaches an emulator of a virtual bench, over ``serial`` or ``can``, for as long as the context lasts.
+    """Emulate a virtual bench over ``serial`` or ``can`` while the context lasts; gives a bench that reaches the emulator.
 
     ``options`` are further driver options (``queue_blocks``, ``watchdog_s``...), ``settings`` further `EmulatorSettings`.
     """

@@ -1,35 +1,106 @@
-"""What a device may do wrong, so that a host can be tested with it."""
+"""Faults of a device, so that a host can be tested with it: messages lost, repeated, reordered or late, and false facts."""
 
+import math
+from collections import deque
 from dataclasses import dataclass
 
-__all__ = ["Faults"]
+from rig.errors import DaqError
+from rig.wire.link import Link
+from rig.wire.messages import Message, Samples
+
+__all__ = ["Faults", "FaultySender"]
 
 
 @dataclass(frozen=True)
 class Faults:
-    """Nothing by default. Blocks are counted from 1; ``every`` of 0 is never."""
+    """Faults of a device; none by default. Blocks count from 1, and 0 in ``..._every`` means never."""
 
     version: int | None = None
-    """Speaks this version of the protocol only."""
+    """The only version of the protocol that it speaks."""
     channel_names: tuple[str, ...] | None = None
-    """Says that its channels are called so."""
+    """Channel names that it reports instead of the true ones."""
     channels_sent: int | None = None
-    """Sends so many channels, whatever it says."""
+    """Number of channels that it sends, whatever it reports."""
     deaf_after_s: float | None = None
-    """Understands nothing any more so long after START, and goes on sampling."""
+    """Time after START from which on it ignores all messages, but goes on sampling, s."""
     silent_after_s: float | None = None
-    """Sends nothing any more so long after START."""
+    """Time after START from which on it sends nothing, s."""
     reset_after_s: float | None = None
-    """Starts anew so long after START."""
+    """Time after START at which it resets, s."""
     drop_every: int = 0
-    """Every so many a block is lost on the way."""
+    """One of so many blocks is lost on the way."""
     drop_burst: int = 1
-    """So many in a row."""
+    """Number of blocks lost in a row."""
     repeat_every: int = 0
-    """Every so many a block comes twice."""
+    """One of so many blocks arrives twice."""
     reorder_every: int = 0
-    """Every so many a block comes after the next one."""
+    """One of so many blocks arrives after the next one."""
     late_every: int = 0
-    """Every so many a block, and all behind it, come late."""
+    """One of so many blocks, and all messages after it, arrive late."""
     late_s: float = 0.05
-    """By so much."""
+    """By how much they are late, s."""
+
+
+class FaultySender:
+    """Sends over a link, with faults. Messages that the link refuses are dropped; lost samples are counted."""
+
+    def __init__(self, link: Link, faults: Faults) -> None:
+        self._link, self._faults = link, faults
+        self.dropped_samples = 0
+        self._kept: Samples | None = None
+        self._late: deque[tuple[float, Message]] = deque()
+        self._silent_s = math.inf
+
+    @property
+    def wake_s(self) -> float:
+        """When the next late message is due."""
+        return self._late[0][0] if self._late else math.inf
+
+    def start(self, now_s: float) -> None:
+        """A new stream begins."""
+        self.dropped_samples = 0
+        self._kept = None
+        self._late.clear()
+        silent = self._faults.silent_after_s
+        self._silent_s = now_s + silent if silent is not None else math.inf
+
+    def send(self, message: Message, now_s: float) -> bool:
+        """Send a message after those that are late; False if the link refused it."""
+        if now_s >= self._silent_s:
+            return False
+        if self._late:
+            self._late.append((self._late[-1][0], message))
+            return True
+        return self._send(message)
+
+    def _send(self, message: Message) -> bool:
+        try:
+            self._link.send(message)
+        except DaqError:
+            if isinstance(message, Samples):
+                self.dropped_samples += message.counts.shape[0]
+            return False
+        return True
+
+    def flush(self, now_s: float) -> None:
+        """Send the late messages that are due."""
+        while self._late and self._late[0][0] <= now_s:
+            self._send(self._late.popleft()[1])
+
+    def send_samples(self, samples: Samples, number: int, now_s: float) -> None:
+        """Send block ``number``, counted from 1, with its faults."""
+        faults = self._faults
+        if faults.drop_every and number % faults.drop_every < faults.drop_burst and number >= faults.drop_every:
+            return
+        if faults.late_every and number % faults.late_every == 0:
+            self._late.append((now_s + faults.late_s, samples))
+            return
+        if faults.reorder_every and number % faults.reorder_every == 0:
+            self._kept = samples
+            return
+        self.send(samples, now_s)
+        if self._kept is not None:
+            kept, self._kept = self._kept, None
+            self.send(kept, now_s)
+        if faults.repeat_every and number % faults.repeat_every == 0:
+            self.send(samples, now_s)

@@ -1,15 +1,86 @@
-"""A device's parameters: what it tells, and what may be set to what."""
+"""A device's parameters: what it says of itself, and what may be set to what."""
 
-from rig.emulator.description import SETTINGS, Words
 from rig.emulator.faults import Faults
-from rig.wire.messages import Parameter, Status
-from rig.wire.parameter_words import NAME_WORDS, text_words
+from rig.emulator.plant import Plant
+from rig.wire.messages import VERSION, Parameter, Status
+from rig.wire.parameter_words import NAME_WORDS, double_words, float_word, text_words
 
-__all__ = ["Parameters"]
+__all__ = ["SETTINGS", "Parameters", "Words", "described"]
+
+Words = dict[tuple[int, int], int]
+"""Words by parameter and item."""
+
+LARGEST_BLOCK = 1000
+LARGEST_QUEUE = 64
+SHORTEST_WATCHDOG_US = 1000
+LONGEST_WATCHDOG_US = 4_000_000_000
+
+SETTINGS = {
+    Parameter.VERSION: (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION),
+    Parameter.RATE_MHZ: (Parameter.LOWEST_RATE_MHZ, Parameter.HIGHEST_RATE_MHZ),
+    Parameter.BLOCK: (None, Parameter.LARGEST_BLOCK),
+    Parameter.QUEUE: (None, Parameter.LARGEST_QUEUE),
+    Parameter.WATCHDOG_US: (Parameter.SHORTEST_WATCHDOG_US, Parameter.LONGEST_WATCHDOG_US),
+    Parameter.RAMP_US: (None, Parameter.LONGEST_WATCHDOG_US),
+}
+"""Parameters that can be set, with those that hold their bounds. Without a lower bound it is 1; 0 for the ramp."""
+
+
+def described(
+    plant: Plant,
+    *,
+    model: str = "vibrolock emulator",
+    firmware: str = "1.0",
+    serial_number: str = "0001",
+    simulated: int = 1,
+    layout_crc: int = 0,
+    boot: int = 1,
+) -> Words:
+    """The words of a device in front of a plant."""
+    words: Words = {}
+
+    def put(parameter: Parameter, word: int, item: int = 0) -> None:
+        words[int(parameter), item] = word
+
+    def put_text(parameter: Parameter, text: str, channel: int = 0) -> None:
+        for number, word in enumerate(text_words(text)):
+            put(parameter, word, NAME_WORDS * channel + number)
+
+    for parameter in (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION, Parameter.VERSION):
+        put(parameter, VERSION)
+    put_text(Parameter.MODEL, model)
+    put_text(Parameter.FIRMWARE, firmware)
+    put_text(Parameter.SERIAL_NUMBER, serial_number)
+    put(Parameter.SIMULATED, simulated)
+    put(Parameter.N_CHANNELS, len(plant.names))
+    for channel, name in enumerate(plant.names):
+        put_text(Parameter.CHANNEL_NAME, name, channel)
+        put_text(Parameter.CHANNEL_UNIT, "V", channel)
+        put(Parameter.CHANNEL_RANGE_V, float_word(float(plant.range_v[channel])), channel)
+        put(Parameter.CHANNEL_V_PER_COUNT, float_word(float(plant.v_per_count[channel])), channel)
+        put(Parameter.SKEW_NS, round(1e9 * float(plant.skew_s[channel])), channel)
+    put(Parameter.OUTPUT_RANGE_V, float_word(plant.output_range_v))
+    put(Parameter.OUTPUT_V_PER_COUNT, float_word(plant.output_v_per_count))
+    put(Parameter.BITS, plant.bits)
+    for parameter in (Parameter.LOWEST_RATE_MHZ, Parameter.HIGHEST_RATE_MHZ, Parameter.RATE_MHZ):
+        put(parameter, round(1e3 * plant.rate_hz))
+    put(Parameter.LARGEST_BLOCK, LARGEST_BLOCK)
+    put(Parameter.LARGEST_QUEUE, LARGEST_QUEUE)
+    put(Parameter.SHORTEST_WATCHDOG_US, SHORTEST_WATCHDOG_US)
+    put(Parameter.LONGEST_WATCHDOG_US, LONGEST_WATCHDOG_US)
+    put(Parameter.FILTER_DELAY_NS, round(1e9 * plant.filter_delay_s))
+    for item, word in enumerate(double_words(plant.filter_delay_s)):
+        put(Parameter.FILTER_DELAY_S, word, item)
+    for parameter, word in {Parameter.BLOCK: 1, Parameter.QUEUE: 1, Parameter.WATCHDOG_US: 100_000}.items():
+        put(parameter, word)
+    put(Parameter.RAMP_US, 50_000)
+    put(Parameter.LAYOUT_CRC, layout_crc)
+    put(Parameter.BOOT, boot)
+    return words
 
 
 class Parameters:
-    """The words of a device, as it tells them: with the lies of ``faults``."""
+    """The words of a device as it reports them, with those that ``faults`` falsify."""
 
     def __init__(self, words: Words, faults: Faults) -> None:
         self.words = dict(words)
@@ -32,7 +103,7 @@ class Parameters:
         return (Status.UNKNOWN, 0) if word is None else (Status.DONE, word)
 
     def set(self, parameter: int, item: int, value: int) -> tuple[Status, int]:
-        """Answer to SET, carried out where the value is allowed."""
+        """Answer to SET; the value is set if it is allowed."""
         bounds = {int(one): both for one, both in SETTINGS.items()}.get(parameter)
         if bounds is None or item:
             return Status.UNKNOWN, 0

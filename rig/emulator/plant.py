@@ -1,23 +1,25 @@
-"""What a device measures: something that takes voltages and gives back converter counts."""
+"""What stands behind a device's converters: a virtual rig, its wiring, and a log of the output."""
 
+import os
+import time
 from collections.abc import Mapping
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
 from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.virtual.driver import HOLD_SAMPLES
-from rig.drivers.virtual.kernels import exchange_block
-from rig.drivers.virtual.loopback import loopback_of
+from rig.drivers.virtual.kernels import Converters, exchange_block, loopback_of
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.layout import Flag
 
-__all__ = ["Plant", "VirtualPlant", "Wiring"]
+__all__ = ["LoggedPlant", "Plant", "VirtualPlant", "Wiring"]
 
-WHOLE_RANGE = 2.0**31  # counts of a converter without steps, in 32 bits
-NO_QUEUE = np.zeros(0)  # what is under way is the device's
+WHOLE_RANGE = 2.0**31  # counts of full scale where the virtual converter has no steps
+NO_QUEUE = np.zeros(0)  # the emulated device has its own queue
 
 
 class Plant(Protocol):
@@ -50,9 +52,9 @@ class Plant(Protocol):
 
 
 class Wiring:
-    """How the sensors are connected: right, or as it happens on a Monday. The plant itself is as it is.
+    """How the sensors are connected to the channels; mistakes can be made on purpose. The rig itself is unchanged.
 
-    ``flip``: sensors the other way round. ``dead``: channels that are connected to nothing and read the converter's last bit.
+    ``flip``: sensors mounted the other way round. ``dead``: channels without a sensor, which toggle their last bit.
     ``swap``: pairs of sensors in each other's sockets.
     """
 
@@ -79,7 +81,7 @@ class Wiring:
         self.as_it_should_be = not (flip or dead or swap)
 
     def connect(self, counts: np.ndarray, first: int) -> np.ndarray:
-        """Counts [n, n_channels] as the device gets them; ``first`` is the index of the first row."""
+        """Counts [n, n_channels] by channel from counts by sensor; ``first`` is the index of the first row."""
         out = counts[:, self._order] * self._sign
         for channel in self._dead:
             out[:, channel] = (np.arange(first, first + counts.shape[0]) * 7919 >> 4) & 1
@@ -87,9 +89,9 @@ class Wiring:
 
 
 class VirtualPlant:
-    """The virtual rig of a bench, its converters' counts as they are: scaled by the volts of a count they are its readings.
+    """The virtual rig of a bench, read in counts of its converters: counts times volts per count are the rig's readings.
 
-    A rig that has diverged reads full scale, overloaded.
+    A rig that has diverged reads full scale, with the overload flag.
     """
 
     def __init__(self, bench: Bench, seed: int = 0, wiring: Wiring | None = None) -> None:
@@ -116,7 +118,6 @@ class VirtualPlant:
         self.rate_hz = bench.sample_rate_hz
         self.filter_delay_s = self._rig.filter_delay_samples / bench.sample_rate_hz
         self._wiring = wiring if wiring is not None and not wiring.as_it_should_be else None
-        self._raised_count = np.zeros(len(Flag), np.int64)
         self._dtype = np.dtype(f"<i{self.bits // 8}")
         self._device_flags = {
             int(Flag.SENSOR_CLIPPED): int(DeviceFlag.OVERLOAD),
@@ -130,12 +131,13 @@ class VirtualPlant:
         """Back to rest, at sample 0, with the noise of the same seed."""
         self._realised = self._rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)
-        self._loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
+        loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
+        self._converters = Converters(NO_QUEUE, np.zeros(len(Flag), np.int64), loopback)
         self._first = 0
         self._buffers_for(0)
 
     def _buffers_for(self, n: int) -> None:
-        """The kernel writes into these without asking for their size: they are always those of the block at hand."""
+        """Allocate the kernel's output arrays for blocks of ``n``: the kernel does not check their size."""
         self._readings_v = np.empty((n, len(self.names)))
         self._raised = np.zeros(n, np.uint16)
 
@@ -149,13 +151,11 @@ class VirtualPlant:
             exchange_block(
                 self._arrays,
                 self._state,
-                NO_QUEUE,
+                self._converters,
                 self._first + part.start,
                 voltages[part],
                 self._readings_v[part],
                 self._raised[part],
-                self._raised_count,
-                self._loopback,
             )
         counts, flags = self._counted()
         if self._wiring is not None:
@@ -164,7 +164,7 @@ class VirtualPlant:
         return counts, flags
 
     def _counted(self) -> tuple[np.ndarray, int]:
-        """The readings as counts: they lie on the converter's steps and within its range, so nothing is lost."""
+        """The readings as counts. They lie on the converter's steps and within its range, so nothing is lost."""
         raised = int(np.bitwise_or.reduce(self._raised))
         scaled = self._readings_v / self.v_per_count
         flags = 0
@@ -174,3 +174,57 @@ class VirtualPlant:
             if raised & Flag.DIVERGED:
                 scaled = np.nan_to_num(scaled, nan=2.0 ** (self.bits - 1) - 1.0)
         return np.rint(scaled, out=scaled).astype(self._dtype), flags
+
+
+class LoggedPlant:
+    """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V.
+
+    A further line with 0 V marks that the device was stopped.
+
+    A file that cannot be made is a `ConfigurationError`; a disk that is full later ends the writing and nothing else.
+    """
+
+    def __init__(self, plant: Plant, path: Path) -> None:
+        self._plant = plant
+        try:
+            self._descriptor = os.open(
+                path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644
+            )  # open as long as the device lives
+        except OSError as error:
+            raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
+        self._is_full = False
+        self._first = 0
+
+    names: tuple[str, ...]
+    range_v: np.ndarray
+    v_per_count: np.ndarray
+    skew_s: np.ndarray
+    output_range_v: float
+    output_v_per_count: float
+    bits: int
+    rate_hz: float
+    filter_delay_s: float
+
+    def __getattr__(self, name: str) -> Any:
+        """Everything else is the plant's."""
+        return getattr(self._plant, name)
+
+    def reset(self) -> None:
+        """Sample 0, and 0 V on the converter."""
+        self._plant.reset()
+        self._first = 0
+        self._write(0.0)
+
+    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
+        """Write down, then measure."""
+        self._write(float(np.abs(voltages).max()))
+        self._first += voltages.size
+        return self._plant.step(voltages)
+
+    def _write(self, largest_v: float) -> None:
+        if self._is_full:
+            return
+        try:
+            os.write(self._descriptor, f"{time.monotonic():.6f} {self._first} {largest_v:.6g}\n".encode("ascii"))
+        except OSError:
+            self._is_full = True

@@ -1,4 +1,4 @@
-"""The device's end of every wire that can be emulated, and how a bench reaches it."""
+"""The device's end of each wire that can be emulated, and the driver options with which a bench reaches it."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -9,7 +9,7 @@ from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqRefused
 from rig.wire.link import Link
 from rig.wire.serial.link import SerialLink
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 
 if TYPE_CHECKING:
     from rig.wire.can.bus import FrameBus
@@ -42,7 +42,7 @@ def _slcan(settings: EmulatorSettings, descriptor: int, path: str) -> tuple[Link
     """An adapter on a pseudo-terminal, and the device on the bus behind it."""
     from rig.wire.can.slcan import SlcanBus
 
-    bus = SlcanBus(descriptor, settings.fd, data_bit_rate_hz=settings.data_bitrate, adapter=True)
+    bus = SlcanBus(descriptor, settings.timing, adapter=True)
     return _can_link(settings, bus), {"interface": "slcan", "channel": path, **_can_options(settings)}
 
 
@@ -51,9 +51,7 @@ def _can_interface(settings: EmulatorSettings) -> tuple[Link, dict[str, Any]]:
 
     assert settings.interface is not None
     assert settings.channel is not None
-    bus = PythonCanBus(
-        settings.interface, settings.channel, settings.fd, settings.bitrate, settings.data_bitrate, settings.node
-    )
+    bus = PythonCanBus(settings.interface, settings.channel, settings.timing, settings.node)
     options = {"interface": settings.interface, "channel": settings.channel, **_can_options(settings)}
     return _can_link(settings, bus), options
 
@@ -61,8 +59,7 @@ def _can_interface(settings: EmulatorSettings) -> tuple[Link, dict[str, Any]]:
 def _can_link(settings: EmulatorSettings, bus: "FrameBus") -> Link:
     from rig.wire.can.link import CanLink
 
-    channels = len(settings.bench.channels)
-    return CanLink(bus, channels, settings.fd, settings.node, settings.bitrate, settings.data_bitrate, device=True)
+    return CanLink(bus, len(settings.bench.channels), settings.timing, settings.node, device=True)
 
 
 def _can_options(settings: EmulatorSettings) -> dict[str, Any]:
@@ -72,7 +69,7 @@ def _can_options(settings: EmulatorSettings) -> dict[str, Any]:
 
 @contextmanager
 def _pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
-    """Descriptor of the near end and path of the far end, which is that of the symbolic link where one is wanted."""
+    """Descriptor of the near end and path of the far end; the path of the symbolic link, if there is one."""
     try:
         line = open_pseudo_terminal()
     except (ImportError, OSError) as error:
@@ -83,14 +80,14 @@ def _pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
         yield line.descriptor, str(link.absolute()) if link is not None else line.path
     finally:
         if link is not None:
-            with suppress(OSError):  # it may have been removed, or lead elsewhere by now
+            with suppress(OSError):  # the link may be gone or lead elsewhere by now
                 if link.readlink() == Path(line.path):
                     link.unlink()
         line.close()
 
 
 def _name(link: Path, path: str) -> None:
-    """Have a symbolic link lead to a port. One that leads nowhere was left behind and gives way."""
+    """Make a symbolic link to a port; a link to a port that no longer exists is replaced."""
     try:
         if link.is_symlink():
             target = link.readlink()

@@ -1,29 +1,64 @@
-"""The emulator: a virtual rig behind a wire, until it is told to end."""
+"""The emulator process: a virtual rig behind a wire, served at the pace of the clock until it is told to end."""
 
 import os
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from rig.emulator.description import described
 from rig.emulator.device import Device
 from rig.emulator.faults import Faults
-from rig.emulator.output_log import LoggedPlant
-from rig.emulator.pace import ask_for_priority, keep_serving
-from rig.emulator.plant import Plant, VirtualPlant, Wiring
+from rig.emulator.parameters import described
+from rig.emulator.plant import LoggedPlant, Plant, VirtualPlant, Wiring
 from rig.emulator.ports import device_end
 from rig.emulator.settings import EmulatorSettings
+from rig.system.privileges import prepare
 from rig.wire.link import Link
 
-__all__ = ["Ready", "run_emulator"]
+__all__ = ["Ready", "ask_for_priority", "keep_serving", "run_emulator"]
+
+PRIORITY = 60
+"""Of SCHED_FIFO: below the wall-clock loop's, above the kernel's interrupt threads."""
+MOST_AT_ONCE = 64  # messages read after a late deadline
+
+
+def keep_serving(device: Device, should_end: Callable[[], bool], clock: Callable[[], float] = time.monotonic) -> None:
+    """Serve a host until ``should_end``, which is called at every message and ten times a second, returns true.
+
+    Deadlines are absolute times of ``clock``. If this process notices a deadline late, messages that have arrived until then
+    count as in time, because the host is not to blame. Raises `rig.errors.DaqDisconnected` when the link is gone for good.
+    """
+    receive, handle, advance = device.link.receive, device.handle, device.advance
+    advance(clock())
+    while not should_end():
+        wake_s = device.wake_s
+        message = receive(max(0.0, wake_s - clock()))
+        now_s = clock()
+        if message is not None:
+            handle(message, min(now_s, wake_s))
+            if now_s >= wake_s:
+                for _ in range(MOST_AT_ONCE):
+                    message = receive(0.0)
+                    if message is None:
+                        break
+                    handle(message, wake_s)
+                now_s = clock()
+        advance(now_s)
+    device.switch_off(clock())
+
+
+def ask_for_priority() -> str:
+    """Request real-time scheduling and locked memory, and turn off garbage collection; return the scheduling granted."""
+    scheduling = prepare(priority=PRIORITY)["scheduling"]
+    return scheduling if scheduling.startswith("SCHED") else "ordinary scheduling"
 
 
 @dataclass
 class Ready:
-    """What there is to say once an emulator can be reached."""
+    """Facts on an emulator that can now be reached."""
 
     wire: str
     options: dict[str, Any]
@@ -31,18 +66,18 @@ class Ready:
     lockstep: bool
     scheduling: str
     largest_block: int
-    """Samples that a block may have on this wire."""
+    """Largest number of samples in a block on this wire."""
     process: int = field(default_factory=os.getpid)
 
 
 class _End:
-    """Whether to end: on SIGTERM, SIGINT or SIGHUP, or once the process that wanted the emulator is gone."""
+    """Whether to end: after SIGTERM, SIGINT or SIGHUP, or when the parent process is gone."""
 
     def __init__(self, parent: int | None) -> None:
         self._parent = parent
         self._told = False
         for name in ("SIGTERM", "SIGINT", "SIGHUP"):
-            if hasattr(signal, name):  # the last not on every system
+            if hasattr(signal, name):  # SIGHUP does not exist on every system
                 signal.signal(getattr(signal, name), self._tell)
 
     def _tell(self, _number: int, _frame: object) -> None:
@@ -55,7 +90,7 @@ class _End:
 def run_emulator(
     settings: EmulatorSettings, when_ready: Callable[[Ready], None], *, parent: int | None = None
 ) -> dict[str, int]:
-    """Emulate a device until told to end; returns what it counted.
+    """Emulate a device until it is told to end; return what it has counted.
 
     ``when_ready`` is called once it can be reached. With ``parent`` it ends as soon as that process is no longer its
     parent. SIGUSR1 presses the emergency stop. Raises `ConfigurationError`, `rig.errors.DaqError`.
@@ -79,7 +114,7 @@ def _plant(settings: EmulatorSettings) -> Plant:
     if settings.log_output is not None:
         plant = LoggedPlant(plant, settings.log_output)
     plant.reset()
-    plant.step(np.zeros(settings.bench.block))  # what has to be compiled is compiled before anybody waits for it
+    plant.step(np.zeros(settings.bench.block))  # compile the kernels before a host waits for samples
     plant.reset()
     return plant
 

@@ -1,4 +1,4 @@
-"""What an emulator is told when it is started."""
+"""Settings of an emulator."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -9,13 +9,13 @@ from pydantic import Field, model_validator
 from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.emulator.faults import Faults
-from rig.wire.can.frames import DATA_BIT_RATE_HZ
+from rig.wire.can.frames import DATA_BIT_RATE_HZ, BusTiming
 
 __all__ = ["EmulatorSettings"]
 
 
 class EmulatorSettings(Configured):
-    """A virtual bench behind a wire."""
+    """A virtual bench behind a wire, and how it behaves there."""
 
     wire: Literal["serial", "can"]
     """The wire protocol it speaks."""
@@ -24,21 +24,21 @@ class EmulatorSettings(Configured):
     seed: int = Field(0, ge=0)
     """Seed of the rig's noise."""
     lockstep: bool = False
-    """Measure a block when its outputs have come, instead of by the clock."""
+    """Measure a block when its outputs have arrived, instead of by the clock."""
     as_hardware: bool = False
-    """Do not say that nothing physical moves: what is asked of people before a real test is asked here too."""
+    """Do not report that nothing physical moves, so that arming is asked for as on a real rig."""
     flip: tuple[str, ...] = ()
     """Sensors mounted the other way round."""
     dead: tuple[str, ...] = ()
-    """Channels that are connected to nothing."""
+    """Channels that are not connected."""
     swap: tuple[tuple[str, str], ...] = ()
     """Pairs of sensors in each other's sockets."""
     serial_number: str = Field("0001", max_length=32)
-    """Serial number that the device tells."""
+    """Serial number that the device reports."""
     link: Path | None = None
-    """Symbolic link to the pseudo-terminal, so that the port has a name that stays."""
+    """Symbolic link to the pseudo-terminal, so that the port has a fixed name."""
     log_output: Path | None = None
-    """File for the device's output, a line a block."""
+    """Log of the device's output, one line per block."""
     interface: str | None = None
     """CAN: interface of python-can, or slcan over a pseudo-terminal if left out."""
     channel: str | None = None
@@ -52,7 +52,12 @@ class EmulatorSettings(Configured):
     node: int = Field(1, ge=0, le=15)
     """CAN: number of the device on its bus."""
     faults: dict[str, Any] = Field(default_factory=dict)
-    """What the device shall do wrong; see `Faults`."""
+    """Faults of the device; fields of `Faults`."""
+
+    @property
+    def timing(self) -> BusTiming:
+        """CAN: frames and bit rates of the bus."""
+        return BusTiming(self.fd, self.bitrate, self.data_bitrate)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -1,4 +1,4 @@
-"""A device's life: which state it is in, what has latched, and the watchdog; every way out of ARMED leads to 0 V."""
+"""States of a device, what has latched, and the watchdog. Every transition out of ARMED brings the output to 0 V."""
 
 import math
 from collections import Counter
@@ -12,9 +12,9 @@ __all__ = ["Life"]
 
 
 class Life:
-    """States and the ways between them.
+    """States and the transitions between them.
 
-    ``changed`` is called at every change of state, with the time. Commands return what they are answered with.
+    ``changed`` is called with the time at every change of state. Commands return the status and value of their answer.
     """
 
     def __init__(
@@ -29,21 +29,21 @@ class Life:
 
     @property
     def bites_s(self) -> float:
-        """When the watchdog will bite unless it is fed."""
+        """Time at which the watchdog trips unless it is fed before."""
         return self._fed_s + self._watchdog_s
 
     def feed(self, now_s: float, *, in_time: bool) -> None:
-        """A valid output has come; one that is late altogether moves nothing, and so does not quieten the watchdog."""
+        """Note a valid output. One that is entirely late reaches no converter, so it does not feed the watchdog."""
         if self.state is DeviceState.ARMED:
             self._fed_s = now_s if in_time else self._fed_s
             self._sampling.has_output = True
 
     def stand_still(self, late_s: float) -> None:
-        """Our clock stood still for so long."""
+        """Extend the watchdog by a time for which the device clock stood still."""
         self._fed_s += late_s
 
     def watch(self, now_s: float) -> None:
-        """Let the watchdog bite if it is time."""
+        """Trip the watchdog if its time is over."""
         bites_s = self.bites_s
         if now_s >= bites_s and self.state is DeviceState.ARMED:
             self._counts["watchdog_trips"] += 1
@@ -51,7 +51,7 @@ class Life:
             self._bring_down(bites_s, DeviceState.LATCHED, 1e-6 * self._parameters.value(Parameter.RAMP_US))
 
     def start(self, now_s: float) -> tuple[Status, int]:
-        """Begin to sample, with the settings in force."""
+        """Begin to sample with the present settings."""
         if self.state is DeviceState.LATCHED:
             return Status.LATCHED, self.latch
         if self.state is not DeviceState.IDLE:
@@ -64,7 +64,7 @@ class Life:
         return Status.DONE, 0
 
     def arm(self, key: int, now_s: float) -> tuple[Status, int]:
-        """Let outputs through."""
+        """Pass outputs to the converter."""
         if key != ARM_KEY:
             return Status.NOT_ALLOWED, 0
         if self.state is DeviceState.LATCHED:
@@ -83,7 +83,7 @@ class Life:
         return Status.DONE, int(self.state)
 
     def stop(self, now_s: float) -> tuple[Status, int]:
-        """0 V at once, end sampling; what has latched stays so."""
+        """0 V at once, end sampling; latched flags stay."""
         self._sampling.stop()
         self._fed_s = math.inf
         if self.state is not DeviceState.LATCHED:
@@ -91,7 +91,7 @@ class Life:
         return Status.DONE, int(self.state)
 
     def clear(self, now_s: float) -> tuple[Status, int]:
-        """Forget what has latched."""
+        """Clear latched flags."""
         if self._sampling.on:
             return Status.WRONG_STATE, int(self.state)
         self.latch = 0
@@ -105,7 +105,7 @@ class Life:
         self._bring_down(now_s, DeviceState.LATCHED)
 
     def begin_anew(self, now_s: float) -> None:
-        """As after a loss of supply."""
+        """Reset, as after a loss of supply."""
         self.stop(now_s)
         self.latch = 0
         self.state = DeviceState.IDLE

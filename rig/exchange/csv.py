@@ -14,8 +14,8 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.exchange.mat import ImportFailed
-from rig.measurements.contents import Contents
 from rig.system.text_files import read_text
+from rig.text.contents import Contents
 
 __all__ = ["read_csv", "table_of_ours", "write_csv"]
 
@@ -39,7 +39,7 @@ def write_csv(items: Sequence[Contents], path: Path) -> None:
 
 
 def _others(item: Contents) -> dict[str, Any]:
-    """What is not in the table; and of what is, in which order its columns make arrays."""
+    """Everything that is not in the table, and the order in which its columns make arrays."""
     loose = {}
     for name, array in item.arrays.items():
         if name not in item.rows:

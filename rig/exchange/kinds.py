@@ -1,4 +1,4 @@
-"""The kinds of objects that are exchanged: how each is taken apart and put together again."""
+"""The kinds of objects that are exchanged, each with its conversion to arrays and back."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,10 +21,9 @@ from identification import (
 from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
 from rig.exchange.pnlss import pnlss_from, pnlss_parts
-from rig.exchange.signals import time_data_from, time_data_parts, transient_from, transient_parts
-from rig.exchange.time_data import TimeData
+from rig.exchange.time_data import TimeData, time_data_from, time_data_parts, transient_from, transient_parts
 from rig.measurements.backbone_table import backbone_from, backbone_parts
-from rig.measurements.contents import Contents, Labels, unit_of
+from rig.text.contents import Contents, Labels, unit_of
 
 __all__ = ["KINDS", "put_together", "taken_apart"]
 
@@ -107,6 +106,8 @@ KINDS = (
 
 def taken_apart(value: Any) -> Contents:
     """An object as arrays and attributes; raises `IdentificationError` for a type that is not exchanged."""
+    if isinstance(value, Contents):
+        return value
     for kind in KINDS:
         if isinstance(value, kind.type):
             return kind.apart(value)

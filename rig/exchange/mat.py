@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RigError
-from rig.exchange.mat_values import read_values
-from rig.measurements.contents import Contents
+from rig.exchange.mat_process import read_values
 from rig.system.child import ChildFailed, ask_child
+from rig.text.contents import Contents
 
 __all__ = ["ImportFailed", "read_mat", "structures_of_ours", "write_mat"]
 
@@ -90,7 +90,7 @@ def read_mat(path: Path) -> dict[str, Any]:
     with TemporaryDirectory(prefix="vibrolock-") as folder:
         timeout_s = _PATIENCE_S + path.stat().st_size / _SLOWEST_BYTES_S
         try:
-            why = ask_child("rig.exchange.mat_load", str(path.absolute()), folder, timeout_s=timeout_s)
+            why = ask_child("rig.exchange.mat_process", str(path.absolute()), folder, timeout_s=timeout_s)
         except ChildFailed as error:
             raise ImportFailed(f"{path}: is no MAT file, or a damaged one (reading it {error})") from None
         if why:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import PnlssModel
-from rig.measurements.contents import Contents
+from rig.text.contents import Contents
 
 __all__ = ["pnlss_from", "pnlss_parts"]
 

@@ -119,7 +119,7 @@ def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
 
 
 def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
-    """Universal files say their units, which are SI by now: a mapping may not say others."""
+    """Refuse a mapping with units for a universal file: those of the file are converted to SI already."""
     from identification.mapping.units import si_of
 
     for channel in getattr(mapping, "channels", ()):
@@ -172,9 +172,8 @@ def _from_csv(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
 
 def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
     from rig.exchange.uff.modes import modes_in
-    from rig.exchange.uff.reading import read_uff
+    from rig.exchange.uff.reading import read_uff, time_data_in
     from rig.exchange.uff.responses import responses_in
-    from rig.exchange.uff.time_data import time_data_in
 
     units = options["units"]
     if units not in ("", "labels", "file", "si"):

@@ -26,7 +26,7 @@ EMULATED_BLOCK_S = 0.004  # a wire carries blocks, no single samples at the rate
 
 @dataclass(frozen=True)
 class Subject:
-    """A bench under test. ``truth`` is the virtual rig behind it, if it is one; ``arm`` a person's word."""
+    """A bench under test. ``truth`` is the virtual rig behind it, if it is one; ``arm`` is the permission to move it."""
 
     bench: Bench
     capabilities: Capabilities
@@ -43,7 +43,7 @@ class Subject:
     def lacking(
         self, *, channels: int | Sequence[str] | None = None, physical: bool = False, virtual: bool = False
     ) -> str:
-        """What the bench has not of what a test needs, as the reason to skip it; empty where it has all."""
+        """What a test needs and the bench lacks, as the reason to skip it; empty if nothing."""
         here = f"bench {self.bench.name}: the test needs"
         names = [channel.name for channel in self.bench.channels]
         if isinstance(channels, int) and len(names) < channels:
@@ -129,7 +129,7 @@ class ArmedRig:
         return done
 
     def _armed(self, request: ArmingRequest) -> bool:
-        """Whether ``--rig-arm`` is enough: a trip from before these tests is for a person to see, one provoked here is not.
+        """Whether ``--rig-arm`` is enough: a trip from before these tests needs a person, one provoked here does not.
 
         It is a switch, and so never enough where the output would outlive the host.
         """

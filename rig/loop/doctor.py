@@ -17,7 +17,7 @@ SECONDS = 1.0
 
 
 def examine(folder: Path) -> dict[str, Any]:
-    """Facts on processor, clock, privileges, kernels, disk, drivers and serial ports; ``folder`` is where recordings would go.
+    """Facts on processor, clock, privileges, kernels, disk, drivers and serial ports; ``folder`` is that of recordings.
 
     The lateness is that of a process like the one a wall-clock loop gets, woken a thousand times in a second, with and
     without its privileges.
@@ -73,7 +73,7 @@ def _probed(*, privileged: bool) -> dict[str, Any]:
 
 
 def _promise(probed: dict[str, Any]) -> str:
-    """In one sentence, what a wall-clock loop may count on here."""
+    """One sentence on what a wall-clock loop can rely on here."""
     if "wake_up_us" not in probed:
         return "in the campaign's own process, and nothing is promised on this system"
     rate_hz = 0.5e6 / max(1.0, probed["wake_up_us"]["p99_9"])

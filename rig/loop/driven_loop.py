@@ -1,4 +1,4 @@
-"""What a loop does in any process: swap blocks with the driver, and come to 0 V whatever the driver raises."""
+"""The part of the loop that is the same in any process: exchange blocks, and come to 0 V whatever the driver raises."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class Block(NamedTuple):
 
 
 def end_by_driver(tick: Tick, error: DaqError) -> None:
-    """Note in the guard that the driver has failed, with which the output is off."""
+    """Note in the guard that the driver has failed, so that the output counts as off."""
     guard = tick.guard
     if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
         guard["reason"] = end_reason_of(error)
@@ -51,7 +51,7 @@ class DrivenLoop:
 
     @property
     def counters(self) -> dict[str, int]:
-        """The driver's counters as of the last row: blocks of 0 V at the end have none."""
+        """The driver's counters at the last row; the blocks of 0 V after it are not counted."""
         return dict(self.daq.counters) if self._counted is None else self._counted
 
     def stop(self) -> None:
@@ -73,13 +73,13 @@ class DrivenLoop:
             self._counted = dict(self.daq.counters)
 
     def _swap(self) -> Block | None:
-        """The next block for the voltages at hand; None where the loop has failed."""
+        """Exchange the present voltages for the next block; None if the loop has failed."""
         daq = self.daq
         try:
             return Block(daq.exchange(self._voltages), daq.flags)
         except Exception as error:
             self._fail(as_daq_error(error))
-        except BaseException as error:  # KeyboardInterrupt, SystemExit: a rig that is driven comes down first
+        except BaseException as error:  # KeyboardInterrupt, SystemExit: the rig is ramped down first
             if self.interruption is None:
                 return self._interrupted(error)
             self._fail(DaqError(f"{type(error).__name__} was raised in the driver again while the output came down"))
@@ -90,7 +90,7 @@ class DrivenLoop:
         end_by_driver(self.tick, error)
 
     def _interrupted(self, error: BaseException) -> Block:
-        """Ask for the ramp; the block whose exchange was broken off is one of lost samples."""
+        """Ask for the ramp; the block whose exchange was interrupted counts as lost samples."""
         self.interruption = error
         if not self.cause and int(self.tick.guard["mode"][0]) == GuardMode.ARMED:
             self.cause = " ".join(f"{type(error).__name__} was raised in the driver: {error}".split()).rstrip(":")

@@ -1,4 +1,4 @@
-"""The loop: blocks from the driver through the tick and back, in chunks of telemetry for whoever records them."""
+"""The loop: it passes blocks from the driver through the tick and back, and yields telemetry in chunks."""
 
 import time
 from collections.abc import Iterator
@@ -22,15 +22,15 @@ PACED_CHUNK_S = 0.02
 
 @runtime_checkable
 class FusedDAQ(Protocol):
-    """A driver that can run the tick and what stands behind it in one compiled loop."""
+    """A driver that can run the tick together with its rig in one compiled loop."""
 
     def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
-        """Fill ``readings`` and ``rows``; returns the number of samples done, fewer once the output is off."""
+        """Fill ``readings`` and ``rows``; return the number of samples done, fewer than asked for if the output went off."""
 
 
 @dataclass
 class LoopStatistics:
-    """What the loop did. ``busy_s`` is the time in tick and driver alone."""
+    """Statistics of a loop. ``busy_s`` is the time in tick and driver alone."""
 
     sample_rate_hz: float
     samples: int = 0
@@ -58,17 +58,17 @@ class RunningLoop(Protocol):
     """A loop as a campaign sees it, in this process or in another."""
 
     tick: Tick
-    """Its control state, as of the last row that `run` has yielded."""
+    """The tick, with its state at the last row that `run` has yielded."""
     failure: DaqError | None
-    """Why the driver ended the loop, if it did."""
+    """Error of the driver that ended the loop, if one did."""
     cause: str
-    """Why the loop asked for the ramp, or who had it do so, in a sentence; else empty."""
+    """Why the ramp was asked for, or by whom, in one sentence; else empty."""
     statistics: LoopStatistics
-    """What the loop did so far."""
+    """Statistics so far."""
 
     @property
     def waits(self) -> bool:
-        """Whether time stands still for it while its rows are not taken."""
+        """Whether the loop pauses while its rows are not taken."""
 
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks, until the output is off."""
@@ -80,7 +80,7 @@ class RunningLoop(Protocol):
         """
 
     def bring_down(self) -> None:
-        """Ramp to 0 V what still runs, and wait for it: for whoever does not take its rows any more."""
+        """Ramp to 0 V if it still runs, and wait for the end; for a caller that takes no more rows."""
 
     @property
     def counters(self) -> dict[str, int]:
@@ -115,7 +115,7 @@ class Loop(DrivenLoop):
 
     @property
     def waits(self) -> bool:
-        """Unless it is paced, or its device has a clock."""
+        """True unless the loop is paced or its device has a clock."""
         return not (self.paced or self.daq.wall_clock)
 
     def run(self) -> Iterator[np.ndarray]:
@@ -125,7 +125,7 @@ class Loop(DrivenLoop):
             raise self.interruption
 
     def bring_down(self) -> None:
-        """Ramp to 0 V what still runs; nobody takes the rows."""
+        """Ramp to 0 V if it still runs; the rows are dropped."""
         self.request_stop()
         for _ in self._chunks():
             pass
@@ -141,7 +141,7 @@ class Loop(DrivenLoop):
             self.statistics.busy_s += time.perf_counter() - start
             self.statistics.samples += done
             if self.over:
-                self.stop()  # before its rows are taken, which may last
+                self.stop()  # before its rows are yielded: the caller may take long
             if self.paced:
                 self._wait_for_the_clock(began)
             self.statistics.wall_s = time.perf_counter() - began

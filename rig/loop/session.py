@@ -1,6 +1,6 @@
-"""A session with a bench: its driver open and its loop running, in this process or in one of its own.
+"""A session with a bench: its driver is open and its loop runs, in this process or in another.
 
-A virtual rig runs here, as fast as the machine allows; what has to keep to a clock runs in `rig.loop.worker`.
+A virtual rig runs in this process, as fast as the machine allows. A rig with a clock runs in `rig.loop.worker`.
 """
 
 import warnings
@@ -25,11 +25,11 @@ class Session(Protocol):
     """A bench whose device is open."""
 
     capabilities: Capabilities
-    """What its driver can do."""
+    """Capabilities of its driver."""
     identity: dict[str, str]
-    """What stands behind the driver, for the record."""
+    """Identity of the device behind the driver, for the record."""
     latched: str
-    """What the device had latched when it was opened, in words; empty for nothing."""
+    """What the device had latched when it was opened, in words; empty if nothing."""
 
     def start(self, settings: TickSettings) -> RunningLoop:
         """Start the device and a loop over it; the loop runs when its rows are asked for. Once in a session.
@@ -59,7 +59,7 @@ class LocalSession:
         return loop
 
     def finish(self) -> None:
-        """Ramp down what still runs, for whoever leaves in mid-run."""
+        """Ramp down a loop that still runs, when the session is left early."""
         if self._loop is not None and not self._loop.over:
             self._loop.bring_down()
 
@@ -77,7 +77,7 @@ def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iter
     refuse(bench)
     daq = make_daq(bench, seed)
     if supported() and (realtime or daq.wall_clock):
-        del daq  # nothing is open yet; the other process makes its own
+        del daq  # not open yet; the other process makes its own driver
         with WorkerSession(bench, seed) as session:
             yield session
         return
@@ -93,7 +93,7 @@ def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iter
 
 
 def _closed(daq: DAQ) -> None:
-    """Close a driver; what it has to say at that is no reason to lose what was recorded."""
+    """Close a driver; an error in closing is dropped, so that the recording is not lost."""
     try:
         daq.close()
     except RigError as error:

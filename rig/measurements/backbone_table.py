@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import Backbone, Channel, PeriodicVibration
-from rig.measurements.contents import Contents
+from rig.text.contents import Contents
 
 __all__ = ["backbone_from", "backbone_parts"]
 

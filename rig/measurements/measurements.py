@@ -14,7 +14,7 @@ from identification import (
 )
 from identification import force_surface as surface_of
 from identification.multisine.best_linear_approximation import Estimator
-from rig.campaigns.dwell.campaign import DwellCourse
+from rig.campaigns.dwell.points import DwellCourse
 from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows
 from rig.campaigns.kinds import KINDS, kinds_that_yield
 from rig.errors import RecordingError

@@ -18,11 +18,11 @@ SYNC_INTERVAL_S = 0.5
 """The disk is synchronised at most this often while blocks are appended."""
 
 _WRITABLE = os.O_RDWR | os.O_APPEND | getattr(os, "O_BINARY", 0)
-_fdatasync: Callable[[int], None] = getattr(os, "fdatasync", os.fsync)  # macOS and Windows have none
+_fdatasync: Callable[[int], None] = getattr(os, "fdatasync", os.fsync)  # not on macOS and Windows
 
 
 class NameLost(OSError):  # noqa: N818 (says what happened)
-    """The file that is being written was removed or renamed by somebody else."""
+    """The file that is being written was removed or renamed by another program."""
 
 
 class BlockFile:
@@ -65,7 +65,7 @@ class BlockFile:
         self._end = (n_bytes, n_blocks)
 
     def append(self, kind: BlockKind, part: int, row: int, payload: bytes, *, twice: bool = False) -> None:
-        """Append one block, or the same again behind it; it is in the hands of the operating system on return."""
+        """Append one block, or two copies of it; on return the operating system has it."""
         if self._descriptor < 0:
             raise OSError(errno.EBADF, "the journal is closed")
         if self._unsound:

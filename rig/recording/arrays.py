@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rig.errors import RecordingError
 from rig.recording.journal import journal_path
+from rig.recording.journal_blocks import read_journal
 from rig.recording.layout import identify, kind_in, new_file, open_file, reading
-from rig.recording.sequence import read_journal
 from rig.recording.tables import StoredTexts, write_object
 from rig.text.printable import error_text
 

@@ -31,7 +31,7 @@ __all__ = [
 MAGIC = b"VLJB"
 VERSION = 2
 LARGEST_PAYLOAD = 16 * 2**20
-"""A longer length is taken for damage, which bounds the reader's memory."""
+"""A block that claims to be longer counts as damaged, which bounds the reader's memory."""
 
 _HEADS = {1: struct.Struct("<4sHHIQ"), 2: struct.Struct("<4sHHIQIQ")}
 _VERSION = struct.Struct("<4xH")
@@ -40,7 +40,7 @@ _SEARCH_BYTES = 2**20
 
 
 class BlockKind(IntEnum):
-    """What a block holds: JSON text, but for ``ROWS``, which holds the bytes of whole rows."""
+    """Kind of a block. ``ROWS`` holds the bytes of whole rows, all others JSON text."""
 
     HEADER = 1
     PART = 2
@@ -51,12 +51,12 @@ class BlockKind(IntEnum):
 
 
 TWICE = frozenset((BlockKind.HEADER, BlockKind.PART))
-"""Kinds that are written twice, one block behind the other: without them nothing that follows could be read."""
+"""Kinds that are written twice in a row, because nothing after them could be read without them."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Bytes between two whole blocks that cannot be read."""
+    """Unreadable bytes between two whole blocks."""
 
     n_bytes: int
     n_blocks: int
@@ -72,9 +72,9 @@ class Block:
     kind: BlockKind
     sequence: int
     part: int
-    """Number of its part, from 1; of version 1 as counted."""
+    """Number of its part, from 1; counted by the reader in files of version 1."""
     row: int
-    """Rows of its part before it; of version 1 as counted."""
+    """Rows of its part before it; counted by the reader in files of version 1."""
     start: int
     """Position of its head in the file, bytes."""
     offset: int
@@ -83,7 +83,7 @@ class Block:
     value: dict[str, Any]
     """The payload decoded; empty for rows."""
     gap: Gap | None = None
-    """What cannot be read between the block before and this one."""
+    """The gap between the block before and this one, if there is one."""
 
     @property
     def stop(self) -> int:
@@ -92,7 +92,7 @@ class Block:
 
 
 class BadBlockError(Exception):
-    """What is wrong with a block."""
+    """A block is damaged; the message says how."""
 
 
 def pack(kind: BlockKind, sequence: int, part: int, row: int, payload: bytes) -> bytes:
@@ -102,7 +102,7 @@ def pack(kind: BlockKind, sequence: int, part: int, row: int, payload: bytes) ->
 
 
 def read_block(stream: BinaryIO, start: int, size: int) -> Block:
-    """Read the block that begins at byte ``start`` of a file of ``size`` bytes; `BadBlockError` where none does."""
+    """Read the block at byte ``start`` of a file of ``size`` bytes; raise `BadBlockError` if there is none."""
     stream.seek(start)
     head = stream.read(_VERSION.size)
     if not head.startswith(MAGIC[: len(head)]):
@@ -136,7 +136,7 @@ def read_block(stream: BinaryIO, start: int, size: int) -> Block:
 
 
 def following_block(stream: BinaryIO, start: int, size: int, sequence: int) -> Block | None:
-    """The first whole block that begins behind ``start`` and was written as number ``sequence`` or later."""
+    """The first whole block at or after byte ``start`` with number ``sequence`` or later."""
     while start < size:
         stream.seek(start)
         window = stream.read(_SEARCH_BYTES)

@@ -1,4 +1,4 @@
-"""What no file of ours holds, refused before any value is read: links elsewhere, data elsewhere, sizes without data."""
+"""Refuses HDF5 files, before any value is read, that link to other files or declare sizes without data."""
 
 from collections.abc import Iterator
 from math import ceil, prod
@@ -11,7 +11,7 @@ __all__ = ["LARGEST_RATIO", "MOST_OBJECTS", "check_attributes", "examine", "obje
 MOST_OBJECTS = 200_000
 """Groups and datasets of a file; a recording of 1000 parts has about 60 000."""
 LARGEST_RATIO = 200
-"""Bytes that the datasets of a file may declare, per byte of the file: our compression (LZF) reaches 88 on zeros."""
+"""Bytes that the datasets may declare per byte of the file; the compression used (LZF) reaches 88 on zeros."""
 
 _SMALL_BYTES = 2**26
 _LARGEST_CHUNK_BYTES = 2**28
@@ -21,7 +21,7 @@ _MOST_TEXTS = 2**22
 
 
 def examine(file: Any, size: int) -> None:
-    """Look at every object of an open HDF5 file of ``size`` bytes, but at none of its values.
+    """Check every object of an open HDF5 file of ``size`` bytes without reading values.
 
     Raises:
         RecordingError: it names the object, what it holds and what is allowed; without the file's name.
@@ -44,7 +44,7 @@ def examine(file: Any, size: int) -> None:
 
 
 def objects_in(file: Any) -> Iterator[Any]:
-    """Every group and dataset, the root first; each once, for all are linked once.
+    """Every group and dataset, the root first.
 
     Raises:
         RecordingError: a link that is not a plain one, an object with two names, or too many of them.
@@ -85,7 +85,7 @@ def check_attributes(item: Any) -> None:
 
 
 def _check_storage(dataset: Any) -> None:
-    """Refuse values that lie elsewhere or nowhere, and types other than numbers and texts."""
+    """Refuse values stored in other files or not stored at all, and types other than numbers and texts."""
     import h5py
 
     if dataset.is_virtual or dataset.external:

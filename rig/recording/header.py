@@ -1,4 +1,4 @@
-"""What is known of a recording before its first row: first block of every journal, root of the HDF5 file."""
+"""Facts about a recording before its first row: the first block of a journal, the root of the HDF5 file."""
 
 import os
 import re
@@ -68,7 +68,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Header:
-    """Everything about a recording but its rows, points and events.
+    """Everything about a recording except its rows, points and events.
 
     Raises:
         RecordingError: on construction; the message names the field, the value and what is allowed.
@@ -92,7 +92,7 @@ class Header:
     first_part: int = 0
     """Number of parts that the HDF5 file beside the journal held when the journal was begun."""
     identity: str = field(default_factory=lambda: os.urandom(8).hex())
-    """Random name that tells this recording from any other one of the same path."""
+    """Random name that distinguishes this recording from others with the same path."""
     schema: int = field(default_factory=lambda: SCHEMA)
     """Schema of the journal that it was read from; a new one is always of the present schema."""
 

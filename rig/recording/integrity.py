@@ -1,14 +1,63 @@
-"""Whether a file is as it was written: by its digest, or by reading all of it in a child process first."""
+"""Whether a file is as it was written: by the digest at its end, or by reading all of it in a child process first."""
 
+import hashlib
+import io
 import json
+import os
+import struct
 import time
 from pathlib import Path
+from typing import BinaryIO
 
 from rig.errors import RecordingError
-from rig.recording.trailer import digest_matches
 from rig.system.child import MEMORY_BYTES, ChildFailed, ask_child
 
-__all__ = ["FIRST_WITH_DIGEST", "VERIFIED", "integrity_of"]
+__all__ = ["FIRST_WITH_DIGEST", "VERIFIED", "append_trailer", "digest_matches", "integrity_of"]
+
+_MAGIC, _VERSION = b"VLDIGEST", 1
+_TRAILER = struct.Struct("<8sI32sQ")
+_AT_ONCE = 2**20
+
+
+def append_trailer(stream: "BinaryIO | io.RawIOBase") -> None:
+    """Append the digest of everything in ``stream``."""
+    covered = stream.seek(0, os.SEEK_END)
+    digest = _digest(stream, covered)
+    stream.seek(covered)
+    stream.write(_TRAILER.pack(_MAGIC, _VERSION, digest, covered))
+
+
+def digest_matches(path: Path) -> bool:
+    """Read ``path`` once, 1 MiB at a time: True where it is as it was written, False where it has no digest.
+
+    Raises:
+        RecordingError: the digest does not match what is before it.
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        start = size - _TRAILER.size
+        if start < 0:
+            return False
+        stream.seek(start)
+        magic, version, digest, covered = _TRAILER.unpack(stream.read(_TRAILER.size))
+        if (
+            magic != _MAGIC and covered != start
+        ):  # either is enough, so that a changed byte in one does not hide the other
+            return False
+        if (magic, version, covered) == (_MAGIC, _VERSION, start) and _digest(stream, covered) == digest:
+            return True
+    raise RecordingError(f"{path}: damaged: its digest does not match (a byte has changed since it was written)")
+
+
+def _digest(stream: "BinaryIO | io.RawIOBase", length: int) -> bytes:
+    digest = hashlib.sha256()
+    stream.seek(0)
+    while length > 0 and (data := stream.read(min(_AT_ONCE, length))):
+        digest.update(data)
+        length -= len(data)
+    return digest.digest()
+
 
 VERIFIED = "verified"
 FIRST_WITH_DIGEST = 3
@@ -18,7 +67,7 @@ _PATIENCE_S, _SLOWEST_BYTES_S = 60.0, 5e6
 _SETTLED_S = 2.0
 
 _known: dict[tuple[Path, int, int, int, int, int], str] = {}
-"""What was found, by all that tells one state of a file from another."""
+"""Results by path, device, inode, size and times of a file."""
 
 
 def integrity_of(path: Path) -> str:
@@ -34,7 +83,7 @@ def integrity_of(path: Path) -> str:
     facts = path.stat()
     state = (path.absolute(), facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns)
     if state not in _known:
-        # A change within one tick of the file system's clock leaves its times as they are: what is new is not remembered.
+        # A change within one tick of the file system's clock does not show in its times: for new files the result is not kept.
         settled = time.time() - max(facts.st_mtime, facts.st_ctime) > _SETTLED_S
         found = VERIFIED if digest_matches(path) else _read_by_child(path, facts.st_size)
         if not settled:
@@ -45,7 +94,9 @@ def integrity_of(path: Path) -> str:
 
 def _read_by_child(path: Path, size: int) -> str:
     try:
-        answer = json.loads(ask_child("rig.recording.walk", str(path), timeout_s=_PATIENCE_S + size / _SLOWEST_BYTES_S))
+        answer = json.loads(
+            ask_child("rig.recording.whole_read", str(path), timeout_s=_PATIENCE_S + size / _SLOWEST_BYTES_S)
+        )
     except ChildFailed as error:
         raise RecordingError(f"{path}: damaged: the HDF5 library {error} over it") from error
     if answer["memory"]:

@@ -18,9 +18,9 @@ from rig.errors import RecordingError
 from rig.recording import jsontext
 from rig.recording.appending import BlockFile, NameLost
 from rig.recording.blocks import LARGEST_PAYLOAD, TWICE, BlockKind
-from rig.recording.contents import JournalContents
 from rig.recording.header import Column, Header, packed
-from rig.recording.sequence import Tail, read_journal
+from rig.recording.journal_blocks import Tail, read_journal
+from rig.recording.journal_contents import JournalContents
 from rig.system.locking import synchronise_folder
 
 __all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]
@@ -34,7 +34,7 @@ def journal_path(output: str | Path) -> Path:
 
 
 def set_aside(path: Path) -> Path:
-    """Return a free path beside the damaged journal ``path``, under which it is to be kept."""
+    """A free path beside the damaged journal ``path`` to keep it under."""
     candidates = (path.with_name(f"{path.name}.damaged{n}") for n in ("", *(f"-{k}" for k in range(2, 1000))))
     return next(candidate for candidate in candidates if not candidate.exists())
 
@@ -56,7 +56,7 @@ class JournalWriter:
         self.n_parts = 0
         """Parts in the journal."""
         self.dropped = Tail(0, "", torn=True)
-        """What ``reopen`` cut off."""
+        """What ``reopen`` has cut off."""
         self._blocks = blocks
         self._in_part = False
         self._part_number = self._rows_in_part = 0
@@ -165,7 +165,7 @@ class JournalWriter:
         self._synchronise()
 
     def close(self) -> None:
-        """Force everything to the disk and let go of the file; may be called twice."""
+        """Force everything to the disk and close the file; may be called twice."""
         try:
             if not self._blocks.closed:
                 self._synchronise()

@@ -1,4 +1,4 @@
-"""What all HDF5 files of the bench have in common: how they are recognised, opened, and replaced in one step."""
+"""Common to all HDF5 files of the bench: how they are recognised, opened, and replaced in one step."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -8,10 +8,9 @@ from typing import Any
 
 from rig.errors import RecordingError
 from rig.recording.examination import check_attributes, examine
+from rig.recording.hdf5_sink import Sink
 from rig.recording.header import FORMAT, SCHEMA, check_schema
-from rig.recording.integrity import integrity_of
-from rig.recording.sink import Sink
-from rig.recording.trailer import append_trailer
+from rig.recording.integrity import append_trailer, integrity_of
 from rig.system.locking import synchronise_folder
 from rig.text.printable import error_text
 

@@ -1,4 +1,4 @@
-"""What every part of a recording offers, be it in a journal or in an HDF5 file."""
+"""`Part`: the interface of a part of a recording, in a journal or in an HDF5 file."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ class Part(ABC):
     """One uninterrupted stretch of a recording, from its beginning to its end, a kill or a change of plan."""
 
     information: dict[str, Any]
-    """What was said when the part began."""
+    """Information given when the part began."""
     points: list[dict[str, Any]]
     """Results per point, in the order in which they were completed."""
     events: list[dict[str, Any]]
@@ -45,7 +45,7 @@ class Part(ABC):
     columns: Sequence[Column]
     """Unit and meaning of each field of its rows."""
     dropped_bytes: int
-    """Bytes of its journal that could not be read; 0 but for a torn or damaged journal."""
+    """Bytes of its journal that could not be read; above 0 only for a torn or damaged journal."""
     dropped_reason: str
     """Where they are, why they could not be read, and which rows were lost with them; empty where none were."""
 

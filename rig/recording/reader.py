@@ -7,14 +7,14 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from rig.errors import RecordingError
-from rig.recording.contents import JournalContents
+from rig.recording.conversion import check_continuation
+from rig.recording.hdf5_recording import read_recording, recording_integrity
 from rig.recording.header import Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.journal import journal_path
+from rig.recording.journal_contents import JournalContents
 from rig.recording.layout import open_file
 from rig.recording.parts import Part
-from rig.recording.store import check_continuation
-from rig.recording.stored import read_recording, recording_integrity
 
 __all__ = ["Part", "RecordedPlan", "Recording"]
 
@@ -75,7 +75,7 @@ class Recording:
 
     @property
     def plans(self) -> list[RecordedPlan]:
-        """The plan that the recording was begun with, and those that took its place."""
+        """The first plan of the recording, and those that replaced it."""
         first = RecordedPlan(0, self._header.configuration.get("plan", {}), None)
         told = ((number, part.information) for number, part in enumerate(self.parts))
         return [first, *(RecordedPlan(n, said["plan"], said["numbers"]) for n, said in told if "plan" in said)]
@@ -135,7 +135,7 @@ class Recording:
         return bool(self.parts) and self.parts[-1].complete
 
     def close(self) -> None:
-        """Let go of the files; may be called twice. Rows can no longer be read."""
+        """Close the files; may be called twice. Rows can no longer be read."""
         self._stack.close()
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""JSON objects in HDF5: one as a text, many as a table of texts with a column beside it for every plain key."""
+"""JSON objects in HDF5: one as a text; many as a table of texts, with a column for every plain key."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What a process may ask of the system so that its loop is woken in time: each is tried, and said."""
+"""Privileges that let a loop wake up in time; each is requested, and whether it was granted is reported."""
 
 import ctypes
 import gc
@@ -20,7 +20,7 @@ NO_SUCH = "not on this system"
 
 
 def prepare(*, privileged: bool = True, priority: int = PRIORITY) -> dict[str, str]:
-    """Ask for all of it in this process; returns what came of each.
+    """Request real-time scheduling, locked memory and CPU affinity for this process; return which were granted.
 
     ``privileged`` false leaves out what needs a permission. The garbage collector is off from here on: what is there is kept
     for good, and a loop without cyclic garbage needs none.

@@ -8,35 +8,30 @@ import math
 
 import numpy as np
 
-from controller.demodulation.kernels import adapt, demodulate, sign_product, turn_phasors
-from controller.kernels import TWO_PI, advance_phase, size, track, wrap
-from controller.layout import ADAPTIVE, SIGN, VOLTAGE
+from controller.amplitude import FORCE_RMS, VOLTAGE, demand, held_size, see_output, take_over
+from controller.detector import ADAPTIVE, detect, force_rms
+from controller.frequency import follow
+from controller.law import measure_phase
+from controller.period import add_sample
+from controller.primitives import TWO_PI, advance_phase, size
 from rig.daq import LOST
-from rig.tick.laws.amplitude.kernels import controlled_size, demanded_amplitude, take_over
-from rig.tick.laws.frequency.kernels import choose_frequency, phase_error, see_rest
-from rig.tick.laws.periods.kernels import add_to_period, close_period
-from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, SENSOR_AT_RANGE, TickArrays
-from rig.tick.safety.following.kernels import contradicts_exciter, permitted_level
+from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
+from rig.tick.measure import pass_over, take_in
+from rig.tick.periods import close_period
+from rig.tick.safety.following import begin_to_follow, contradicts_exciter, permitted_level
 from rig.tick.safety.kernels import (
     NON_FINITE_OUTPUT,
     PLANT_CONTRADICTED,
-    SENSOR_OVERLOAD,
-    carry_motion,
     permitted_amplitude,
     permitted_turn,
     shut_down,
     watch_frequency,
-    watch_gap,
-    watch_input,
-    watch_motion,
 )
 from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.kernels import advance, is_ramp
-from rig.tick.sequencer.layout import LOOP_DRIVE, WAVEFORM
-from vibrolock.compiled import Record, kernel
+from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
+from vibrolock.compiled import Record, inner_kernel, kernel
 
-STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
-HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
 SMALLEST_V = 1e-12  # no division by an output of nothing
 UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
 
@@ -52,143 +47,112 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
     return float(theta + TWO_PI if theta < 0.0 else theta)
 
 
-@kernel
-def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tuple[bool, bool]:
-    """A reading that is not plainly in order: watch it; returns whether it may be used, and whether it is a motion.
-
-    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel. So would the
-    gap that is left without it: from then on the channel tells nothing of a motion any more.
-    """
-    guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
-    channel, watch = t.inputs[index], t.watches[index]
-    usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
-    within = usable and abs(volts * channel.unit_per_volt) <= channel.limit
-    if not within or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD):
-        watch.distrusted = 1
-    return usable, watch.distrusted == 0 and watch.same_samples < STUCK_SAMPLES
+@inner_kernel
+def measure_rms(t: TickArrays, amplitude_law: int) -> None:
+    """The force's root mean square, where it is what ``amplitude_law`` holds."""
+    if amplitude_law == FORCE_RMS:
+        control = t.control[0]
+        control.vibration.force_rms_n = force_rms(t.law[0].detector, control.detector)
 
 
 @kernel
-def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
-    """Check and convert every input channel; returns the telemetry flags of the inputs."""
-    law, loop, guard, limits = t.law[0], t.loop[0], t.guard[0], t.limits[0]
-    armed = guard.mode == ARMED
-    driven = armed and (loop.held == 1 or t.progress[0].start_level > 0.0)  # in a ramp from a level, too
-    # At first the mean of all samples seen so far: noise or ambient vibration in a single one would be integrated as travel.
-    mean_gain = max(law.mean_gain, 1.0 / (loop.seen + 1.0))
-    loop.seen += 1
-    flags = 0
-    force = 0.0
-    drive = 0.0
-    for index in range(t.inputs.size):
-        channel, watch = t.inputs[index], t.watches[index]
-        volt = volts[index]
-        value = volt * channel.unit_per_volt
-        readings[index] = value
-        moves = True
-        in_order = armed and abs(volt) < channel.alarm_v and volt != watch.last_v and watch.alert == 0
-        if in_order:
-            watch.last_v = volt
-        else:
-            usable, moves = examine_input(t, index, volt, driven)
-            if not usable:
-                continue
-            if watch.overload_samples > 0:
-                flags |= SENSOR_AT_RANGE
-        mean = track(watch.mean, value, mean_gain)
-        watch.mean = mean
-        value -= mean
-        if index == loop.force_channel:
-            force = value
-        if index == loop.drive_channel:
-            drive = value
-        if channel.watch_displacement == 1 and moves:
-            watch_motion(guard, limits, watch, value, index, loop.sample)
-    loop.force, loop.drive_motion = force, drive
-    return flags
-
-
-@kernel
-def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
-    """A sample that was lost on its way: nothing is read, the motion goes on as it was, a long gap trips.
-
-    For force and drive stand the fundamentals as they are known: so a detector's ripple goes on as well, and does not turn
-    into an error of the phase by stopping anywhere.
-    """
-    loop, limits, dt = t.loop[0], t.limits[0], t.law[0].dt_s
-    readings[:] = math.nan
-    loop.lost += 1
-    omega = limits.resonance_rad_s if loop.drive == WAVEFORM else loop.omega
-    cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
-    for index in range(t.inputs.size):
-        if t.inputs[index].watch_displacement == 1:
-            watch = t.watches[index]
-            # The mean swings a little with the vibration: held anywhere, it would be integrated as travel for seconds.
-            watch.mean += t.law[0].mean_gain * carry_motion(limits, watch, cos_step, sin_step, omega)
-    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
-    loop.force = force.real * cos_theta - force.imag * sin_theta
-    t.watches[loop.force_channel].mean += t.law[0].mean_gain * loop.force
-    loop.drive_motion = drive.real * cos_theta - drive.imag * sin_theta
-    watch_gap(t.guard[0], limits, loop.lost, loop.sample, dt)
-    return 0
-
-
-@kernel
-def demodulate_inputs(t: TickArrays, cos_theta: float, sin_theta: float) -> None:
-    """Force and drive-point motion of this sample into their complex amplitudes and sizes."""
-    law, loop, gain = t.law[0], t.loop[0], t.law[0].demodulator_gain
-    force, drive = t.watches[loop.force_channel], t.watches[loop.drive_channel]
-    if law.detector == ADAPTIVE:
-        turn_phasors(t.phasors, cos_theta, sin_theta)
-        adapt(t.filters[0], t.phasors, loop.force, gain)
-        adapt(t.filters[1], t.phasors, loop.drive_motion, gain)
-        force.estimate, drive.estimate = t.filters[0, 1], t.filters[1, 1]
-    else:
-        force.estimate = demodulate(force.estimate, loop.force, cos_theta, sin_theta, gain)
-        drive.estimate = demodulate(drive.estimate, loop.drive_motion, cos_theta, sin_theta, gain)
-        loop.force_square = track(loop.force_square, loop.force * loop.force, gain)
-        if law.detector == SIGN:
-            loop.sign_mean = track(loop.sign_mean, sign_product(loop.force, loop.drive_motion), gain)
-    loop.force_size, loop.response_size = size(force.estimate), size(drive.estimate)
-    loop.displacement = loop.response_size / (loop.omega * loop.omega)
-
-
-@kernel
-def judge_by_exciter(t: TickArrays, amplitude_v: float, turn: float, sample: int) -> None:
-    """Trip where the known exciter contradicts the output (V, rad) that force and drive show at this sample."""
-    law, loop, guard, following = t.law[0], t.loop[0], t.guard[0], t.following[0]
+def judge_by_exciter(t: TickArrays, seen: Record) -> None:
+    """Trip where the known exciter contradicts the output ``seen`` (of the history) that force and drive show now."""
+    loop, guard, following, vibration = t.loop[0], t.guard[0], t.following[0], t.control[0].vibration
     if guard.mode != ARMED or loop.drive == WAVEFORM:
         return
-    force, drive = t.watches[loop.force_channel].estimate, t.watches[loop.drive_channel].estimate
-    sent = complex(amplitude_v * math.cos(turn), amplitude_v * math.sin(turn))
-    if contradicts_exciter(t.expected[0], following, sent, force, drive, law.demodulator_gain, law.dt_s):
+    sent = complex(seen.amplitude_v * math.cos(seen.turn), seen.amplitude_v * math.sin(seen.turn))
+    gain = t.law[0].detector.gain
+    if contradicts_exciter(t.expected[0], following, sent, vibration.force, vibration.drive, gain, loop.dt_s):
         ratio = size(following.needed) / max(size(following.late_sent), SMALLEST_V)
-        shut_down(guard, PLANT_CONTRADICTED, -1, ratio, sample, False)
+        shut_down(guard, PLANT_CONTRADICTED, -1, ratio, loop.sample, False)
 
 
 @kernel
-def oscillate(t: TickArrays, amplitude: float) -> float:
+def begin_segment(t: TickArrays, segment: Record) -> None:
+    """A new segment's drive and amplitude law take over from what there is, so that nothing jumps."""
+    loop, control, progress = t.loop[0], t.control[0], t.progress[0]
+    amplitude = control.amplitude
+    if segment.drive == LOOP_DRIVE and loop.drive != LOOP_DRIVE:
+        control.frequency.taking_over = 1
+    if segment.drive == TONE and loop.drive == LOOP_DRIVE:
+        progress.omega = control.frequency.omega  # from where the tone's ramp goes to its own frequency
+    loop.drive = segment.drive
+    if segment.amplitude_law != amplitude.law:
+        begin_to_follow(t.expected[0], t.following[0], amplitude.output.amplitude_v, 0.0, 0.0)
+        measure_rms(t, segment.amplitude_law)
+        progress.level = take_over(t.law[0].amplitude, amplitude, control.vibration, segment.amplitude_law)
+
+
+@inner_kernel
+def step_sequencer(t: TickArrays) -> bool:
+    """The plan's level, lag and frequency for this sample; returns whether the run goes on."""
+    loop, progress, amplitude = t.loop[0], t.progress[0], t.control[0].amplitude
+    if progress.entered == 0 and progress.finished == 0 and progress.segment < progress.segments:
+        begin_segment(t, t.segments[progress.segment])
+    progress.sample = loop.sample
+    progress.cycle = loop.cycles + loop.theta_in / TWO_PI
+    missed = amplitude.saturated == 1 and held_size(amplitude, t.control[0].vibration) < UNREACHED * progress.level
+    progress.unreached = 1 if missed else 0
+    advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.control[0].lock, t.guard[0])
+    running = t.guard[0].mode == ARMED and progress.finished == 0
+    loop.held = 0
+    if running and progress.entered == 1:
+        segment = t.segments[progress.segment]
+        loop.held = 0 if is_ramp(segment.kind) else 1
+        loop.waveform = segment.waveform
+    return bool(running)
+
+
+@inner_kernel
+def choose_frequency(t: TickArrays) -> None:
+    """Frequency of the sample: that of the loop, held where no phase can be read, or the plan's."""
+    control, loop, progress = t.control[0], t.loop[0], t.progress[0]
+    if loop.drive == WAVEFORM:
+        control.frequency.omega = TWO_PI / (t.waveforms.shape[1] * loop.dt_s)
+    elif loop.drive == TONE:
+        control.frequency.omega = progress.omega
+    elif control.vibration.present == 1:
+        follow(t.law[0].frequency, control.frequency, control.vibration, progress.lag)
+    if loop.drive != WAVEFORM:
+        watch_frequency(t.guard[0], t.limits[0], control.frequency.omega, loop.sample)
+
+
+@inner_kernel
+def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool) -> float:
+    """Safety: the amplitude (V) that goes out for the ``demanded`` one, of which the law's watch has ``allowed`` so much."""
+    amplitude, guard, limits = t.control[0].amplitude, t.guard[0], t.limits[0]
+    before, turn = guard.amplitude_v, amplitude.output.turn
+    permitted = permitted_amplitude(guard, limits, allowed, t.loop[0].sample)
+    if running:
+        turn = permitted_turn(limits, turn, amplitude.demanded_turn, before, permitted)
+    see_output(amplitude, demanded, permitted, turn)
+    return permitted
+
+
+@inner_kernel
+def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
     """The output (V) of this sample, ``Re(U exp(i theta))``, and the oscillator one sample on.
 
     A waveform is played by its number of the sample.
     """
-    loop = t.loop[0]
+    loop, omega = t.loop[0], t.control[0].frequency.omega
     if loop.drive == WAVEFORM:
         period = t.waveforms.shape[1]
         output = amplitude * t.waveforms[loop.waveform, loop.play]
         loop.play = loop.play + 1 if loop.play + 1 < period else 0
         theta = TWO_PI * loop.play / period
     else:
-        output = amplitude * math.cos(loop.theta + loop.turn)
-        theta = advance_phase(loop.theta, loop.omega, t.law[0].dt_s)
+        output = amplitude * math.cos(loop.theta + turn)
+        theta = advance_phase(loop.theta, omega, loop.dt_s)
     if not math.isfinite(output):
         shut_down(t.guard[0], NON_FINITE_OUTPUT, -1, output, loop.sample, True)
         output = 0.0
     sent = t.history[loop.sample % t.history.size]
     sent.theta = loop.theta
-    sent.omega = loop.omega
+    sent.omega = omega
     sent.amplitude_v = amplitude
-    sent.turn = loop.turn
+    sent.turn = turn
     sent.output_v = output
     loop.theta = theta
     loop.sample += 1
@@ -201,12 +165,12 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
 
     Of a sample that is ``lost`` the volts are not looked at: estimates hold, but for their ripple; all else goes on.
     """
-    law, loop, guard, progress = t.law[0], t.loop[0], t.guard[0], t.progress[0]
-    now = loop.sample
-    slot = now % t.history.size
+    law, control, loop, guard, progress = t.law[0], t.control[0], t.loop[0], t.guard[0], t.progress[0]
+    vibration, frequency, amplitude = control.vibration, control.frequency, control.amplitude
+    slot = loop.sample % t.history.size
     shown = slot - loop.lead_whole if slot >= loop.lead_whole else slot - loop.lead_whole + t.history.size
     seen = t.history[shown]
-    theta_in = phase_on_output(t.history, shown, loop.lead_fraction, law.dt_s)
+    theta_in = phase_on_output(t.history, shown, loop.lead_fraction, loop.dt_s)
     row.theta_rad = theta_in
     row.frequency_hz = seen.omega / TWO_PI
     row.output_v = seen.output_v
@@ -222,58 +186,38 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
     else:
         loop.lost = max(loop.lost - 1, 0)  # losses with single good samples in between are a gap as well
         flags = take_in(t, volts, readings)
-    if not lost or law.detector != ADAPTIVE:
-        demodulate_inputs(t, cos_theta, sin_theta)
+    if not lost or law.detector.kind != ADAPTIVE:
+        phasor = complex(cos_theta, sin_theta)
+        detect(law.detector, control.detector, vibration, loop.force, loop.drive_motion, phasor, frequency.omega)
+        measure_rms(t, amplitude.law)
         if t.expected[0].known == 1:
-            judge_by_exciter(t, seen.amplitude_v, seen.turn, now)
-    thresholds = t.thresholds[0]
-    present = loop.force_size >= thresholds.smallest_force_n and loop.response_size >= thresholds.smallest_response
-    closed = present and loop.drive == LOOP_DRIVE
-    loop.error = phase_error(t) if closed else 0.0
-    see_rest(t)
+            judge_by_exciter(t, seen)
+    lag_of_skew = frequency.omega * loop.skew_samples * loop.dt_s
+    closed = measure_phase(law, control, progress.lag, lag_of_skew, loop.drive == LOOP_DRIVE)
 
     if theta_in < loop.theta_in:
         loop.cycles += 1
-        close_period(t, present)
+        close_period(t)
     loop.theta_in = theta_in
-    add_to_period(t)
+    add_sample(control.period, vibration, held_size(amplitude, vibration))
 
-    if progress.entered == 0 and progress.finished == 0 and progress.segment < progress.segments:
-        take_over(t, t.segments[progress.segment])
-    cycle = loop.cycles + theta_in / TWO_PI
-    unreached = loop.saturated == 1 and controlled_size(t) < UNREACHED * progress.level
-    advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.lock[0], guard, cycle, now, unreached)
-    running = guard.mode == ARMED and progress.finished == 0
-    loop.held = 0
-    if running and progress.entered == 1:
-        segment = t.segments[progress.segment]
-        loop.held = 0 if is_ramp(segment.kind) else 1
-        loop.waveform = segment.waveform
-    flags |= HELD if loop.held == 1 else 0
-
+    running = step_sequencer(t)
     demanded = allowed = 0.0
     if running:
-        choose_frequency(t, present)
-        flags |= FREQUENCY_CLAMPED if loop.clamped == 1 else 0
-        if loop.drive != WAVEFORM:
-            watch_frequency(guard, t.limits[0], loop.omega, now)
-        demanded = demanded_amplitude(t, present)
-        allowed = demanded if loop.amplitude_law == VOLTAGE else permitted_level(t.following[0], demanded)
-        flags |= SATURATED if loop.saturated == 1 else 0
-    before, loop.turn_behind = guard.amplitude_v, 0
-    amplitude = permitted_amplitude(guard, t.limits[0], allowed, now)
-    if running and loop.demanded_turn != loop.turn:
-        loop.turn = permitted_turn(t.limits[0], loop.turn, loop.demanded_turn, before, amplitude)
-        if loop.turn != loop.demanded_turn:
-            loop.turn_behind = 1 if wrap(loop.demanded_turn - loop.turn) > 0.0 else -1
-    loop.held_back = 1 if abs(amplitude - demanded) > HELD_BACK * abs(demanded) else 0
-    loop.behind = 0 if loop.held_back == 0 else (1 if demanded > amplitude else -1)
-    output = oscillate(t, amplitude)
+        choose_frequency(t)
+        by_loop = loop.drive == LOOP_DRIVE
+        demanded = demand(law.amplitude, amplitude, vibration, progress.level, progress.lag, frequency.omega, by_loop)
+        allowed = demanded if amplitude.law == VOLTAGE else permitted_level(t.following[0], demanded)
+    permitted = permit_output(t, demanded, allowed, running)
+    output = oscillate(t, permitted, amplitude.output.turn)
 
-    row.phase_error_rad = loop.error if closed else math.nan
+    flags |= HELD if loop.held == 1 else 0
+    flags |= FREQUENCY_CLAMPED if running and frequency.clamped == 1 else 0
+    flags |= SATURATED if running and amplitude.saturated == 1 else 0
+    row.phase_error_rad = vibration.error_rad if closed else math.nan
     row.flags = flags
     row.segment = progress.segment if running and progress.segment < progress.segments else -1
-    row.lock = t.lock[0].state
+    row.lock = control.lock.state
     row.guard = guard.mode
     return output
 

@@ -16,54 +16,16 @@ LOOP = np.dtype(
         ("sample", "i8"),
         ("lead_whole", "i8"),
         ("lead_fraction", "f8"),
+        ("dt_s", "f8"),
         ("force_channel", "i8"),
         ("drive_channel", "i8"),
+        ("skew_samples", "f8"),
         ("theta", "f8"),
-        ("omega", "f8"),
         ("theta_in", "f8"),
         ("cycles", "i8"),
         ("held", "i8"),
-        ("phase_integral", "f8"),
-        ("taking_over", "i8"),
         ("force", "f8"),
         ("drive_motion", "f8"),
-        ("sign_mean", "f8"),
-        ("force_square", "f8"),
-        ("force_size", "f8"),
-        ("response_size", "f8"),
-        ("displacement", "f8"),
-        ("amplitude_law", "i8"),
-        ("demanded_v", "f8"),
-        ("turn", "f8"),
-        ("demanded_turn", "f8"),
-        ("turn_behind", "i8"),
-        ("force_integral", "f8"),
-        ("log_integral", "c16"),
-        ("log_reference", "f8"),
-        ("reference_turn", "f8"),
-        ("response_error", "c16"),
-        ("late_force", "c16"),
-        ("late_drive", "c16"),
-        ("rest_force", "f8"),
-        ("rest_response", "f8"),
-        ("rest_error", "f8"),
-        ("plant_ratio", "c16"),
-        ("slope_known", "i8"),
-        ("slow_x", "f8"),
-        ("slow_f", "f8"),
-        ("square_x", "f8"),
-        ("product_xf", "f8"),
-        ("error", "f8"),
-        ("mean_error", "f8"),
-        ("sum_error", "f8"),
-        ("sum_force", "f8"),
-        ("sum_response", "f8"),
-        ("sum_controlled", "f8"),
-        ("sum_samples", "i8"),
-        ("saturated", "i8"),
-        ("clamped", "i8"),
-        ("held_back", "i8"),
-        ("behind", "i8"),
         ("drive", "i8"),
         ("waveform", "i8"),
         ("play", "i8"),
@@ -71,12 +33,10 @@ LOOP = np.dtype(
         ("seen", "i8"),
     ]
 )
-"""State of oscillator and laws (one record). ``turn``: angle of the complex command U that is put out, ``demanded_turn`` by
-its law, ``turn_behind``: 1 while it cannot rise there as fast as it should, -1 fall; ``displacement``: amplitude of the
-drive point (m); ``log_reference``, ``reference_turn``: logarithm of the displacement (m) and angle the response is held at;
-``late_`` amplitudes that passed one more low-pass, ``rest_`` sizes and phase error as they will be once the response keeps
-still (`rig.tick.laws.frequency.kernels.see_rest`); ``lost``: samples
-that have not come, less those that have since, never below 0; ``seen``: all that have come."""
+"""What is the tick's own (one record): sample counter, way from output to input, channels, oscillator phase on the output and
+at the inputs, readings of the sample, what drives. ``skew_samples``: delay of the force's channel less the drive point's;
+``held``: the level is not being ramped; ``lost``: samples that have not come, less those that have since, never below 0;
+``seen``: all that have come."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """What the tick has sent out and the inputs have not yet seen; a ring."""
@@ -133,14 +93,13 @@ def recorded_row(n_channels: int) -> np.dtype[Any]:
 
 
 class TickArrays(NamedTuple):
-    """Everything the tick reads and writes. The first eight are constants of the run, the rest is its state.
+    """Everything the tick reads and writes. The first seven are constants of the run, the rest is its state.
 
-    ``waveforms`` [n, period]: periodic waveforms of unit peak that segments may play; [1, 1] without any. ``phasors``
-    complex [H+1] and ``filters`` complex [2, H+1] belong to the adaptive filters of force and drive.
+    ``law`` is of `controller.law.LAW`, ``control`` its state, of `controller.law.CONTROL`. ``waveforms`` [n, period]: periodic
+    waveforms of unit peak that segments may play; [1, 1] without any.
     """
 
     law: np.ndarray
-    thresholds: np.ndarray
     rule: np.ndarray
     limits: np.ndarray
     inputs: np.ndarray
@@ -148,7 +107,7 @@ class TickArrays(NamedTuple):
     segments: np.ndarray
     waveforms: np.ndarray
     loop: np.ndarray
-    lock: np.ndarray
+    control: np.ndarray
     guard: np.ndarray
     watches: np.ndarray
     following: np.ndarray
@@ -156,5 +115,3 @@ class TickArrays(NamedTuple):
     progress: np.ndarray
     outcomes: np.ndarray
     history: np.ndarray
-    phasors: np.ndarray
-    filters: np.ndarray

@@ -6,18 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.law import Law
-from controller.layout import LOCK, AmplitudeLaw
+from controller import AmplitudeLaw, Law, control_state
 from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.errors import ConfigurationError
 from rig.tick.layout import HISTORY, LOOP, ROW, TickArrays, recorded_row
-from rig.tick.safety.following.expected import expected_record
-from rig.tick.safety.following.kernels import see_frequency
-from rig.tick.safety.following.layout import FOLLOWING
+from rig.tick.safety.expected import expected_record
+from rig.tick.safety.following import FOLLOWING, see_frequency
 from rig.tick.safety.kernels import is_over
 from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
-from rig.tick.sequencer.layout import PROGRESS, SETTLING
+from rig.tick.sequencer.judgement import SETTLING
+from rig.tick.sequencer.layout import PROGRESS
 from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
 __all__ = ["Tick", "TickSettings"]
@@ -58,31 +57,34 @@ class Tick:
             raise ConfigurationError(
                 f"lead_samples = {lead_samples:g}: an output shows at the next sample at the earliest"
             )
-        lag_rad = float(law_record["target_lag_rad"][0])
+        lag_rad = float(law_record["frequency"]["target_lag_rad"][0])
         table, outcomes = segment_table(segments, bench.sample_rate_hz, amplitude_law, lag_rad)
         force, drive = bench.index_of("force"), bench.index_of("drive")
         smallest = [SMALLEST_BITS * c.resolution_v / abs(c.sensitivity_v_per_unit) for c in bench.channels]
+        law_record["lock"] = law.lock.build(smallest[force], smallest[drive])
         loop = np.zeros(1, LOOP)
         loop["lead_whole"] = math.floor(lead_samples)
         loop["lead_fraction"] = lead_samples - math.floor(lead_samples)
+        loop["dt_s"] = 1.0 / bench.sample_rate_hz
         loop["force_channel"], loop["drive_channel"] = force, drive
+        loop["skew_samples"] = bench.channels[force].skew_samples - bench.channels[drive].skew_samples
+        loop["drive"] = table["drive"][:1]
+        control = control_state(law_record)
         first = segments[0].excitation if segments else None
-        loop["omega"] = law_record["centre_rad_s"] if first is None else 2.0 * math.pi * first.frequency_hz
+        if first is not None:
+            control["frequency"]["omega"] = 2.0 * math.pi * first.frequency_hz
+        omega = float(control["frequency"]["omega"][0])
         progress = np.zeros(1, PROGRESS)
-        progress["omega"] = loop["omega"]
+        progress["omega"] = omega
         progress["unlocked"] = 1
         progress["lag"] = table["lag_rad"][:1] if len(segments) else lag_rad
-        loop["drive"] = table["drive"][:1]
-        loop["log_integral"] = math.log(float(law_record["smallest_v"][0]))
-        harmonics = int(law_record["harmonics"][0])
         progress["segments"] = len(segments)
         expected, following = expected_record(bench, smallest[force], smallest[drive], exciter), np.zeros(1, FOLLOWING)
         following["reference_v"] = expected["floor_v"]
-        see_frequency(expected[0], following[0], float(loop["omega"][0]))
+        see_frequency(expected[0], following[0], omega)
         self.bench = bench
         self.arrays = TickArrays(
             law=law_record,
-            thresholds=law.lock.build(smallest[force], smallest[drive]),
             rule=settle.build(),
             limits=limits_record(bench),
             inputs=input_records(bench),
@@ -90,16 +92,14 @@ class Tick:
             segments=table,
             waveforms=np.zeros((1, 1)) if waveforms is None else np.ascontiguousarray(waveforms, float),
             loop=loop,
-            lock=np.zeros(1, LOCK),
+            control=control,
             guard=guard_record(armed),
             watches=watch_records(len(bench.channels)),
             following=following,
             settling=np.zeros(1, SETTLING),
             progress=progress,
             outcomes=outcomes,
-            history=_history(loop, 1.0 / bench.sample_rate_hz),
-            phasors=np.zeros(harmonics + 1, complex),
-            filters=np.zeros((2, harmonics + 1), complex),
+            history=_history(int(loop["lead_whole"][0]) + 2, omega, 1.0 / bench.sample_rate_hz),
         )
 
     @property
@@ -116,6 +116,11 @@ class Tick:
     def sample(self) -> int:
         """Number of samples done."""
         return int(self.arrays.loop["sample"][0])
+
+    @property
+    def frequency_hz(self) -> float:
+        """Frequency of the oscillator."""
+        return float(self.arrays.control["frequency"]["omega"][0]) / (2.0 * math.pi)
 
     @property
     def row_dtype(self) -> np.dtype[np.void]:
@@ -172,11 +177,9 @@ class TickSettings:
         )
 
 
-def _history(loop: np.ndarray, dt: float) -> np.ndarray:
+def _history(size: int, omega: float, dt: float) -> np.ndarray:
     """The ring of what was sent out, as if the oscillator had been running silently before."""
-    size = int(loop["lead_whole"][0]) + 2
     out = np.zeros(size, HISTORY)
-    omega = float(loop["omega"][0])
     ago = np.arange(size, 0, -1)
     out["theta"] = np.mod(-ago * omega * dt, 2.0 * math.pi)
     out["omega"] = omega

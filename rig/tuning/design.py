@@ -23,8 +23,7 @@ from controller.tuning import (
 )
 from controller.tuning.exact import frequencies_for
 from identification import FrequencyResponseMatrix
-from rig.tuning.errors import TuningError
-from rig.tuning.plant import largest_outside
+from rig.tuning.plant import TuningError, largest_outside
 
 __all__ = ["Chosen", "LawName", "choose", "gains_of"]
 
@@ -40,7 +39,7 @@ PHASE_PEAK = 1.6
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """Gains, and what they do."""
+    """Chosen gains, and the loops that they give."""
 
     law: LawName
     """Which law of frequency: ``frequency-error`` (with complex response control) or ``phase`` (levels in volts)."""
@@ -51,9 +50,9 @@ class Chosen:
     force_share: float
     """Gain over w_LP with which a force may be held through the response; 0 for the phase law."""
     design: Design
-    """On the plant as measured."""
+    """Loops with the plant as measured."""
     others: tuple[Design, ...]
-    """On the plant with two and four times its damping."""
+    """Loops with two and four times the plant's damping."""
     closed_form: HippoldGains
     """Closed form of Hippold et al. for the same low-pass, for comparison."""
     outside: tuple[float, float]
@@ -63,16 +62,16 @@ class Chosen:
 
     @property
     def sensitivity_peak(self) -> float:
-        """Largest max |S| of all loops on all dampings."""
+        """Largest max |S| of all loops over all dampings."""
         return max(_peak(design) for design in (self.design, *self.others))
 
 
 def choose(
     plant: PlantModel, responses: FrequencyResponseMatrix, law: str, largest_low_pass_rad_s: float, noise: str
 ) -> Chosen:
-    """The gains for a plant; ``noise`` says what bounds the low-pass.
+    """The gains for a plant; ``noise`` says in words what bounds the low-pass.
 
-    Raises `TuningError` with the numbers where none suit.
+    Raises `TuningError`, with the numbers, if no gains suit.
     """
     omega = plant.lock_frequency_rad_s()
     allowed = [w for w in (omega / part for part in LOW_PASSES) if w <= 1.001 * largest_low_pass_rad_s]
@@ -132,13 +131,13 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
 
 
 def _force_share(plant: PlantModel, w: float, share: float) -> float:
-    """Largest of some gains of a force loop around both laws that could be raised by half before it is unstable."""
+    """Largest of the tried gains of a force loop around both laws that may rise by half before the loop is unstable."""
     loops = ((part, _loop(plant, plant, w, share, 1.5 * part)) for part in FORCE_SHARES)
     return next((part for part, loop in loops if unstable_poles(loop) == 0), FORCE_SHARES[-1])
 
 
 def _loop(plant: PlantModel, measured: PlantModel, w: float, share: float, force_share: float = 0.0) -> ControlLoop:
-    """Both laws around a plant, with the gains for the one that was measured."""
+    """Both laws around ``plant``, with gains designed for the ``measured`` one."""
     response = complex_response_law(measured, w, smoothing_rad_s=w, force_share=force_share)
     return ControlLoop(plant, w, frequency_error_law(w, share=share), response)
 

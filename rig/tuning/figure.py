@@ -21,7 +21,7 @@ DASHES = ("-", "--", ":")
 
 
 def check_figure(figure: Path, overwrite: bool) -> None:
-    """Refuse, before anything moves, a figure that could not be written."""
+    """Raise `RecordingError`, before anything moves, for a figure that could not be written."""
     if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
     if figure.is_dir():
@@ -111,7 +111,7 @@ def _draw_frequency_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
 
 
 def _draw_level_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
-    """After a level 30 % higher: response in % of what it should rise by, and the lag."""
+    """Response and lag after a step to a level 30 % higher."""
     drawn = 0.0
     lag = axis.twinx()
     for line, design in zip(DASHES, designs, strict=False):

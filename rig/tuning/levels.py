@@ -1,4 +1,4 @@
-"""Levels of the backbone that a tuning proposes: from what can be told from noise to a part of the bench's limits."""
+"""Levels and low-pass of the proposed test: from the lowest force that noise allows to a part of the limits."""
 
 import math
 from collections.abc import Mapping
@@ -6,16 +6,50 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.tuning import PlantModel
+from controller.tuning import LowPassChoice, PlantModel, low_pass_from_densities
 from rig.bench import Bench
 from rig.campaigns.planning.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
 
-__all__ = ["LevelChoice", "choose_levels", "lowest_force_n", "needed_v", "reach_m"]
+__all__ = ["LevelChoice", "choose_levels", "low_pass", "lowest_force_n", "needed_v", "reach_m"]
 
-PART = 1.0 / 3.0  # of the limits at the linear plant: room for what the nonlinearity asks for on top
+LAG_STD_DEG = 0.75  # standard deviation of the lag before the settle rule averages it over ten periods
+RAISED = 3.0  # factor by which the lowest force may be raised
+
+
+def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float) -> tuple[float, float, str]:
+    """Largest low-pass (rad/s), the lowest force (N) at which the lag can be measured with it, and why.
+
+    At that force the standard deviation of the lag is `LAG_STD_DEG`. If at most `RAISED` times the wanted force is needed, the
+    force is raised and the low-pass is kept, because a slow low-pass costs time at every level.
+    """
+    omega = plant.lock_frequency_rad_s()
+    accelerance = abs(complex(plant.accelerance(1j * omega)))
+
+    def fluctuation(force_n: float) -> LowPassChoice:
+        amplitudes = (densities[0], force_n, densities[1], force_n * accelerance)
+        return low_pass_from_densities(omega, *amplitudes, lag_std_deg=LAG_STD_DEG)
+
+    quickest = fluctuation(1e6 * lowest_n)  # bounded by the frequency alone
+    needed_n = 1e6 * lowest_n * quickest.lag_std_deg / LAG_STD_DEG
+    if needed_n <= lowest_n:
+        choice = fluctuation(lowest_n)
+        return (
+            choice.low_pass_rad_s,
+            lowest_n,
+            f"the lag then fluctuates by {choice.lag_std_deg:.2g} deg at {lowest_n:.3g} N",
+        )
+    why = f"the lag then fluctuates by {LAG_STD_DEG:g} deg at"
+    if needed_n <= RAISED * lowest_n:
+        return quickest.low_pass_rad_s, needed_n, f"{why} {needed_n:.3g} N, the lowest level, raised for that"
+    choice = fluctuation(lowest_n)
+    force_n = lowest_n * max(1.0, choice.lag_std_deg / LAG_STD_DEG)
+    return choice.low_pass_rad_s, force_n, f"{why} {force_n:.3g} N, the lowest level"
+
+
+PART = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
 SPAN = 30.0  # highest level over lowest, where noise allows
-BITS = 2.0  # amplitude of the force, in the converter's least bits, at the lowest level
+BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
 
 
 @dataclass(frozen=True)
@@ -44,9 +78,9 @@ def needed_n(plant: PlantModel, level_m: float) -> float:
 
 
 def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tuple[float, str]:
-    """Largest displacement of the drive point (m peak) that keeps the linear plant within the bench's limits, and what ends it.
+    """Largest displacement of the drive point (m peak) within the bench's limits on the linear plant, and which limit ends it.
 
-    ``ratios`` are how far channels move for one metre at the drive point, by name.
+    ``ratios`` are displacements of channels per displacement of the drive point, by name.
     """
     limits, omega = bench.limits, plant.lock_frequency_rad_s()
     name, ratio = max(ratios.items(), key=lambda entry: entry[1], default=("", 1.0))
@@ -62,7 +96,7 @@ def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tup
 
 
 def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
-    """Lowest useful force: a part of the highest one, but some bits of the converter."""
+    """Lowest useful force: a part of the highest one, but at least some bits of the converter."""
     force = next(channel for channel in bench.channels if channel.role == "force")
     bit = force.resolution_v / abs(force.sensitivity_v_per_unit)
     return max(needed_n(plant, highest_m) / SPAN, BITS * bit)
@@ -78,7 +112,7 @@ def choose_levels(
     to_m: float | None = None,
     points: int = 8,
 ) -> LevelChoice:
-    """Levels in equal ratios between the lowest force that can be told and a third of what the limits allow.
+    """Levels in equal ratios, from the lowest force above noise to a third of what the limits allow.
 
     ``ratios`` as for `reach_m`. Raises `ConfigurationError` for a level beyond what the bench reaches.
     """
@@ -109,5 +143,5 @@ def choose_levels(
 
 
 def significant(value: float, digits: int = 5) -> float:
-    """A number with some digits, as people write it."""
+    """A number rounded to some significant digits."""
     return value if value == 0.0 or not math.isfinite(value) else float(f"{value:.{digits}g}")

@@ -1,4 +1,4 @@
-"""The low-level multisine of a tuning: from a safe voltage upwards until the responses are told from noise.
+"""The low-level multisine of a tuning: from a safe voltage upwards until the responses stand out of the noise.
 
 All of it goes through the ordinary runner into one recording, level by level a change of its plan.
 """
@@ -16,8 +16,7 @@ from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, See
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
-from rig.tuning.errors import TuningError
-from rig.tuning.spectra import coherence_of, densities, near, voltage_responses
+from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
 __all__ = ["LinearTest", "measure"]
 
@@ -32,24 +31,24 @@ SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)
 
 @dataclass(frozen=True, eq=False)
 class LinearTest:
-    """What the multisine has told."""
+    """Result of the multisine."""
 
     level_rms_v: float
-    """Level that sufficed, V RMS."""
+    """Level that was used, V RMS."""
     responses: FrequencyResponseMatrix
     """Force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
     lead_samples: float
-    """Samples from an output to the input that shows it: block, queue and filters of the device that was started."""
+    """Samples from an output to its effect in the inputs: block, queue and filters of the device."""
     coherence: tuple[float, float]
     """Median over the band around the mode, of force and drive with the voltage, one period each."""
     distortion: float
-    """Nonlinear part of the force's response beside its linear one, median over that band; 0 where noise hides it."""
+    """Ratio of the nonlinear to the linear part of the force response, median over that band; 0 if noise hides it."""
     force_density: float
     """One-sided density of the force's noise near the mode, N^2/Hz."""
     acceleration_density: float
     """The same of the drive acceleration, (m/s^2)^2/Hz."""
     levels_tried_v: tuple[float, ...]
-    """Levels on the way, V RMS."""
+    """All levels that were played in the search, V RMS."""
 
 
 def measure(

@@ -1,4 +1,4 @@
-"""The plan that a tuning writes: TOML that runs as it is, with a comment for the origin of each number."""
+"""The plan that a tuning writes: TOML with a comment on the origin of each number."""
 
 import json
 import math

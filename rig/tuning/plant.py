@@ -1,30 +1,86 @@
-"""From the responses of the linear test to the plant, and what it says of the bench's facts."""
+"""From the spectra of the linear test to the plant, and how the plant differs from the bench's facts."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.tuning import PlantModel
-from identification import FrequencyResponseMatrix
+from identification import FrequencyResponseMatrix, PeriodicSpectra, best_linear_approximation
 from rig.bench import Bench
-from rig.tuning.errors import TuningError
-from rig.tuning.spectra import FIT_BAND, near
+from rig.errors import RigError
 
-__all__ = ["ALLOWED_OFFSET", "compared_with_bench", "largest_outside", "mass_ratios", "measured_ratios", "plant_of"]
+__all__ = [
+    "ALLOWED_OFFSET",
+    "FIT_BAND",
+    "TuningError",
+    "coherence_of",
+    "compared_with_bench",
+    "densities",
+    "largest_outside",
+    "mass_ratios",
+    "measured_ratios",
+    "near",
+    "plant_of",
+    "voltage_responses",
+]
+
+
+class TuningError(RigError):
+    """A rig cannot be tuned: its test shows no mode, or no gains suit it. The message has the numbers."""
+
+
+Real = NDArray[np.float64]
+
+FIT_BAND = (0.6, 1.6)  # of the linear frequency: that of the plant's model
+
+
+def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
+    """Median coherence of force and drive with the voltage around the mode, of one period."""
+    around = near(bench, measured.frequency_hz) & measured.excited
+    out = []
+    for role in ("force", "drive"):
+        index = measured.index(next(c.name for c in bench.channels if c.role == role))
+        power = np.mean(np.abs(measured.mean[:, index][:, around]) ** 2, axis=0)
+        noise = np.mean(measured.noise_variance[:, index][:, around], axis=0)
+        signal = np.maximum(power - noise / measured.spectra.shape[1], 0.0)
+        out.append(float(np.median(signal)) / max(float(np.median(signal)) + float(np.median(noise)), 1e-300))
+    return out[0], out[1]
+
+
+def voltage_responses(bench: Bench, measured: PeriodicSpectra) -> FrequencyResponseMatrix:
+    """Force, drive acceleration, and the accelerations of all response channels per volt, with covariance."""
+    names = [c.name for role in ("force", "drive", "response") for c in bench.channels if c.role == role]
+    return best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
+
+
+def near(bench: Bench, frequency_hz: Real) -> NDArray[np.bool_]:
+    """Which lines lie in the band of the plant's model."""
+    linear = bench.specimen.linear_frequency_hz
+    return np.asarray((frequency_hz > FIT_BAND[0] * linear) & (frequency_hz < FIT_BAND[1] * linear))
+
+
+def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
+    """One-sided noise densities: a line of resolution d carries the power S d, half the square of its peak amplitude."""
+    around = near(bench, measured.frequency_hz)
+    step = float(np.diff(measured.frequency_hz).mean())
+    rows = [measured.index(next(c.name for c in bench.channels if c.role == role)) for role in ("force", "drive")]
+    variance = [float(np.mean(measured.noise_variance[:, row][:, around])) for row in rows]
+    return 0.5 * variance[0] / step, 0.5 * variance[1] / step
+
 
 ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
 WORTH_SAYING_HZ = 0.005
 WORTH_SAYING_SHAPE = 0.05
-TOLD = 3.0  # standard errors from which on a channel's motion is told from noise
+TOLD = 3.0  # standard errors from which on the motion of a channel counts as measured
 TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-error law
 
 
 def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float) -> PlantModel:
     """The plant fitted to force and drive acceleration per volt around the bench's linear frequency.
 
-    ``lead_samples`` from an output to the input that shows it are those of the run that measured the responses: a device
-    knows its queue and its filters once it has started.
+    ``lead_samples`` from an output to its effect in the inputs are those of the run that measured the responses.
 
     Raises `TuningError` where they show no mode of the structure.
     """
@@ -49,10 +105,10 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: flo
 
 
 def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
-    """How far each response channel moves for one metre at the drive point at resonance, by name.
+    """Displacement of each response channel per displacement of the drive point at resonance, by name.
 
     Least squares of the channel's response to that of the drive point, over the lines within a bandwidth of the mode. A
-    channel that cannot be told from noise is left out.
+    channel that does not stand out of the noise is left out.
     """
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     frequency = responses.frequency_hz
@@ -70,7 +126,7 @@ def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> di
 
 
 def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
-    """What of the bench's facts differs from the measurement, one line each.
+    """Differences between the bench's facts and the measurement, one line each.
 
     Raises `TuningError` where the mode lies so far from the bench's linear frequency that it may be another one.
     """
@@ -123,7 +179,7 @@ def largest_outside(
 def mass_ratios(bench: Bench, responses: FrequencyResponseMatrix, plant: PlantModel) -> tuple[float, float]:
     """Smallest and largest mass ratio mu that models of this band and of all measured lines find.
 
-    Near one mode the exciter's moving mass is hard to tell from its spring: where the two differ, neither is to be believed.
+    Near one mode the exciter's moving mass is hard to separate from its spring: if the two differ, the ratio is not identified.
     """
     try:
         wide = PlantModel.from_frequency_responses(

@@ -86,7 +86,7 @@ def _margins(found: Margins) -> dict[str, float]:
 
 
 def lines(found: dict[str, Any]) -> list[str]:
-    """A `summary` for people."""
+    """Lines of text from a `summary`."""
     test, plant, levels = found["test"], found["plant"], found["levels_m"]
     low, high = plant["mass_ratio"]
     shape = plant["bench_drive_mode_shape"]
@@ -98,7 +98,7 @@ def lines(found: dict[str, Any]) -> list[str]:
         f"{100.0 * plant['damping_ratio']:.3f} %, phi_d {plant['drive_mode_shape']:.4f} kg^-1/2 "
         f"(bench {'none' if shape is None else format(shape, 'g')})",
         f"with exciter   {plant['coupled_pole_hz']:.3f} Hz, damping {100.0 * plant['coupled_damping_ratio']:.2f} %, mass ratio "
-        + (f"{low:.3f}" if high - low < 0.2 * abs(high) else f"not to be told ({low:.3f} to {high:.3f})")
+        + (f"{low:.3f}" if high - low < 0.2 * abs(high) else f"could not be identified ({low:.3f} to {high:.3f})")
         + f", {plant['force_per_v_n']:.3g} N/V at resonance; model within {100.0 * plant['fit_error']:.2g} %",
         f"law            {found['law']}: {found['why']}",
         *(f"  {name} = {_number(value)}" for name, value in found["gains"].items()),

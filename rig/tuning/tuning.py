@@ -12,9 +12,8 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.level_search import MultisineSeries
 from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
-from rig.tuning.levels import PART, LevelChoice, choose_levels, lowest_force_n, reach_m
+from rig.tuning.levels import PART, LevelChoice, choose_levels, low_pass, lowest_force_n, reach_m
 from rig.tuning.linear_test import LinearTest, measure
-from rig.tuning.noise import low_pass
 from rig.tuning.plan import plan_text
 from rig.tuning.plant import compared_with_bench, measured_ratios, plant_of
 
@@ -66,7 +65,7 @@ class TuningRequest:
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """What a tuning has found."""
+    """Result of a tuning."""
 
     bench: Bench
     """The bench."""
@@ -77,13 +76,13 @@ class Tuning:
     plant: PlantModel
     """The plant near the mode."""
     response_ratios: dict[str, float]
-    """How far each response channel moves for one metre at the drive point at resonance, as measured, by name."""
+    """Measured displacement of each response channel per displacement of the drive point at resonance, by name."""
     chosen: Chosen
     """The gains."""
     levels: LevelChoice
     """The levels."""
     notes: tuple[str, ...]
-    """What a user should know, one line each."""
+    """Notes for the user, one line each."""
     plan_toml: str
     """The plan."""
 
@@ -110,7 +109,7 @@ def tune(
 
     ``named`` is what the plan calls the bench.
 
-    Raises `rig.tuning.errors.TuningError` where the rig is unsuited, with the numbers,
+    Raises `rig.tuning.plant.TuningError` where the rig is unsuited, with the numbers,
     `rig.errors.ConfigurationError` for what the bench does not allow, `rig.errors.RecordingError` for a recording that
     cannot be written.
     """
@@ -151,7 +150,7 @@ def tune(
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:
-    """What may go otherwise than the linear plant has it."""
+    """Notes on what may differ from the linear plant."""
     out = []
     if test.distortion > NONLINEAR:
         out.append(

@@ -1,4 +1,4 @@
-"""One end of a wire, as host and device see it: whole messages in and out, whatever carries them."""
+"""`Link`: one end of a wire, for host or device. Whole messages go in and out, whatever carries them."""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -9,14 +9,14 @@ __all__ = ["Link", "Load"]
 
 
 class Load(NamedTuple):
-    """What a stream asks of a wire and what the wire carries."""
+    """Bit rate that a stream needs and that the wire has."""
 
     needed_bit_s: float
     """Bits per second, with framing, checksums and worst-case stuffing, both directions where they share the wire."""
     available_bit_s: float
     """Bits per second of the wire; infinite for a wire that does not exist (a pseudo-terminal)."""
     sum_text: str
-    """The sum written out, for the message that refuses it."""
+    """The sum written out, for the error if it is too much."""
 
     @property
     def share(self) -> float:
@@ -27,9 +27,9 @@ class Load(NamedTuple):
 class Link(ABC):
     """One end of a wire.
 
-    `receive` is called in a loop and must be cheap: it returns the next whole message, or None when none came within the
-    time. Damaged, foreign or impossible frames never leave the link: they are counted and skipped, and memory stays bounded
-    whatever comes in. Stream frames are only understood after `configure`.
+    `receive` is called in a loop and must be cheap: it returns the next whole message, or None if none came in time. Damaged,
+    foreign or impossible frames are counted and skipped inside the link, and memory stays bounded whatever comes in. Samples
+    and outputs are understood only after `configure`.
 
     Errors: `DaqDisconnected` once the other end or the port is gone, `DaqBusy` for a port that somebody else holds.
     """
@@ -37,7 +37,7 @@ class Link(ABC):
     def __init__(self, name: str) -> None:
         self.name = name
         self.counters: dict[str, int] = {}
-        """What went wrong so far, by name; whole numbers that only grow."""
+        """Faults so far, by name; whole numbers that only grow."""
 
     @abstractmethod
     def open(self) -> None:
@@ -45,7 +45,7 @@ class Link(ABC):
 
     @abstractmethod
     def configure(self, stream: Stream) -> None:
-        """Agree on the shape of samples and outputs; called at both ends before START takes effect."""
+        """Set the shape of samples and outputs; called at both ends before START takes effect."""
 
     @abstractmethod
     def send(self, message: Message) -> None:
@@ -53,22 +53,22 @@ class Link(ABC):
 
     @abstractmethod
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait for it at most so long, 0 does not wait."""
+        """Return the next message, or None after ``timeout_s``; 0 does not wait."""
 
     @abstractmethod
     def load(self, stream: Stream) -> Load:
-        """What a stream would ask of this wire."""
+        """Load of this wire by a stream."""
 
     @property
     def largest_block(self) -> int:
-        """Samples that a block may have on this wire."""
+        """Largest number of samples in a block on this wire."""
         return 1 << 16
 
     @property
     def layout_crc(self) -> int:
-        """CRC-32 of the definition both ends must share; 0 where the protocol's page says it all."""
+        """CRC-32 of the definition that both ends must share; 0 if the wire has none."""
         return 0
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the port; any time, any number of times, whatever has happened to it."""
+        """Close the port; allowed at any time, any number of times, also after an error."""

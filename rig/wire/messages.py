@@ -1,8 +1,8 @@
 """The messages that host and device exchange, whatever the wire: requests and answers, samples, outputs, heartbeats.
 
 A device is a dictionary of parameters of four bytes each, a state (`DeviceState`) and two streams. Every command is one
-`Request`, answered by one `Answer` with the same number, and repeated by the host until it is; a device that sees the number of
-its last request again repeats its answer and does nothing. Samples and outputs are never repeated: what is lost stays a gap.
+`Request`, answered by one `Answer` with the same number. The host repeats a request until it is answered; a device that
+receives its last request again only repeats the answer. Samples and outputs are never repeated: a lost one stays a gap.
 """
 
 from enum import IntEnum, IntFlag
@@ -30,10 +30,10 @@ __all__ = [
 ]
 
 VERSION = 1
-"""Version of the protocol that this product speaks."""
+"""Version of the protocol that this package speaks."""
 
 HEARTBEATS_HZ = 10
-"""Heartbeats a second, besides those at every change of state."""
+"""Heartbeats per second; every change of state sends a further one."""
 
 
 class Command(IntEnum):
@@ -48,14 +48,14 @@ class Command(IntEnum):
     STOP = 4
     """0 V at once, end sampling. Any time."""
     ARM = 5
-    """Let outputs through from now on, and start the watchdog; ``value`` is `ARM_KEY`. Only while running."""
+    """Put outputs on the converter from now on, and start the watchdog; ``value`` is `ARM_KEY`. Only while running."""
     DISARM = 6
     """0 V at once; sampling goes on."""
     CLEAR = 7
     """Forget a latched watchdog or emergency stop, once its cause is gone. Only while idle."""
 
 
-ARM_KEY = 0x41524D21  # "ARM!": no bit error of another command arms a device
+ARM_KEY = 0x41524D21  # "ARM!": no bit error in another command arms a device
 
 
 class Status(IntEnum):
@@ -63,7 +63,7 @@ class Status(IntEnum):
 
     DONE = 0
     UNKNOWN = 1
-    """It knows no such command, parameter or item."""
+    """There is no such command, parameter or item."""
     NOT_ALLOWED = 2
     """The value is not allowed; the answer's ``value`` is the nearest that is."""
     WRONG_STATE = 3
@@ -80,20 +80,20 @@ class DeviceState(IntEnum):
     RUNNING = 1
     """Sampling, 0 V."""
     ARMED = 2
-    """Sampling, outputs let through, watchdog running."""
+    """Sampling, outputs on the converter, watchdog running."""
     LATCHED = 3
-    """0 V until it is stopped and cleared; sampling goes on if it did."""
+    """0 V until it is stopped and cleared; sampling goes on if it was under way."""
 
 
 class DeviceFlag(IntFlag):
-    """Remarks of the device on a block of samples."""
+    """What the device has noticed in a block of samples."""
 
     OVERLOAD = 1
     """An input was beyond its range."""
     OUTPUT_CLIPPED = 2
     """An output was beyond the converter's range."""
     OUTPUT_HELD = 4
-    """An output had not come in time: the last one was held."""
+    """An output did not arrive in time: the last one was held."""
     WATCHDOG = 8
     """The watchdog has brought the output to 0 V, and latched."""
     EMERGENCY_STOP = 16
@@ -106,7 +106,7 @@ class Parameter(IntEnum):
     LOWEST_VERSION = 1
     HIGHEST_VERSION = 2
     VERSION = 3
-    """To be set first: the version that both speak."""
+    """Set first: a version that host and device both speak."""
     MODEL = 4
     """Text."""
     FIRMWARE = 5
@@ -116,14 +116,14 @@ class Parameter(IntEnum):
     BOOT = 7
     """Another number after every reset."""
     SIMULATED = 8
-    """1 where nothing physical moves; 2 where, besides, the same outputs after START always give the same samples."""
+    """1: nothing physical moves. 2: moreover, the same outputs after START always give the same samples."""
     STATE = 9
     """`DeviceState`."""
     N_CHANNELS = 16
     CHANNEL_NAME = 17
     """Text, by channel."""
     CHANNEL_UNIT = 18
-    """Text, by channel: of what `CHANNEL_V_PER_COUNT` scales to, ``V``."""
+    """Text, by channel: unit that `CHANNEL_V_PER_COUNT` scales to, ``V``."""
     CHANNEL_RANGE_V = 19
     """Largest reading, by channel."""
     CHANNEL_V_PER_COUNT = 20
@@ -192,9 +192,9 @@ class Samples(NamedTuple):
     flags: int = 0
     """`DeviceFlag`."""
     dropped: int = 0
-    """Samples that the device could not send since START, in all."""
+    """Number of samples since START that the device could not send."""
     clock_us: int = 0
-    """Device clock when the last row was measured, microseconds; 0 where the wire has no room for it."""
+    """Device clock when the last row was measured, microseconds; 0 on wires that do not carry it."""
     sequence: int = 0
     """Number of the block on the wire, wrapping."""
 
@@ -203,7 +203,7 @@ class Output(NamedTuple):
     """Host to device: the outputs of one block."""
 
     first: int
-    """Index of the sample from which on they are due: (j + q) n."""
+    """Index of the sample at which the first of them is due: (j + q) n."""
     counts: np.ndarray
     """int16 or int32 [n]."""
     sequence: int = 0
@@ -226,7 +226,7 @@ class Heartbeat(NamedTuple):
 
 
 class EmergencyStop(NamedTuple):
-    """Host to device, or from anybody on a bus: 0 V at once, and latch. Sent three times, answered by a heartbeat."""
+    """From the host, or from anyone on a bus: 0 V at once, and latch. Sent three times, answered by a heartbeat."""
 
     reason: int = 0
 
@@ -235,7 +235,7 @@ Message = Request | Answer | Samples | Output | Heartbeat | EmergencyStop
 
 
 class Stream(NamedTuple):
-    """What samples and outputs look like from START on; both ends know it from the parameters."""
+    """Shape and rate of samples and outputs from START on; both ends know it from the parameters."""
 
     n_channels: int
     block: int

@@ -102,7 +102,7 @@ def test_at_the_voltage_limit_the_ramp_waits_and_no_integral_grows(law, level):
     assert np.count_nonzero(limited) > 20 * 33  # more than twenty periods
     assert tick.arrays.progress["level"][0] < 0.9 * level  # where the ramp was frozen
     assert tick.arrays.progress["frozen_cycles"][0] >= 20.0
-    assert tick.arrays.loop["log_integral"][0].real < np.log(0.5) + 0.7
+    assert tick.arrays.control["amplitude"]["force"]["log_integral"][0].real < np.log(0.5) + 0.7
 
 
 def test_a_knock_while_recording_spoils_the_point_and_the_next_is_measured(monkeypatch):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import rig
-from controller.layout import LOCK, LockState
+from controller.lock import LOCK, LockState
 from rig.campaigns.plans import load_plan
-from rig.tick.sequencer.kernels import CLAMPED_PERIODS, FAR_PERIODS, start_verdict
-from rig.tick.sequencer.layout import SETTLING, Outcome
+from rig.tick.sequencer.judgement import CLAMPED_PERIODS, FAR_PERIODS, SETTLING, start_verdict
+from rig.tick.sequencer.layout import Outcome
 from tests.rig.rigs import bench_with
 
 

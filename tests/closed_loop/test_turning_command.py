@@ -90,7 +90,7 @@ def _turned_round(slew_v_per_s):
         for rows in Loop(daq, tick).run():
             chunks.append(rows)
             if mark == 0 and tick.arrays.progress["segment"][0] == 3 and tick.sample > 18000:
-                tick.arrays.loop["reference_turn"] += math.radians(170.0)
+                tick.arrays.control["amplitude"]["response"]["reference_turn"] += math.radians(170.0)
                 mark = tick.sample
     assert mark > 0
     return np.concatenate(chunks), mark

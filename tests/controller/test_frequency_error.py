@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.kernels import LARGEST_FREQUENCY_ERROR, frequency_error
+from controller.frequency import LARGEST_FREQUENCY_ERROR, frequency_error
 
 SHAPE = 0.9
 

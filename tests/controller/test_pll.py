@@ -33,9 +33,9 @@ def test_the_sign_reading_is_a_pi_law_with_the_gains_of_its_low_pass():
 
 def test_the_coefficients_are_those_of_the_sample_rate():
     law = preset("magnet-beam").build(5000.0, AmplitudeLaw.VOLTAGE, 5.0)
-    assert law["dt_s"][0] == 1 / 5000
-    assert law["demodulator_gain"][0] == pytest.approx(1 - math.exp(-2 * math.pi / 5000))
-    assert law["highest_rad_s"][0] == pytest.approx(2 * math.pi * 1.1 * 24.37)
+    assert law["frequency"]["dt_s"][0] == 1 / 5000
+    assert law["detector"]["gain"][0] == pytest.approx(1 - math.exp(-2 * math.pi / 5000))
+    assert law["frequency"]["highest_rad_s"][0] == pytest.approx(2 * math.pi * 1.1 * 24.37)
 
 
 @pytest.mark.parametrize(
@@ -122,14 +122,14 @@ def test_levels_that_no_loop_would_hold_are_refused_for_the_sample_rate_and_leve
 
 def test_the_response_gain_cancels_the_plants_pole_and_is_real_for_the_amplitude_alone():
     complex_law = _second_generation().build(5000.0, AmplitudeLaw.RESPONSE, 5.0)
-    assert complex_law["response_kp"][0] == pytest.approx(7.5 / (11.5 - 3.9j))
+    assert complex_law["amplitude"]["response"]["kp"][0] == pytest.approx(7.5 / (11.5 - 3.9j))
     real_law = _second_generation(response_loop="amplitude").build(5000.0, AmplitudeLaw.RESPONSE, 5.0)
-    assert real_law["response_kp"][0] == pytest.approx((7.5 / (11.5 - 3.9j)).real)
-    assert (complex_law["turns"][0], real_law["turns"][0]) == (1, 0)
+    assert real_law["amplitude"]["response"]["kp"][0] == pytest.approx((7.5 / (11.5 - 3.9j)).real)
+    assert [law["amplitude"]["response"]["turns"][0] for law in (complex_law, real_law)] == [1, 0]
 
 
 def test_the_mode_shape_of_the_controller_goes_before_that_of_the_bench():
     own = _second_generation().build(5000.0, AmplitudeLaw.VOLTAGE, 5.0, drive_mode_shape=0.5)
     benchs = _second_generation(drive_mode_shape=None).build(5000.0, AmplitudeLaw.VOLTAGE, 5.0, drive_mode_shape=0.5)
-    assert own["mode_shape_squared"][0] == pytest.approx(0.81)
-    assert benchs["mode_shape_squared"][0] == pytest.approx(0.25)
+    assert own["frequency"]["mode_shape_squared"][0] == pytest.approx(0.81)
+    assert benchs["frequency"]["mode_shape_squared"][0] == pytest.approx(0.25)

@@ -8,9 +8,7 @@ import pytest
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from controller import OpenLoop
-from controller.lock.rule import LockRule
-from controller.pll import PhaseLockedLoop
+from controller import LockRule, OpenLoop, PhaseLockedLoop
 from rig import errors as rig_errors
 from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
 from rig.campaigns.backbone.plan import BackbonePlan

@@ -27,7 +27,7 @@ from rig.wire.messages import (
 )
 from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec
 from rig.wire.serial.frames import FrameReader, frame
-from rig.wire.serial.load import line_load
+from rig.wire.serial.link import line_load
 from tests.docs import wire
 from tests.docs.tables import table_under
 from tests.docs.test_keys import shown_default, shown_range

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from rig.wire.can.codec import CanCodec
-from rig.wire.can.dbc import compile_text
-from rig.wire.can.definition import definition, shape_of
 from rig.wire.can.frames import Frame, frame_seconds
-from rig.wire.can.load import bus_load
-from rig.wire.can.protocol import FrameKind, protocol
+from rig.wire.can.layout import compile_text
+from rig.wire.can.link import bus_load
+from rig.wire.can.protocol import FrameKind, definition, protocol, shape_of
 from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
 from tests.docs.pages import ROOT, blocks
 

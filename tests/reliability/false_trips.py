@@ -15,7 +15,7 @@ from controller import AmplitudeLaw
 from rig.campaigns.plans import bench_of, load_plan, shipped_plans
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
-from rig.tick.safety.following.kernels import ASTRAY_PERIODS
+from rig.tick.safety.following import ASTRAY_PERIODS
 from rig.tick.safety.layout import EndReason
 from rig.tick.tick import TickSettings
 from tests.rig.rigs import bench_with

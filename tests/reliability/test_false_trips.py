@@ -2,7 +2,7 @@
 
 import pytest
 
-from rig.tick.safety.following.kernels import ASTRAY_PERIODS
+from rig.tick.safety.following import ASTRAY_PERIODS
 from rig.tick.safety.layout import EndReason
 from tests.reliability.false_trips import SoundRun, held_level_plans, sound_run, table_of
 

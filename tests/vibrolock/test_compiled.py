@@ -91,3 +91,17 @@ def test_digests_are_the_same_in_every_process():
     }
     assert len(answers) == 1
     assert len(answers.pop()) > 500
+
+
+def test_a_type_of_argument_that_stands_in_another_module_now_compiles_anew(tmp_path):
+    (tmp_path / "summing.py").write_text(
+        "from vibrolock.compiled import kernel\n\n@kernel\ndef total(pair):\n    return pair.a + pair.b\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    for module in ("here", "there"):
+        (tmp_path / f"{module}.py").write_text("from collections import namedtuple\nPair = namedtuple('Pair', 'a b')\n")
+        code = f"import summing, {module}; print(summing.total({module}.Pair(1.0, 2.0)))"
+        out = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        assert out.stdout == "3.0\n"
+        (tmp_path / f"{module}.py").unlink()

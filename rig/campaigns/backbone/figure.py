@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from identification import IdentificationError, NonlinearMode, nonlinear_mode
-from rig.campaigns.backbone.campaign import recorded_backbone
+from rig.campaigns.backbone.points import recorded_backbone
 from rig.campaigns.evaluation.figure import draw_history, heading
 from rig.figures.nonlinear_mode import draw_properties
 from rig.figures.style import say_why_empty

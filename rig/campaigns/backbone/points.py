@@ -16,7 +16,9 @@ from identification import (
     short_point,
 )
 from rig.bench import Bench
+from rig.bench.configuration import validated
 from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import (
     alien_objection,
     first_of,
@@ -28,6 +30,7 @@ from rig.campaigns.evaluation.acceptance import (
 from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.drift import of_the_result
 from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
+from rig.campaigns.evaluation.recorded import bench_of_recording, points_of
 from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import (
@@ -39,8 +42,16 @@ from rig.campaigns.evaluation.vibrations import (
     within_periods,
 )
 from rig.campaigns.planning.plan import Column, Target
+from rig.recording.reader import Recording
 
-__all__ = ["BACKBONE_COLUMNS", "ShortPointResult", "backbone_of", "measure_backbone_point"]
+__all__ = [
+    "BACKBONE",
+    "BACKBONE_COLUMNS",
+    "ShortPointResult",
+    "backbone_of",
+    "measure_backbone_point",
+    "recorded_backbone",
+]
 
 NEAR = 0.1  # in the logarithm of the amplitude, of what a point of the slow flow is made
 
@@ -165,3 +176,30 @@ def backbone_of(
         tuple(point.direction for point in accepted),
         tuple(point.repeat for point in accepted),
     )
+
+
+def recorded_backbone(recording: Recording) -> Backbone:
+    """The accepted points that the plan asks for, in the order of the plan."""
+    bench = bench_of_recording(recording)
+    plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
+    return backbone_of(
+        points_of(recording),
+        recording.channels,
+        bench.specimen.name,
+        bench.specimen.drive_mode_shape,
+        plan.controller.phase_lag_deg + 180.0,
+    )
+
+
+BACKBONE = Campaign(
+    plan=BackbonePlan,
+    result=ShortPointResult,
+    measure=measure_backbone_point,
+    columns=BACKBONE_COLUMNS,
+    draw="rig.campaigns.backbone.figure:draw",
+    identity=("controller.phase_lag_deg",),
+    fixed=("harmonics",),
+    measurements={Backbone: recorded_backbone},
+    exchanged=lambda recording: [recorded_backbone(recording)],
+    experiments="segments",
+)

@@ -16,6 +16,7 @@ from identification import (
     continuous_backbone,
 )
 from rig.bench import Bench
+from rig.campaigns.campaign import Campaign
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
 from rig.campaigns.continuous_backbone.ways import WAYS, Way, both_ways, rows_near
 from rig.campaigns.evaluation.acceptance import alien_objection, first_of, std_objection
@@ -32,18 +33,23 @@ from rig.campaigns.evaluation.point import (
     result_of,
     vibration_of,
 )
+from rig.campaigns.evaluation.recorded import bench_of_recording, points_of
 from rig.campaigns.evaluation.recorded_flow import recorded_flow
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import channels_from, not_evaluated, vibration_from
 from rig.campaigns.planning.plan import Column, Target
 from rig.errors import RecordingError
+from rig.recording.reader import Recording
 
 __all__ = [
+    "CONTINUOUS_BACKBONE",
     "CONTINUOUS_BACKBONE_COLUMNS",
     "ContinuousBackboneResult",
     "OneWay",
     "continuous_backbones_of",
     "measure_continuous_backbone",
+    "recorded_continuous_backbones",
+    "recorded_mean_backbone",
 ]
 
 CONTINUOUS_BACKBONE_COLUMNS = (
@@ -276,3 +282,34 @@ def _both_ways(point: Point[ContinuousBackboneResult]) -> tuple[OneWay, OneWay]:
     if result.up is None or result.down is None:
         raise RecordingError(f"{point_name(point.number)}: is accepted, but holds one way only")
     return result.up, result.down
+
+
+def recorded_continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
+    """The accepted points, one backbone per repeat, with what was found on the way up and on the way down."""
+    specimen = bench_of_recording(recording).specimen
+    return continuous_backbones_of(
+        points_of(recording, ContinuousBackboneResult), recording.channels, specimen.name, specimen.drive_mode_shape
+    )
+
+
+def recorded_mean_backbone(recording: Recording) -> Backbone:
+    """The means of up and down of all repeats, which know nothing of what lay between the two."""
+    passes = recorded_continuous_backbones(recording)
+    points = [point for one in passes for point in one.backbone.points]
+    repeats = [number for number, one in enumerate(passes, 1) for _ in one.backbone.points]
+    first = passes[0].backbone
+    return Backbone(tuple(points), first.specimen, first.drive_mode_shape, repeats=tuple(repeats))
+
+
+CONTINUOUS_BACKBONE = Campaign(
+    plan=ContinuousBackbonePlan,
+    result=ContinuousBackboneResult,
+    measure=measure_continuous_backbone,
+    in_one_go=True,
+    columns=CONTINUOUS_BACKBONE_COLUMNS,
+    draw="rig.campaigns.continuous_backbone.figure:draw",
+    identity=("controller.phase_lag_deg",),
+    fixed=("harmonics",),
+    measurements={Backbone: recorded_mean_backbone, ContinuousBackbone: recorded_continuous_backbones},
+    exchanged=lambda recording: [recorded_mean_backbone(recording)],
+)

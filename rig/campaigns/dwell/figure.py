@@ -4,8 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.campaigns.dwell.campaign import recorded_course
-from rig.campaigns.dwell.points import DwellResult
+from rig.campaigns.dwell.points import DwellResult, recorded_course
 from rig.campaigns.evaluation.figure import heading
 from rig.campaigns.evaluation.recorded import points_of
 from rig.figures.style import MAIN, REJECTED, SECOND, engineering

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification import InstrumentResponse, PeriodicSpectra
 from rig.campaigns.evaluation.recorded import specimen_of
-from rig.campaigns.multisine.campaign import recorded_spectra
+from rig.campaigns.multisine.points import recorded_spectra
 from rig.figures.style import MAIN, REJECTED, SECOND, unit_text
 from rig.figures.style import title as heading
 from rig.recording.reader import Recording

@@ -6,16 +6,36 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import IdentificationError, PeriodicSpectra, periodic_spectra
+from identification import (
+    FrequencyResponseMatrix,
+    IdentificationError,
+    PeriodicSpectra,
+    best_linear_approximation,
+    periodic_spectra,
+)
+from identification.multisine.best_linear_approximation import Estimator
 from rig.bench import Bench
+from rig.bench.configuration import validated
+from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.lost_samples import lost_rows, rms_of
-from rig.campaigns.evaluation.point import Point, Quality, planned_point
+from rig.campaigns.evaluation.point import Point, Quality, planned_point, result_of
+from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, not_evaluated, skew_turn
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Column, Target
 from rig.daq import Channel
+from rig.recording.reader import Recording
 
-__all__ = ["MULTISINE_COLUMNS", "MultisineResult", "measure_multisine_point", "spectra_of", "turned_periods"]
+__all__ = [
+    "MULTISINE",
+    "MULTISINE_COLUMNS",
+    "MultisineResult",
+    "measure_multisine_point",
+    "recorded_response_matrices",
+    "recorded_spectra",
+    "spectra_of",
+    "turned_periods",
+]
 
 MULTISINE_COLUMNS = (
     Column("realisation", "realisation", "", ".0f"),
@@ -162,3 +182,43 @@ def _rough_power(difference: np.ndarray) -> float:
     used = bends[: bends.size // _LINES * _LINES].reshape(-1, _LINES)
     # A power of two degrees of freedom has its median at log 2 of its mean; the bend of noise has 3/2 of its power.
     return float(np.mean(np.median(used, axis=1)) / (1.5 * math.log(2.0)) * difference.size)
+
+
+def recorded_spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
+    """Spectra of every accepted realisation, by level (V RMS); the output is channel ``voltage``."""
+    bench = bench_of_recording(recording)
+    plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
+    levels: dict[float, dict[int, np.ndarray]] = {}
+    periods: dict[float, int] = {}
+    for point in accepted_points(recording, MultisineResult):
+        level, recorded = point.level, result_of(point).periods
+        levels.setdefault(level, {})[point.realisation or 0] = point_rows(recording, point.number)
+        periods[level] = min(periods.get(level, recorded), recorded)  # a change of plan may change them
+    return {
+        level: spectra_of(bench, plan.model_copy(update={"periods": periods[level]}), records)
+        for level, records in levels.items()
+    }
+
+
+def recorded_response_matrices(
+    recording: Recording, *, estimator: Estimator = "instrument"
+) -> dict[float, FrequencyResponseMatrix]:
+    """Frequency responses from the force to every motion, by level (V RMS), with their covariance."""
+    specimen = bench_of_recording(recording).specimen.name
+    return {
+        level: best_linear_approximation(measured, estimator=estimator, specimen=specimen)
+        for level, measured in recorded_spectra(recording).items()
+    }
+
+
+MULTISINE = Campaign(
+    plan=MultisinePlan,
+    result=MultisineResult,
+    measure=measure_multisine_point,
+    columns=MULTISINE_COLUMNS,
+    draw="rig.campaigns.multisine.figure:draw",
+    identity=("lowest_hz", "highest_hz", "resolution_hz", "grid", "detection_group", "phase_seed"),
+    measurements={PeriodicSpectra: recorded_spectra, FrequencyResponseMatrix: recorded_response_matrices},
+    exchanged=lambda recording: list(recorded_response_matrices(recording).values()),
+    experiments="realisations",
+)

@@ -4,16 +4,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import IdentificationError
+from identification import FrequencyResponse, IdentificationError
 from rig.bench import Bench
+from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import level_objection, settled_point, with_settling
+from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.response_controlled.plan import ResponseControlledPlan
 
-__all__ = ["RESPONSE_CONTROLLED_COLUMNS", "ResponseControlledResult", "measure_response_controlled_point"]
+__all__ = [
+    "RESPONSE_CONTROLLED",
+    "RESPONSE_CONTROLLED_COLUMNS",
+    "ResponseControlledResult",
+    "measure_response_controlled_point",
+]
 
 RESPONSE_CONTROLLED_COLUMNS = (
     Column("asked_phase_lag_deg", "lag asked for", "deg", ".0f"),
@@ -51,3 +58,15 @@ def measure_response_controlled_point(
     point = settled_point(plan, target, bench, vibration, rows, off_level)
     result = ResponseControlledResult(phase_lag_deg=vibration.phase_lag_deg, level_error=missed)
     return with_settling(replace(point, result=result), settling)
+
+
+RESPONSE_CONTROLLED = Campaign(
+    plan=ResponseControlledPlan,
+    result=ResponseControlledResult,
+    measure=measure_response_controlled_point,
+    columns=RESPONSE_CONTROLLED_COLUMNS,
+    draw="rig.campaigns.response_controlled.figure:draw",
+    measurements={FrequencyResponse: recorded_frequency_responses},
+    exchanged=lambda recording: [recorded_frequency_responses(recording)],
+    experiments="segments",
+)

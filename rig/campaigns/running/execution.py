@@ -1,6 +1,5 @@
 """Executing one part of a run: the loop, what is written of it, the points that come out, and every way to stop it."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -310,7 +309,7 @@ class Execution:
     def _trip(self, reason: EndReason) -> dict[str, Any]:
         """Where in the plan it tripped, what the cause most likely was, and what to do."""
         at = tripped_at(self.tick, self.plan, self.targets)
-        frequency_hz = float(self.tick.arrays.loop["omega"][0]) / (2.0 * math.pi)
+        frequency_hz = self.tick.frequency_hz
         trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
         recorded = [point for point in self.known if point.spectrum is not None or point.accepted]
         points = [point for point in recorded if point.quality is not Quality.IMPLAUSIBLE]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
-from rig.recording.contents import JournalContents
 from rig.recording.journal import journal_path
+from rig.recording.journal_contents import JournalContents
 from rig.system.locking import exclusive
 
 __all__ = ["forget_before", "make_way", "put_back", "set_aside"]

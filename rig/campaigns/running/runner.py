@@ -24,10 +24,10 @@ from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.errors import RigError
 from rig.loop.loop import RunningLoop
 from rig.loop.session import Session, open_session
+from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import continue_recording, finalise
 from rig.system.stop_signals import ended_in_order, held
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason

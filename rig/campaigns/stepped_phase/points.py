@@ -4,9 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import Backbone, IdentificationError, nonlinear_mode
+from identification import Backbone, FrequencyResponse, IdentificationError, nonlinear_mode
 from rig.bench import Bench
+from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point, with_settling
+from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
@@ -14,7 +16,7 @@ from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recor
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
 
-__all__ = ["STEPPED_PHASE_COLUMNS", "SteppedPhaseResult", "measure_stepped_phase_point"]
+__all__ = ["STEPPED_PHASE", "STEPPED_PHASE_COLUMNS", "SteppedPhaseResult", "measure_stepped_phase_point"]
 
 STEPPED_PHASE_COLUMNS = (
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),
@@ -59,3 +61,15 @@ def measure_stepped_phase_point(
         force_rms_n=force_rms_n, phase_lag_deg=lag_deg - vibration.phase_error_deg, level_error=missed
     )
     return with_settling(replace(point, modal=modal_part(mode), result=result), settling)
+
+
+STEPPED_PHASE = Campaign(
+    plan=SteppedPhasePlan,
+    result=SteppedPhaseResult,
+    measure=measure_stepped_phase_point,
+    columns=STEPPED_PHASE_COLUMNS,
+    draw="rig.campaigns.stepped_phase.figure:draw",
+    measurements={FrequencyResponse: recorded_frequency_responses},
+    exchanged=lambda recording: [recorded_frequency_responses(recording)],
+    experiments="segments",
+)

@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import IdentificationError
+from identification import FrequencyResponse, IdentificationError
 from rig.bench import Bench
+from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import (
     alien_objection,
     drift_objection,
@@ -15,13 +16,14 @@ from rig.campaigns.evaluation.acceptance import (
     with_settling,
 )
 from rig.campaigns.evaluation.alien_force import alien_force
+from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.point import Point, Quality, planned_point
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 
-__all__ = ["STEPPED_SINE_COLUMNS", "SteppedSineResult", "measure_stepped_sine_point"]
+__all__ = ["STEPPED_SINE", "STEPPED_SINE_COLUMNS", "SteppedSineResult", "measure_stepped_sine_point"]
 
 TRUSTED_ALIEN_FORCE = 0.1  # what no lock holds is warned of, where plans under a lock accept no more
 
@@ -75,3 +77,15 @@ def measure_stepped_sine_point(
     )
     objection = alien_objection(alien, TRUSTED_ALIEN_FORCE)
     return with_settling(point.warned(objection) if objection else point, settling)
+
+
+STEPPED_SINE = Campaign(
+    plan=SteppedSinePlan,
+    result=SteppedSineResult,
+    measure=measure_stepped_sine_point,
+    columns=STEPPED_SINE_COLUMNS,
+    draw="rig.campaigns.stepped_sine.figure:draw",
+    measurements={FrequencyResponse: recorded_frequency_responses},
+    exchanged=lambda recording: [recorded_frequency_responses(recording)],
+    experiments="segments",
+)

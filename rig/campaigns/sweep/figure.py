@@ -9,8 +9,7 @@ from identification import ForceDropOut, Transient, force_drop_out, zero_crossin
 from rig.campaigns.evaluation.point import result_of
 from rig.campaigns.evaluation.recorded import point_rows, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
-from rig.campaigns.sweep.campaign import recorded_sweeps
-from rig.campaigns.sweep.points import SweepResult
+from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
 from rig.figures.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
 from rig.figures.style import title as heading
 from rig.recording.reader import Recording

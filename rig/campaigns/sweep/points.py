@@ -7,14 +7,17 @@ import numpy as np
 from controller import AmplitudeLaw
 from identification import ForceDropOut, IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
+from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of
 from rig.campaigns.evaluation.point import PART, Point, Quality, planned_point
+from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, not_evaluated, skew_turn
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.sweep.plan import SweepPlan
+from rig.recording.reader import Recording
 from rig.tick.layout import SATURATED
 
-__all__ = ["SWEEP_COLUMNS", "HeldCourse", "SweepResult", "measure_sweep", "transient_of"]
+__all__ = ["SWEEP", "SWEEP_COLUMNS", "HeldCourse", "SweepResult", "measure_sweep", "recorded_sweeps", "transient_of"]
 
 NOT_HELD = 0.05  # of its level: a deviation that is said
 USUAL = 0.75  # of a sweep: over so much of it the level is to be held
@@ -200,3 +203,28 @@ def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float)
         frequency_hz=transient.frequency_hz[keep],
         fundamentals=transient.fundamentals[:, keep],
     )
+
+
+def recorded_sweeps(recording: Recording) -> dict[int, Transient]:
+    """Fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
+
+    The output is channel ``voltage``.
+    """
+    bench = bench_of_recording(recording)
+    return {
+        point.number: transient_of(bench, point_rows(recording, point.number))
+        for point in accepted_points(recording, SweepResult)
+    }
+
+
+SWEEP = Campaign(
+    plan=SweepPlan,
+    result=SweepResult,
+    measure=measure_sweep,
+    columns=SWEEP_COLUMNS,
+    draw="rig.campaigns.sweep.figure:draw",
+    identity=("start_hz", "stop_hz", "rate_hz_per_s", "rate_octaves_per_min"),
+    measurements={Transient: recorded_sweeps},
+    exchanged=lambda recording: list(recorded_sweeps(recording).values()),
+    experiments="sweeps",
+)

@@ -1,4 +1,4 @@
-"""`VirtualDAQ`: a full sibling of a real driver, with any block and any latency."""
+"""`VirtualDAQ`: a virtual rig behind the DAQ contract, with any block size and any latency."""
 
 import math
 from collections.abc import Iterator
@@ -10,8 +10,7 @@ from pydantic import Field, ValidationError
 from rig.bench import Bench
 from rig.bench.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
-from rig.drivers.virtual.kernels import exchange_block, fused
-from rig.drivers.virtual.loopback import loopback_of
+from rig.drivers.virtual.kernels import Converters, exchange_block, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from rig.tick.safety.kernels import is_over
@@ -32,7 +31,7 @@ class Queue(Configured):
     """Latency of the virtual device."""
 
     queue_blocks: int = Field(0, ge=0, le=64)
-    """q: blocks of outputs that the device keeps back, as a buffered DAQ does."""
+    """q: blocks of outputs in the device's queue, as in a buffered DAQ."""
     delay_samples: int = Field(0, ge=0, le=1000)
     """Further samples between the handing over of an output and the converter."""
 
@@ -69,13 +68,12 @@ class VirtualDAQ(DAQ):
         self._check_arrays(seed)
         self._seed = seed
         self._specimen = bench.specimen
-        self._queue = np.zeros(0)
-        self._loopback = loopback_of(self.channels, 0.0)
         self._counts = np.zeros(len(Flag), np.int64)
+        self._exchanged = Converters(np.zeros(0), self._counts, loopback_of(self.channels, 0.0))
         self._first = 0
 
     def _check_arrays(self, seed: int) -> None:
-        """Refuse, before a run has begun, parts whose arrays cannot be computed or hold numbers that are none."""
+        """Refuse, before a run begins, parts whose arrays cannot be computed or are not finite."""
         try:
             with np.errstate(over="raise", divide="raise", invalid="raise"):
                 arrays, _ = self.rig.build(seed)
@@ -147,7 +145,7 @@ class VirtualDAQ(DAQ):
 
     @property
     def capabilities(self) -> Capabilities:
-        """A virtual rig takes any block, is not paced, and repeats itself; nothing of it outlives its process."""
+        """Any block size, not paced, repeatable; safe without the host because it ends with its process."""
         return Capabilities(largest_block=1_000_000, paced=False, virtual=True, repeatable=True, safe_without_host=True)
 
     @property
@@ -172,8 +170,8 @@ class VirtualDAQ(DAQ):
 
     @property
     def output_v(self) -> float:
-        """What is on the converter, V, as it would be measured at the output; of a rig that is exchanged, not fused."""
-        past = self._loopback.past
+        """Voltage on the converter now, V; only while blocks are exchanged, not in a fused run."""
+        past = self._exchanged.loopback.past
         return float(past[(self._first - 1) % past.size])
 
     def _open(self) -> None:
@@ -182,9 +180,9 @@ class VirtualDAQ(DAQ):
     def _start(self) -> None:
         self._realised = self.rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)
-        self._queue = np.zeros(self.queue_samples)
-        self._loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
-        self._under_way = np.zeros(self.block + self.queue_samples)
+        loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
+        self._exchanged = Converters(np.zeros(self.queue_samples), self._counts, loopback)
+        self._fused = Converters(np.zeros(self.block + self.queue_samples), self._counts, loopback)
         self._counts[:] = 0
         self._first = 0
 
@@ -197,10 +195,8 @@ class VirtualDAQ(DAQ):
             self._swap(voltages, inputs, self.flags)
 
     def _swap(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
-        """Swap samples over which the plant stays as it is."""
-        exchange_block(
-            self._arrays, self._state, self._queue, self._first, voltages, inputs, flags, self._counts, self._loopback
-        )
+        """Exchange samples during which the plant does not change."""
+        exchange_block(self._arrays, self._state, self._exchanged, self._first, voltages, inputs, flags)
         self._first += voltages.size
 
     def _pieces(self, n: int) -> Iterator[tuple[RigArrays, slice]]:
@@ -221,17 +217,7 @@ class VirtualDAQ(DAQ):
         done = 0
         for arrays, part in self._pieces(rows.size):
             self._arrays = arrays
-            done += fused(
-                t,
-                self._arrays,
-                self._state,
-                self._under_way,
-                volts,
-                readings[part],
-                rows[part],
-                self._counts,
-                self._loopback,
-            )
+            done += fused(t, self._arrays, self._state, self._fused, volts, readings[part], rows[part])
             if is_over(t.guard[0], lead):
                 break
         return done
@@ -243,6 +229,6 @@ class VirtualDAQ(DAQ):
         self._rest()
 
     def _rest(self) -> None:
-        """0 V on the converter and on the way there."""
-        self._queue[:] = 0.0
-        self._loopback.past[:] = 0.0
+        """Set the converter and the queue to 0 V."""
+        self._exchanged.queue[:] = 0.0
+        self._exchanged.loopback.past[:] = 0.0

@@ -1,4 +1,4 @@
-"""The parts that a virtual rig is built from, as `rig list` shows them: made from the models, so nobody keeps it up."""
+"""The parts that a virtual rig is built from, as `rig list` shows them, generated from the models' schemas."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -24,7 +24,7 @@ _FEW = 4
 
 
 def specimens() -> list[dict[str, str]]:
-    """The shipped specimens: name, and what their file says first."""
+    """The shipped specimens: name, kind of structure and local elements."""
     from simulators.shipped import shipped_specimens, specimen_table
 
     rows = []
@@ -37,7 +37,7 @@ def specimens() -> list[dict[str, str]]:
 
 
 def parts() -> list[dict[str, Any]]:
-    """Every part: where in the rig's table it stands, its name, its first line, and choices that it offers."""
+    """Every part: its group in the rig's table, its name, its first line, and the choices it offers."""
     return [
         {"group": group, "name": name, "description": _first_line(schema), "choices": _choices(name, schema)}
         for group, name, schema in _named_parts()

@@ -4,26 +4,55 @@ import contextlib
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from rig.bench import Bench
-from rig.drivers.wire.dialogue import ANSWER_S, Dialogue, why_not
+from rig.drivers.wire.dialogue import ANSWER_S, STOPPED, Dialogue, latched_text, stopped, why_not
 from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
-from rig.drivers.wire.latch import STOPPED, latched_text, stopped
-from rig.drivers.wire.round_trips import RoundTrips
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
 from rig.wire.messages import Command, DeviceFlag, DeviceState, Parameter, Status, Stream
 
-__all__ = ["Connection"]
+__all__ = ["Connection", "RoundTrips"]
 
-MOST_LOAD = 0.9  # of what the wire carries
+KEPT = 4096
+
+
+class RoundTrips:
+    """The last few thousand round trips; `report` gives their median and 99th percentile in microseconds."""
+
+    def __init__(self) -> None:
+        self._kept_s = np.zeros(KEPT)
+        self._count = 0
+
+    def add(self, round_trip_s: float) -> None:
+        """Add one round trip."""
+        self._kept_s[self._count % KEPT] = round_trip_s
+        self._count += 1
+
+    def report(self) -> dict[str, float]:
+        """Median, 99th percentile and largest, microseconds; empty before the first round trip."""
+        if not self._count:
+            return {}
+        kept_us = 1e6 * self._kept_s[: min(self._count, KEPT)]
+        p50, p99, largest = np.percentile(kept_us, (50.0, 99.0, 100.0))
+        return {
+            "round_trip_p50_us": round(float(p50), 1),
+            "round_trip_p99_us": round(float(p99), 1),
+            "round_trip_largest_us": round(float(largest), 1),
+            "round_trips": float(self._count),
+        }
+
+
+MOST_LOAD = 0.9  # part of the wire's capacity that a stream may use
 FIND_TRIES = 20
 OPENING_PINGS = 50
 NOTHING = DeviceFlag(0)
-HEARTBEAT_S = 0.25  # two of them, and some more
+HEARTBEAT_S = 0.25  # a device sends one every 0.1 s
 
 
 class Connection:
-    """A link and who answers at its other end.
+    """A link, and the device at its other end.
 
     Errors: those of `rig.errors`, each in one line that begins with the name of the port.
     """
@@ -32,21 +61,21 @@ class Connection:
         self.link, self.clock = link, clock
         self.dialogue = Dialogue(link, clock)
         self.facts: DeviceFacts | None = None
-        """What the device says of itself, once it has been met."""
+        """The device's description of itself; None before `meet`."""
         self.round_trips = RoundTrips()
         self.load_share = 0.0
-        """Of what the wire carries, taken by the stream that was checked last."""
+        """Part of the wire's capacity that the stream checked last uses."""
         self.needed_bit_s = 0.0
-        """What that stream asks of it, bit/s; known also where the wire carries any."""
+        """Bits per second of that stream; also known for a wire without a limit."""
         self.sustainable_hz = math.inf
-        """Sample rate that wire and device would carry with such blocks."""
+        """Highest sample rate that wire and device carry with blocks of this size, Hz."""
         self.found_running = False
-        """Whether it was sampling when it was found."""
+        """Whether the device was still sampling when it was found."""
         self.latched = self.cleared = NOTHING
-        """What had latched when it was met, as long as it has not been cleared, and from then on."""
+        """``latched``: what had latched when the device was met and is not cleared yet; ``cleared``: what was cleared."""
 
     def meet(self, bench: Bench, queue: int) -> None:
-        """Find the device, and refuse it where it is not the bench's or the wire cannot carry its stream."""
+        """Find the device. Refuse it if it is not the one the bench describes, or if the wire cannot carry its stream."""
         self._find()
         negotiate(self.dialogue)
         facts = read_facts(self.dialogue)
@@ -60,7 +89,7 @@ class Connection:
         self.latched = self._what_has_latched()
 
     def _find(self) -> None:
-        """Ask until something answers, and bring what a dead host has left running to rest."""
+        """Ask until a device answers, and stop it in case an earlier host has left it running."""
         dialogue, name = self.dialogue, self.link.name
         for attempt in range(FIND_TRIES):
             with contextlib.suppress(DaqTimeout):
@@ -81,7 +110,7 @@ class Connection:
         dialogue.forget()
 
     def check_capacity(self, stream: Stream) -> None:
-        """`DaqRefused`, with the sum, where the wire cannot carry a stream."""
+        """Raise `DaqRefused`, with the sum of the bits, if the wire cannot carry a stream."""
         assert self.facts is not None
         load = self.link.load(stream)
         self.load_share, self.needed_bit_s = load.share, load.needed_bit_s
@@ -94,7 +123,7 @@ class Connection:
             )
 
     def check_latch(self, forgiven: DeviceFlag = NOTHING) -> None:
-        """`DaqEmergencyStop` or `DaqWatchdog` where something beside the ``forgiven`` has latched."""
+        """Raise `DaqEmergencyStop` or `DaqWatchdog` if anything other than ``forgiven`` has latched."""
         latched = self._what_has_latched()
         if latched & ~forgiven:
             raise stopped(
@@ -104,20 +133,20 @@ class Connection:
             )
 
     def clear(self) -> None:
-        """Release what had latched when the device was met; what has latched since is an error."""
+        """Clear what had latched when the device was met; raise for what has latched since."""
         if self.latched:
             self.check_latch(self.latched)
             self.dialogue.do(Command.CLEAR)
             self.latched, self.cleared = NOTHING, self.latched
 
     def _what_has_latched(self) -> DeviceFlag:
-        """Nothing, or what the next heartbeat of a device that is LATCHED says; all of it where none comes."""
+        """Flags that have latched, from the next heartbeat; without a heartbeat all flags that can latch."""
         if self.dialogue.get(Parameter.STATE) != DeviceState.LATCHED:
             return NOTHING
         return DeviceFlag(self.dialogue.beat_with(STOPPED, HEARTBEAT_S)) or STOPPED
 
     def set(self, parameter: Parameter, value: int, key: str, scale: float, unit: str) -> None:
-        """Set a parameter; ``key``, ``scale`` and ``unit`` are those of the bench, for the message that it cannot be."""
+        """Set a parameter; ``key``, ``scale`` and ``unit`` say in an error what the bench calls it."""
         answer = self.dialogue.ask(Command.SET, parameter, value=value)
         if answer.status == Status.DONE and answer.value == value:
             return
@@ -129,12 +158,12 @@ class Connection:
         raise DaqMismatch(f"{self.link.name}: {key} = {value * scale:g} {unit}: {why}")
 
     def close(self) -> None:
-        """Tell the device to stop, if there still is one, and let go of the port."""
+        """Send STOP without waiting for an answer, and close the port."""
         with contextlib.suppress(DaqError):
             self.link.send(self.dialogue.next_request(Command.STOP))
         self.let_go()
 
     def let_go(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         with contextlib.suppress(DaqError):
             self.link.close()

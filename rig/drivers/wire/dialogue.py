@@ -3,12 +3,12 @@
 from collections import deque
 from collections.abc import Callable
 
-from rig.drivers.wire.latch import stopped
-from rig.errors import DaqProtocol, DaqRefused, DaqTimeout
+from rig.errors import DaqEmergencyStop, DaqError, DaqProtocol, DaqRefused, DaqTimeout, DaqWatchdog
 from rig.wire.link import Link
 from rig.wire.messages import (
     Answer,
     Command,
+    DeviceFlag,
     DeviceState,
     Heartbeat,
     Parameter,
@@ -18,32 +18,50 @@ from rig.wire.messages import (
 )
 from rig.wire.parameter_words import NAME_WORDS, as_float, as_text
 
-__all__ = ["ANSWER_S", "Dialogue", "why_not"]
+__all__ = ["ANSWER_S", "STOPPED", "Dialogue", "latched_text", "stopped", "why_not"]
+
+STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
+
+
+def latched_text(latched: DeviceFlag) -> str:
+    """What has latched, in words; empty if nothing has."""
+    names = {DeviceFlag.EMERGENCY_STOP: "emergency stop", DeviceFlag.WATCHDOG: "watchdog"}
+    said = " and ".join(name for flag, name in names.items() if latched & flag)
+    return f"the device's {said} had latched" if said else ""
+
+
+def stopped(name: str, flags: int, text: str) -> DaqError:
+    """The error for what has latched: the emergency stop goes before the watchdog. ``name`` is that of the port."""
+    kind = DaqEmergencyStop if flags & DeviceFlag.EMERGENCY_STOP else DaqWatchdog
+    return kind(f"{name}: {text}")
+
 
 TRIES = 5
 ANSWER_S = 0.1
-DOUBLED_ANSWERS = 8  # a single one may be a frame that the wire has repeated
+DOUBLED_ANSWERS = 8  # from this many on two devices answer; the wire itself may repeat a single frame
 WAITING_BLOCKS = 4096
-REMEMBERED_ANSWERS = 16  # a second device may be slower than the first by several requests
+REMEMBERED_ANSWERS = 16  # a second device may answer several requests later than the first
 
 
 class Dialogue:
-    """Requests and answers over a link, and the stream messages that came in between.
+    """Sends requests over a link and waits for their answers; keeps the stream messages that arrive meanwhile.
 
-    Errors: `DaqTimeout` for a device that has fallen silent, `DaqProtocol` where two devices answer, `DaqRefused` for what
-    the device will not do, `DaqEmergencyStop` and `DaqWatchdog` for what it will not do because they have latched.
+    Errors: `DaqTimeout` for a device that has fallen silent, `DaqProtocol` where two devices answer, `DaqRefused` for a
+    request that the device refuses, `DaqEmergencyStop` and `DaqWatchdog` if it refuses because one of these has latched.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self.link = link
         self.clock = clock
         self.early: deque[Samples | Heartbeat] = deque(maxlen=WAITING_BLOCKS)
-        """Stream messages that came while an answer was waited for."""
+        """Stream messages that arrived while an answer was awaited."""
         self.retries = 0
         self.stray_answers = 0
         self._doubled = 0
-        self._answered: deque[tuple[Answer, int]] = deque(maxlen=REMEMBERED_ANSWERS)  # and how often each was asked for
-        self._number = round(1e6 * clock()) % 255  # another one than the last host's, most likely
+        self._answered: deque[tuple[Answer, int]] = deque(
+            maxlen=REMEMBERED_ANSWERS
+        )  # with the number of times each request was sent
+        self._number = round(1e6 * clock()) % 255  # most likely not the number that the last host ended with
 
     def ask(
         self,
@@ -69,7 +87,7 @@ class Dialogue:
         )
 
     def next_request(self, command: Command, parameter: int = 0, item: int = 0, value: int = 0) -> Request:
-        """A request with a number of its own."""
+        """A request with the next number."""
         self._number = self._number % 255 + 1
         return Request(self._number, command, parameter, item, value)
 
@@ -88,20 +106,20 @@ class Dialogue:
         return None
 
     def forget_beats(self) -> None:
-        """Drop the heartbeats that have come so far, and keep the blocks."""
+        """Drop the heartbeats that were kept; blocks stay."""
         kept = [message for message in self.early if isinstance(message, Samples)]
         self.early.clear()
         self.early.extend(kept)
 
     def forget(self) -> None:
-        """Drop what has come so far: heartbeats of an idle device, blocks for a host that is no more."""
+        """Drop all messages received so far: heartbeats of an idle device, blocks meant for an earlier host."""
         for _ in range(WAITING_BLOCKS):
             if self.link.receive(0.0) is None:
                 break
         self.early.clear()
 
     def beat_with(self, wanted: int, longest_s: float) -> int:
-        """Those of the flags ``wanted`` that the next heartbeat with any of them has; 0 where none comes in time."""
+        """Wait for a heartbeat with any of the flags ``wanted``; return those it has, or 0 if none comes in time."""
         until = self.clock() + longest_s
         while (left := until - self.clock()) > 0.0:
             message = self.link.receive(left)
@@ -112,7 +130,7 @@ class Dialogue:
         return 0
 
     def note_stray(self, answer: Answer) -> None:
-        """Count an answer that nobody waits for; `DaqProtocol` once it is plain that two devices answer."""
+        """Count an answer that was not awaited; raise `DaqProtocol` once so many are doubled that two devices must answer."""
         self.stray_answers += 1
         known = next(
             (one for one in self._answered if (one[0].number, one[0][2:4]) == (answer.number, answer[2:4])), None
@@ -128,14 +146,14 @@ class Dialogue:
         )
 
     def damage(self) -> str:
-        """What the link has counted, for a message; empty where nothing was damaged."""
+        """Damage that the link has counted, to be appended to an error; empty if there is none."""
         seen = [f"{count} {name.replace('_', ' ')}" for name, count in self.link.counters.items() if count]
         return f" ({', '.join(seen)})" if seen else ""
 
     def do(
         self, command: Command, parameter: int = 0, item: int = 0, value: int = 0, answer_s: float = ANSWER_S
     ) -> int:
-        """Have a request carried out; returns the answer's value. `DaqRefused` where the device will not."""
+        """Send a request and return the answer's value; raise `DaqRefused` if the device refuses it."""
         answer = self.ask(command, parameter, item, value, answer_s=answer_s)
         if answer.status == Status.LATCHED:
             raise stopped(self.link.name, answer.value, f"{_said(command, parameter, value)}: {why_not(answer)}")
@@ -159,7 +177,7 @@ class Dialogue:
         return as_float(self.get(parameter, item))
 
     def get_text(self, parameter: Parameter, channel: int = 0) -> str:
-        """A parameter that is a text, asked for up to its end."""
+        """A text parameter, read word by word up to its end."""
         words: list[int] = []
         for item in range(NAME_WORDS * channel, NAME_WORDS * (channel + 1)):
             words.append(self.get(parameter, item, 0))
@@ -175,7 +193,7 @@ def _said(command: Command, parameter: int, value: int | None = None) -> str:
 
 
 def why_not(answer: Answer) -> str:
-    """What a status that is not DONE says, in words."""
+    """The reason in a status other than DONE, in words."""
     if answer.status == Status.NOT_ALLOWED:
         return f"not allowed, the nearest value is {answer.value}"
     if answer.status == Status.WRONG_STATE:

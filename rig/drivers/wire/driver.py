@@ -10,26 +10,25 @@ import numpy as np
 from rig.bench import Bench
 from rig.daq import DAQ, Capabilities
 from rig.drivers.wire.connection import Connection
+from rig.drivers.wire.dialogue import latched_text
 from rig.drivers.wire.facts import DeviceFacts, remarks_on
-from rig.drivers.wire.latch import latched_text
-from rig.drivers.wire.options import WireOptions
+from rig.drivers.wire.options import WireOptions, raised_remark
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
-from rig.drivers.wire.watchdog import raised_remark
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
 
 __all__ = ["WireDAQ"]
 
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
-LARGEST_UNKNOWN_BLOCK = 65536  # until the device has told its own
+LARGEST_UNKNOWN_BLOCK = 65536  # before the device has been asked
 
 
 class WireDAQ(DAQ):
-    """A device behind a wire. A driver says which by `_make_link`; everything else is the protocol's.
+    """A device behind a wire. A driver for a particular wire implements `_make_link` only.
 
-    `start` sets the device's parameters; it begins to sample, and is armed, with the first call of `exchange`: so nothing is
-    lost and no watchdog bites while the loop is being prepared. From then on call j of `exchange` hands over the
-    outputs of block j + q and waits for the samples of block j.
+    `start` sets the device's parameters. The device begins to sample and is armed with the first call of `exchange`, so that
+    no block is lost and no watchdog trips while the loop is being prepared. Call j of `exchange` hands over the outputs of
+    block j + q and waits for the samples of block j.
 
     Errors: those of `rig.errors`, each in one line that begins with the name of the port.
     """
@@ -120,7 +119,7 @@ class WireDAQ(DAQ):
 
     @property
     def statistics(self) -> dict[str, float]:
-        """Round trips of pings in between the blocks, what the stream asks of the wire, and what rate it would carry."""
+        """Round trips of pings, load of the wire, and the highest sample rate that the wire would carry."""
         connection = self._connection
         if connection is None:
             return {}
@@ -166,7 +165,7 @@ class WireDAQ(DAQ):
         self._streaming.exchange(voltages, inputs, self.flags)
 
     def emergency_stop(self, reason: int = 0) -> None:
-        """Have the device drop its output to 0 V and latch; said three times, for nobody acknowledges it."""
+        """Make the device drop its output to 0 V and latch. Sent three times, because it is not acknowledged."""
         if self._connection is not None:
             for _ in range(3):
                 self._connection.link.send(EmergencyStop(reason))

@@ -1,4 +1,4 @@
-"""What a device says of itself when it is asked, and whether that is the bench's device."""
+"""A device's description of itself, and whether it is the device that the bench describes."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ class DeviceFacts:
     boot: int
     simulated: bool
     repeatable: bool
-    """Whether every START finds the same device, so that the same outputs give the same samples."""
+    """Whether the same outputs after START always give the same samples."""
     names: tuple[str, ...]
     units: tuple[str, ...]
     range_v: np.ndarray
@@ -51,7 +51,7 @@ class DeviceFacts:
 
 
 def negotiate(dialogue: Dialogue) -> None:
-    """Agree on a version; `DaqProtocol` where the device speaks none of ours."""
+    """Agree on a version of the protocol; raise `DaqProtocol` if there is none in common."""
     lowest, highest = dialogue.get(Parameter.LOWEST_VERSION), dialogue.get(Parameter.HIGHEST_VERSION)
     if not lowest <= VERSION <= highest:
         raise DaqProtocol(
@@ -103,7 +103,7 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
 
 
 def _filter_delay_s(dialogue: Dialogue) -> float:
-    """In whole nanoseconds, or to the last bit where the device tells it so, and both agree."""
+    """Filter delay from the double-precision parameter if the device has it and it agrees; else from whole nanoseconds."""
     delay_s = 1e-9 * dialogue.get(Parameter.FILTER_DELAY_NS, default=0)
     low, high = (dialogue.get(Parameter.FILTER_DELAY_S, item, default=0) for item in (0, 1))
     exact_s = as_double(low, high)
@@ -111,14 +111,14 @@ def _filter_delay_s(dialogue: Dialogue) -> float:
 
 
 def _check_scales(name: str, facts: DeviceFacts) -> None:
-    """Refuse scales with which no count means anything."""
+    """Refuse ranges, volts per count or a largest block that are not positive numbers."""
     scales = np.array([*facts.v_per_count, *facts.range_v, facts.output_v_per_count, facts.output_range_v])
     if not (np.isfinite(scales).all() and (scales > 0.0).all() and facts.largest_block >= 1):
         raise DaqProtocol(f"{name}: the device tells ranges, steps or blocks that are not positive numbers")
 
 
 def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> None:
-    """`DaqMismatch` where the device is not the one that the bench describes."""
+    """Raise `DaqMismatch` if the device is not the one that the bench describes."""
     ours = [channel.name for channel in bench.channels]
     if ours != list(facts.names):
         how = "in another order" if sorted(ours) == sorted(facts.names) else "and not these"
@@ -152,7 +152,7 @@ def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> Non
 
 
 def remarks_on(facts: DeviceFacts, bench: Bench) -> list[str]:
-    """Where the device differs from the bench's facts without being another device."""
+    """Differences from the bench that are worth a remark but do not make it another device."""
     out = []
     skew_samples = facts.skew_s * bench.sample_rate_hz
     for channel, step_v, skew in zip(bench.channels, facts.v_per_count, skew_samples, strict=True):

@@ -1,4 +1,4 @@
-"""Blocks from the wire in the device's order: gaps are said, repeated and late-coming blocks are counted and skipped."""
+"""Blocks from the wire, in order: lost blocks are reported as gaps; repeated and late blocks are counted and skipped."""
 
 from collections.abc import Callable
 
@@ -8,17 +8,17 @@ from rig.wire.messages import Answer, DeviceFlag, DeviceState, Heartbeat, Messag
 
 __all__ = ["Incoming"]
 
-OLD_BLOCKS_IN_A_ROW = 3  # so many old blocks, each after the other, are a device that counts anew
-UNARMED_BEATS = 2  # one may have been under way when the device was armed
+OLD_BLOCKS_IN_A_ROW = 3  # consecutive old blocks after which the device must have started to count anew
+UNARMED_BEATS = 2  # the first may have been sent before the device was armed
 UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}
 STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
 
 
 class Incoming:
-    """What comes in while a device streams.
+    """The samples of a streaming device, block by block.
 
-    ``take`` returns one block after the other. ``shape`` is a block's; a gap of more than ``longest_gap`` samples cannot be,
-    for the watchdog would have ended the stream.
+    ``shape`` is that of a block. A gap of more than ``longest_gap`` samples is an error: the watchdog would have ended the
+    stream before.
 
     Errors: `DaqTimeout`, `DaqProtocol`, `DaqReset`, `DaqWatchdog`, `DaqEmergencyStop`.
     """
@@ -43,7 +43,7 @@ class Incoming:
         self._unarmed_beats = 0
 
     def take(self) -> Samples | None:
-        """The next block; None where it was lost, which is known as soon as a newer one has come."""
+        """The next block; None if it was lost, which shows when a newer block arrives."""
         samples = self._newer
         if samples is None:
             samples = self._wait()
@@ -58,7 +58,7 @@ class Incoming:
         return samples
 
     def _wait(self) -> Samples:
-        """The first block that is not older than the one expected."""
+        """Wait for a block that is not older than the expected one."""
         until = 0.0
         left_s = self._timeout_s
         while True:

@@ -1,22 +1,63 @@
-"""What every driver over a wire may be told."""
+"""Options that all wires share, and the watchdog time that follows from them."""
 
 from pydantic import Field
 
 from rig.bench.configuration import Configured
+from rig.drivers.wire.facts import DeviceFacts
+from rig.errors import DaqRefused
 
-__all__ = ["WireOptions"]
+__all__ = ["WireOptions", "raised_remark", "watchdog_s"]
 
 LONGEST_S = 4000.0  # microseconds in an unsigned word of four bytes
 
 
 class WireOptions(Configured):
-    """Options that all wires share; a driver adds those that say where the device is."""
+    """Options that all wires share; each driver adds those that locate the device."""
 
     queue_blocks: int = Field(1, ge=1, le=64)
-    """q: blocks between the handing over of an output and the converter; more forgive a later host and delay the loop."""
+    """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop."""
     watchdog_s: float | None = Field(None, gt=0, le=LONGEST_S)
     """Time without an output after which the device brings its own to 0 V, s; by default 0.1 s, or 4 blocks if longer."""
     ramp_s: float = Field(0.05, ge=0, le=LONGEST_S)
-    """Time of the ramp with which the device's watchdog does so, s; 0 drops the output."""
+    """Duration of the ramp to 0 V after the watchdog has tripped, s; 0 drops the output at once."""
     timeout_s: float | None = Field(None, gt=0, le=LONGEST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
+
+
+DEFAULT_S, DEFAULT_BLOCKS = 0.1, 4
+SHORTEST_BLOCKS = 2
+LONGEST_S, LONGEST_BLOCKS = 1.0, 10  # where something moves: so long an output may be held
+
+
+def _default_s(block_s: float) -> float:
+    return max(DEFAULT_S, DEFAULT_BLOCKS * block_s)
+
+
+def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> float:
+    """Watchdog time to set, s.
+
+    Raises `DaqRefused` if it is shorter than two blocks, or too long for a device that moves something.
+    """
+    chosen_s = options.watchdog_s or max(_default_s(block_s), facts.watchdog_s[0])
+    shortest_s, longest_s = SHORTEST_BLOCKS * block_s, max(LONGEST_S, LONGEST_BLOCKS * block_s)
+    if chosen_s < shortest_s:
+        raise DaqRefused(
+            f"driver.options.watchdog_s = {chosen_s:g}: allowed is from {shortest_s:g} s on, {SHORTEST_BLOCKS} blocks"
+        )
+    if chosen_s > longest_s and not facts.simulated:
+        whose = "" if options.watchdog_s else ", the shortest that the device can do"
+        raise DaqRefused(
+            f"driver.options.watchdog_s = {chosen_s:g}{whose}: allowed is up to {longest_s:g} s "
+            "for a device that does not say that nothing moves: so long it may hold its last output"
+        )
+    return chosen_s
+
+
+def raised_remark(options: WireOptions, facts: DeviceFacts, block_s: float) -> str:
+    """Remark that the device's shortest watchdog time is above the default; empty if the default applies or was not wanted."""
+    if options.watchdog_s or facts.watchdog_s[0] <= _default_s(block_s):
+        return ""
+    return (
+        f"the device's watchdog waits {facts.watchdog_s[0]:g} s, the shortest that it can do, "
+        f"instead of the usual {_default_s(block_s):g} s"
+    )

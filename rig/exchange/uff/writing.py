@@ -15,7 +15,7 @@ import numpy as np
 from identification import Channel
 from rig.errors import RecordingError
 from rig.exchange.uff.codes import WIDTH, axis, channel_lines, degrees_of_freedom, evenly
-from rig.measurements.contents import Contents
+from rig.text.contents import Contents
 
 __all__ = ["write_uff"]
 
@@ -36,7 +36,10 @@ def write_uff(items: Sequence[Contents], path: Path) -> None:
             return False
 
     writer = Writer(str(path))
-    for dataset in [*_head(items), *(dataset for item in items for dataset in _DATASETS[item.kind](item))]:
+    for dataset in [
+        *_head(items),
+        *(dataset for item in items for dataset in _DATASETS.get(item.kind, _refused)(item)),
+    ]:
         if not np.all(np.isfinite(dataset.get("data", 0.0))):
             raise RecordingError(f"'{dataset['id1']}' holds a number that is not finite, which universal files cannot")
         with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""Times counted in logarithmic bins, in memory that somebody else may watch."""
+"""Times counted in logarithmic bins, in memory that another process may read."""
 
 import math
 
@@ -6,10 +6,10 @@ __all__ = ["WORDS", "Histogram"]
 
 PER_OCTAVE = 16
 OCTAVES = 24  # 1 us to 16.8 s
-BINS = PER_OCTAVE * OCTAVES + 2  # one below, one beyond
+BINS = PER_OCTAVE * OCTAVES + 2  # one bin below the range, one above
 LARGEST = BINS
 WORDS = BINS + 1
-"""Words of eight bytes that a histogram takes."""
+"""Size of a histogram in words of eight bytes."""
 
 _log2 = math.log2
 
@@ -20,7 +20,7 @@ def upper_edge_us(index: int) -> float:
 
 
 class Histogram:
-    """Counts by time, 16 bins an octave (4.4 %) from 1 us on, and the largest as it was.
+    """Counts in 16 bins per octave (4.4 %) from 1 us on, and the largest time exactly.
 
     ``words`` holds `WORDS` signed integers of eight bytes, zeros at first. One process counts, any may read.
     """
@@ -63,7 +63,7 @@ class Histogram:
         return out | {"largest": round(self.largest_us, 2)}
 
     def bins(self) -> dict[str, list[float]]:
-        """Upper edges (us) of the bins that hold anything, and how many each holds."""
+        """Upper edge (us) and count of every bin that is not empty."""
         held = [index for index in range(BINS) if self._words[index]]
         edges = [round(min(upper_edge_us(index), max(self.largest_us, 1.0)), 3) for index in held]
         return {"upper_edge_us": edges, "count": [self._words[index] for index in held]}

@@ -1,4 +1,4 @@
-"""The loop by the wall clock: one block after the other, on time or counted, and a safe end whatever happens."""
+"""The loop by the wall clock: block after block, late ones are counted, and every end brings the output to 0 V."""
 
 import os
 import struct
@@ -11,10 +11,9 @@ import numpy as np
 from rig.daq import DAQ
 from rig.errors import DaqError
 from rig.loop.driven_loop import DrivenLoop
-from rig.loop.worker.disturbances import disturbances, since
 from rig.loop.worker.memory import STOP, SharedMemory, Slot
 from rig.loop.worker.pace import pace_of
-from rig.loop.worker.times import BlockTimes
+from rig.loop.worker.times import BlockTimes, disturbances, since
 from rig.tick.kernels import tick_block
 from rig.tick.safety.layout import GuardMode
 from rig.tick.tick import Tick
@@ -22,17 +21,17 @@ from rig.tick.tick import Tick
 __all__ = ["CHUNK_DONE", "LONGEST_STALL_S", "WallClockLoop", "suspended_s"]
 
 CHUNK_DONE = b"."
-"""What is sent to the campaign with every chunk."""
-NOTICE = struct.pack("!i", len(CHUNK_DONE)) + CHUNK_DONE  # as `Connection.send_bytes` has it, without its detours
+"""Message to the campaign with every chunk."""
+NOTICE = struct.pack("!i", len(CHUNK_DONE)) + CHUNK_DONE  # format of `Connection.send_bytes`
 LONGEST_STALL_S = 1.0
-"""A loop paced by the host that comes later than this, or ten blocks, ends with a ramp."""
+"""A loop paced by the host that is late by this time, or by ten blocks if longer, ends with a ramp."""
 OFF = int(GuardMode.OFF)
 
 _now = time.monotonic_ns
 
 
 def suspended_s() -> float:
-    """Seconds that the computer has slept since it was started; 0 where nobody counts them."""
+    """Seconds that the computer was suspended since its start; 0 if the system does not count them."""
     clock = getattr(time, "CLOCK_BOOTTIME", None)
     return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
@@ -76,7 +75,7 @@ class WallClockLoop(DrivenLoop):
         return 1e-9 * self._deadline_ns
 
     def run(self) -> None:
-        """Until the output is off."""
+        """Run until the output is off."""
         before = disturbances()
         began = _now()
         self._pace.begin()
@@ -86,13 +85,13 @@ class WallClockLoop(DrivenLoop):
             rows = self._fill(slot)
             over = self.failure is not None or self.tick.over
             if over:
-                self.stop()  # before anything else: the rows can wait
+                self.stop()  # the next outputs first, the rows after them
             self._hand_over(slot, rows, _now() - began)
         self._announce()
         self.disturbances = since(before)
 
     def _fill(self, slot: Slot) -> int:
-        """Fill a slot block by block; returns the rows that it holds."""
+        """Fill a slot block by block; return the number of rows in it."""
         tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
         arrays, block, by_device = tick.arrays, self.daq.block, self._pace.by_device
         chores = self._chores
@@ -121,7 +120,7 @@ class WallClockLoop(DrivenLoop):
         return self._memory.layout.chunk
 
     def _account(self) -> None:
-        """The block before is over, and its outputs are handed over now: count its times."""
+        """Count the times of the block before, whose outputs are handed over now."""
         response = self.times.done()
         if response > self._stall_ns and not self._pace.by_device:
             self._end(f"the loop stood still for {1e-9 * response:.1f} s")
@@ -129,7 +128,7 @@ class WallClockLoop(DrivenLoop):
     def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
         """Complete a chunk and announce it.
 
-        Without anybody there the slot is filled again; without room it is one that the campaign may be reading.
+        If the campaign is gone, the same slot is filled again. If the ring is full, the campaign may still read that slot.
         """
         self._announce()  # the chunk before, where this one ended before it came to it
         if self._alone or self._memory.free < 1:
@@ -142,7 +141,7 @@ class WallClockLoop(DrivenLoop):
         self._unsaid = True
 
     def _announce(self) -> None:
-        """Tell the campaign of a chunk that it has not been told of."""
+        """Tell the campaign of a chunk that was not announced yet."""
         if not self._unsaid:
             return
         self._unsaid = False
@@ -156,14 +155,14 @@ class WallClockLoop(DrivenLoop):
         self._announce()
 
     def _look_round(self) -> None:
-        """Whether anything asks for the end."""
+        """Check everything that may ask for the end of the loop."""
         if os.getppid() != self._parent:
             self._alone = True
         if self._alone:
             self._end("the campaign's process is gone")
         elif self._memory.free <= self._memory.layout.reserve and not self._waited_for_room():
             self._end("the campaign did not take its rows, and the output was brought down before any was lost")
-        if not self._alone and self._memory.free < 1:  # it has had the time of a ramp and more
+        if not self._alone and self._memory.free < 1:  # longer than a ramp has passed
             self._fail(DaqError("the campaign did not take its rows, and there is no room for more"))
         asked = self._asked()
         if asked:
@@ -174,7 +173,7 @@ class WallClockLoop(DrivenLoop):
         self._slept_s = slept
 
     def _waited_for_room(self) -> bool:
-        """Wait for the campaign where nobody's clock runs on."""
+        """Wait until the campaign has taken a chunk; only in lockstep, where no clock runs on."""
         if self._pace.has_clock:
             return False
         while self._memory.free <= self._memory.layout.reserve:
@@ -184,7 +183,7 @@ class WallClockLoop(DrivenLoop):
         return True
 
     def _end(self, cause: str) -> None:
-        """Ask for the ramp, for a cause of the loop's own; the first one stays."""
+        """Ask for the ramp, with a cause; the first cause is kept."""
         if not self.cause and not self._memory.words[STOP] and int(self.tick.guard["mode"][0]) == GuardMode.ARMED:
             self.cause = cause
         self.tick.request_stop()

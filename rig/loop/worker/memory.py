@@ -1,4 +1,4 @@
-"""The block of memory that the loop process and the campaign share: words, histograms and a ring of chunks.
+"""The memory that the loop process and the campaign share: control words, histograms and a ring of chunks.
 
 It has no name in the file system, only descriptors in two processes: nothing is left of it whatever is killed. Each side
 writes words of its own. A chunk is announced by a byte through a pipe after it is complete, which also orders the memory.
@@ -24,8 +24,8 @@ ALIGNMENT = 64
 STOP, TAKEN, PUBLISHED = range(3)
 CONTROL_WORDS = 8
 TIMES = ("wake_up", "execution", "response")
-"""What is counted of every block: lateness of its beginning, time it took, and both."""
-CONSTANTS = 8  # of the fields of `TickArrays`, the first are constants of the run
+"""Times counted for every block: delay of its beginning, duration, and the sum of both."""
+CONSTANTS = 7  # of the fields of `TickArrays`, the first are constants of the run
 SNAPSHOT = tuple(name for name in TickArrays._fields[CONSTANTS:] if name != "history")
 HEAD = ("rows", "samples", "overruns", "busy_ns", "wall_ns")
 
@@ -60,21 +60,21 @@ def packed(arrays: TickArrays) -> tuple[TickArrays, np.ndarray]:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything stands in the shared block; worked out by both sides from the same numbers."""
+    """Places in the shared memory; both sides compute them from the same numbers."""
 
     chunk: int
     """Samples of a chunk: about 20 ms, whole blocks."""
     slots: int
     """Chunks of the ring."""
     reserve: int
-    """Chunks that a ramp to 0 V takes: with no more left the ramp begins, so that no row is lost."""
+    """Chunks that a ramp to 0 V takes. When only these are free, the ramp begins, so that no row is lost."""
     n_channels: int
     n_counters: int
     state_bytes: int
 
     @classmethod
     def of(cls, bench: Bench, arrays: TickArrays, n_counters: int, ring_s: float) -> "Layout":
-        """For a bench and the arrays of its tick; the ring holds ``ring_s`` before a ramp begins for want of room."""
+        """Layout for a bench and the arrays of its tick; a campaign may be late by ``ring_s`` before a ramp begins."""
         chunk = max(1, round(CHUNK_S * bench.sample_rate_hz / bench.block)) * bench.block
         chunk_s = chunk / bench.sample_rate_hz
         lead = int(arrays.loop["lead_whole"][0])
@@ -133,7 +133,7 @@ class SharedMemory:
         self._map = mmap.mmap(descriptor, layout.size)
         memory = np.frombuffer(self._map, np.uint8)
         if create:
-            memory[:] = 0  # every page is there before the clock runs
+            memory[:] = 0  # touch every page before the clock runs
         self.words = memoryview(self._map)[: 8 * (CONTROL_WORDS + len(TIMES) * WORDS)].cast("q")
         """Control words and histograms."""
         self.histograms = {
@@ -159,19 +159,19 @@ class SharedMemory:
         return self.layout.slots - (self.words[PUBLISHED] - self.words[TAKEN])
 
     def to_fill(self) -> Slot:
-        """The slot that comes next in the loop."""
+        """The next slot that the loop fills."""
         return self._slots[self.words[PUBLISHED] % self.layout.slots]
 
     def publish(self) -> None:
-        """The slot to fill is complete."""
+        """Mark the slot to fill as complete."""
         self.words[PUBLISHED] += 1
 
     def to_take(self) -> Slot:
-        """The slot that comes next in the campaign."""
+        """The next slot that the campaign takes."""
         return self._slots[self.words[TAKEN] % self.layout.slots]
 
     def take(self) -> None:
-        """The slot to take may be filled again."""
+        """Release the slot to take, so that it can be filled again."""
         self.words[TAKEN] += 1
 
     def request_stop(self) -> None:

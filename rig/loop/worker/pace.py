@@ -1,4 +1,4 @@
-"""When a block of the loop is due: by the host's clock, by the device's, or whenever the other side has come."""
+"""When a block of the loop is due: by the host's clock, by the device's clock, or without any clock."""
 
 import math
 import time
@@ -9,8 +9,8 @@ from rig.daq import DAQ
 
 __all__ = ["DevicePace", "HostPace", "Lockstep", "Pace", "pace_of", "pacing_of"]
 
-DRIFT = 2e-4  # crystals of host and device differ by less
-WINDOW_S = 0.2  # of which no block was on time, before a device is thought to have stood still
+DRIFT = 2e-4  # the clocks of host and device differ by less
+WINDOW_S = 0.2  # without a block on time, after which the device's clock is taken to have stopped for a while
 WINDOW_BLOCKS = 20
 
 _now = time.monotonic_ns
@@ -32,7 +32,7 @@ class Pace(Protocol):
         """When the block that has begun at a time was due (monotonic clock, ns)."""
 
     def begin(self) -> None:
-        """The clock runs from now on."""
+        """Start the clock."""
 
     @property
     def skipped(self) -> int:
@@ -40,10 +40,9 @@ class Pace(Protocol):
 
 
 class HostPace:
-    """Absolute deadlines of the host's monotonic clock: block j is due j + 1 periods after the beginning. Never spins.
+    """Absolute deadlines of the host's monotonic clock: block j is due j + 1 periods after the beginning. It never spins.
 
-    What is late by whole periods goes on from the present, for a burst of blocks would sample at wrong times: these periods
-    are skipped, and counted.
+    Whole periods that have been missed are skipped and counted, because a burst of blocks would sample at wrong times.
     """
 
     by_device = False
@@ -56,7 +55,7 @@ class HostPace:
 
     @property
     def skipped(self) -> int:
-        """Periods left out so far."""
+        """Periods skipped so far."""
         return self._skipped
 
     def begin(self) -> None:
@@ -105,10 +104,10 @@ class DevicePace:
         self._number = 0
 
     def wait(self) -> None:
-        """Nothing: the exchange waits."""
+        """Do nothing: the exchange waits."""
 
     def release(self, begun_ns: int) -> int:
-        """When the block was due that has arrived at a time."""
+        """When the block that arrived at this time was due."""
         since = begun_ns - self._number * self._period_ns
         self._earliest = min(self._earliest + DRIFT * self._period_ns, since)
         self._lately = min(self._lately, since)
@@ -122,7 +121,7 @@ class DevicePace:
 
 
 class Lockstep:
-    """A device that waits for the host, block by block: nobody's clock runs, and no block is due at any time."""
+    """A device that waits for the host at every block: no clock runs, and no block is due at any time."""
 
     by_device = True
     has_clock = False
@@ -135,12 +134,12 @@ class Lockstep:
         """Nothing: the exchange waits."""
 
     def release(self, begun_ns: int) -> int:
-        """When it came."""
+        """The time of its arrival."""
         return begun_ns
 
 
 def pacing_of(daq: DAQ) -> str:
-    """Who paces a device that is open: ``host``, ``device``, or nobody (``lockstep``).
+    """What paces an open device: ``host``, ``device``, or neither (``lockstep``).
 
     One that paces and is repeatable must wait for the host: with a clock of its own, no two runs would be alike.
     """

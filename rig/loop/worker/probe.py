@@ -1,4 +1,4 @@
-"""Measurements in a loop process that drive nothing: how late it is woken, and how quick a device answers."""
+"""Measurements in a loop process at 0 V: how late it is woken, and how quickly a device answers."""
 
 import gc
 import time
@@ -51,9 +51,9 @@ def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
             "paced_by": pacing_of(daq),
             "virtual": capabilities.virtual,
         }
-        if daq.latched:  # nobody has armed anything here, and so nobody may clear it
+        if daq.latched:  # nobody has armed the bench, so nothing may be cleared
             return out | {"latched": daq.latched, "remarks": [*daq.remarks]}
-        prepare(privileged=out["paced_by"] == "device")  # what returns at once would never let go of the processor
+        prepare(privileged=out["paced_by"] == "device")  # else the loop would hog the processor
         daq.start(bench.block)
         zeros = np.zeros(bench.block)
         for _ in range(SETTLE_BLOCKS):

@@ -1,4 +1,4 @@
-"""The loop process: opens the driver, takes its orders from the campaign, runs the loop, and says what came of it."""
+"""The loop process: it opens the driver, takes orders from the campaign, runs the loop and reports the result."""
 
 import signal
 import sys
@@ -40,7 +40,7 @@ def main() -> None:
         elif name == "open":
             _serve(commands, facts, memory, *arguments)
     except (EOFError, BrokenPipeError):
-        return  # nobody is there any more, and the driver is closed
+        return  # the campaign is gone, and the driver is closed
     except RigError as error:
         facts.send(("failed", described(error)))
     except Exception as error:
@@ -73,7 +73,9 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         layout, memory = _shared(daq, settings, presumed, ring_s, descriptor)
         _load_kernels(daq, bench, settings)
         came = _listen()
-        said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")  # in no hurry, and never asleep
+        said = prepare(
+            privileged=privileged and pacing_of(daq) != "lockstep"
+        )  # lockstep: no deadlines, and it never sleeps
         daq.clear()
         daq.start(bench.block)
         if daq.latency_samples > presumed:
@@ -90,7 +92,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
 
 
 def _presumed_latency(daq: DAQ, bench: Bench) -> float:
-    """Samples from output to input as far as they can be told before the device is started: queue, hold and filters."""
+    """Latency in samples as far as it is known before the device is started: queue, hold and filters."""
     queue = bench.driver.options.get("queue_blocks", 1)
     queue = queue if isinstance(queue, int) else 1
     return queue * bench.block + 1.0 + daq.filter_delay_samples
@@ -121,14 +123,14 @@ def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
     nothing = np.empty((0, len(bench.channels)))
     tick_block(arrays, nothing, np.zeros(0, np.uint16), readings, rows, np.empty(0))
     _ = tick.over
-    if not daq.wall_clock:  # software, which starts anew as if nothing had been
+    if not daq.wall_clock:  # software, which begins anew at the next start
         daq.start(bench.block)
         daq.exchange(np.zeros(bench.block))
         daq.stop()
 
 
 def _listen() -> list[str]:
-    """From here on signals only ask for the ramp; the list holds the names of those that have come."""
+    """From here on signals only ask for the ramp; return a list that collects their names."""
     came: list[str] = []
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -141,14 +143,14 @@ def _listen() -> list[str]:
 
 
 def _asked(came: list[str], commands: Connection) -> str:
-    """Who has asked this process to end, in a sentence: a signal, or a campaign that talks to it no more."""
+    """What has asked this process to end, in one sentence: a signal, or a campaign that is gone."""
     if came:
         return f"the loop's process was asked to end ({came[0]})"
-    return "the campaign has let go of the loop" if commands.poll() else ""  # nothing else comes once it runs
+    return "the campaign has let go of the loop" if commands.poll() else ""  # readable: it was closed
 
 
 def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
-    """What the loop process alone knows, as plain data for the record."""
+    """Statistics that only the loop process knows, as plain data for the record."""
     counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
     real_time = {**said, **{name: str(value) for name, value in counted.items()}}
     return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}

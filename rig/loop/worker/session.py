@@ -1,4 +1,4 @@
-"""A bench whose driver and loop live in a process of their own, as a campaign sees it."""
+"""A bench whose driver and loop run in another process, as the campaign sees it."""
 
 import pickle
 import warnings
@@ -28,7 +28,7 @@ PATIENCE_S = 5.0
 
 
 class WorkerLoop:
-    """A loop in another process: its rows, and a copy of its control state as of the last of them."""
+    """A loop in another process: its rows, and a copy of its state at the last of them."""
 
     failure: DaqError | None
 
@@ -59,7 +59,9 @@ class WorkerLoop:
         """Telemetry in chunks of about 20 ms, until the output is off or the loop's process is gone."""
         while not self.ended:
             end = self._wait()
-            while self._memory.published > self._memory.taken:  # one that was not announced any more counts as well
+            while (
+                self._memory.published > self._memory.taken
+            ):  # a complete chunk counts, also if its announcement was lost
                 rows = self._take()
                 if rows.size:
                     yield rows
@@ -68,7 +70,7 @@ class WorkerLoop:
 
     @property
     def waits(self) -> bool:
-        """Never: the other process goes on."""
+        """False: the other process goes on."""
         return False
 
     def request_stop(self, cause: str = "") -> None:
@@ -77,7 +79,7 @@ class WorkerLoop:
         self._memory.request_stop()
 
     def bring_down(self) -> None:
-        """Ramp to 0 V what still runs, and wait for it; nobody takes the rows."""
+        """Ramp to 0 V if it still runs, and wait for the end; the rows are dropped."""
         self.request_stop()
         for _ in self.run():
             pass
@@ -185,8 +187,8 @@ class WorkerSession:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Ramp down what still runs, and wait for it."""
-        patience_s = PATIENCE_S + self._bench.limits.ramp_down_s  # it may run although nobody was told any more
+        """Ramp down if it still runs, and wait for the end."""
+        patience_s = PATIENCE_S + self._bench.limits.ramp_down_s  # it may run although its answer was lost
         if self._loop is not None and not self._loop.ended:
             self._loop.request_stop()
         left = self._worker.close(patience_s)

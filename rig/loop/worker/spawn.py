@@ -18,7 +18,7 @@ KILLED = "the loop's process was killed; only the device's watchdog has acted"
 
 
 def supported() -> bool:
-    """Whether this system can have a loop process: descriptors must be inherited."""
+    """Whether this system supports a loop process, which needs inherited descriptors."""
     return os.name == "posix"
 
 
@@ -56,12 +56,12 @@ class Worker:
         return self._process.pid
 
     def send(self, *command: Any) -> None:
-        """Send an order; one that nobody takes any more is found out by the next `receive`."""
+        """Send an order; if the process is gone, the next `receive` raises."""
         with contextlib.suppress(BrokenPipeError):
             self._commands.send(command)
 
     def receive(self, expected: str) -> tuple[Any, ...]:
-        """What the process says next; raises its error again, or `DaqError` where it has ended."""
+        """The next answer of the process; raises the error that it sent, or `DaqError` if it has ended."""
         try:
             name, *facts = self.facts.recv()
         except (EOFError, OSError):
@@ -73,7 +73,7 @@ class Worker:
         return tuple(facts)
 
     def ended(self) -> DaqError:
-        """The error of a process that is there no more."""
+        """The error for a process that has ended."""
         try:
             status = self._process.wait(2.0)
         except subprocess.TimeoutExpired:
@@ -82,7 +82,7 @@ class Worker:
         return DaqError(f"the loop's process has ended ({how}); the device's own watchdog brings its output to 0 V")
 
     def end(self, patience_s: float) -> str:
-        """Ask it to end, then make it. Returns in a sentence what could not be done in order; empty if it ended by itself."""
+        """Ask the process to end, then kill it. Return in one sentence what went wrong; empty if it ended by itself."""
         for action, said in ((self._process.terminate, ""), (self._process.kill, KILLED)):
             action()
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -91,7 +91,7 @@ class Worker:
         return f"{KILLED}, and it is there still as process {self.pid}"
 
     def close(self, patience_s: float) -> str:
-        """Let it end by itself for a while, then make it; returns what `end` does."""
+        """Wait a while for the process to end by itself, then `end` it; return what `end` returns."""
         self._commands.close()
         try:
             self._process.wait(patience_s)
@@ -105,7 +105,7 @@ class Worker:
 
 
 def rebuilt(names: tuple[str, ...], message: str) -> RigError:
-    """An error of the other process: the closest class that both know."""
+    """An error of the other process, as the closest class that this process knows."""
     for name in names:
         kind = getattr(rig.errors, name, None)
         if isinstance(kind, type) and issubclass(kind, RigError):

@@ -1,11 +1,42 @@
 """The times of the blocks of a loop: how late each began, how long it took, and what held it up."""
 
+import gc
+import importlib.util
+import sys
 import time
 
 from rig.loop.worker.memory import SharedMemory
 from rig.loop.worker.pace import Pace
 
-__all__ = ["STALL_NS", "BlockTimes"]
+__all__ = ["STALL_NS", "BlockTimes", "disturbances", "since"]
+
+
+def disturbances() -> dict[str, int]:
+    """Counts so far of what may delay a thread: modules imported, runs of the garbage collector.
+
+    Where the system counts them, also this thread's involuntary context switches and its major and minor page faults.
+    """
+    system = _of_the_system()  # first, because it may import a module itself
+    collections = sum(int(generation["collections"]) for generation in gc.get_stats())
+    return {"imports": len(sys.modules), "collections": collections, **system}
+
+
+def since(before: dict[str, int]) -> dict[str, int]:
+    """Increase of the counts since ``before``."""
+    now = disturbances()
+    return {name: now[name] - count for name, count in before.items()}
+
+
+def _of_the_system() -> dict[str, int]:
+    if importlib.util.find_spec("resource") is None:
+        return {}
+    import resource
+
+    if not hasattr(resource, "RUSAGE_THREAD"):
+        return {}
+    used = resource.getrusage(resource.RUSAGE_THREAD)
+    return {"involuntary_switches": used.ru_nivcsw, "major_faults": used.ru_majflt, "minor_faults": used.ru_minflt}
+
 
 STALL_NS = 1_000_000
 """A block that is handed over later than this after its release has been held up."""
@@ -15,12 +46,11 @@ _computed = time.thread_time_ns
 
 
 class BlockTimes:
-    """Counts into the histograms of the shared memory, and the blocks that were late or held up.
+    """Counts the times of blocks into the histograms of the shared memory, and how many blocks were late.
 
-    A *stall* is a block handed over more than 1 ms after its release. One of ``own_stalls`` is explained by what the thread
-    itself computed since the block before: Python, or the kernel on its behalf. In all others it was ready or asleep, and
-    somebody else had the processor. Without a clock (`rig.loop.worker.pace.Lockstep`) nothing can be late: only the time that
-    the blocks took is counted.
+    A *stall* is a block handed over more than 1 ms after its release. For ``own_stalls`` the thread's own computing time since
+    the block before explains the delay; in the other stalls the thread was not running. Without a clock
+    (`rig.loop.worker.pace.Lockstep`) nothing can be late, and only the time that a block took is counted.
     """
 
     def __init__(self, pace: Pace, memory: SharedMemory, deadline_ns: int) -> None:
@@ -32,20 +62,20 @@ class BlockTimes:
         self.late = self.stalls = self.own_stalls = self.busy_ns = 0
 
     def report(self) -> dict[str, int]:
-        """Periods left out and stalls, for the record."""
+        """Skipped periods and stalls, for the record."""
         return {"skipped_periods": self._pace.skipped, "stalls": self.stalls, "own_stalls": self.own_stalls}
 
     @property
     def overruns(self) -> int:
-        """Blocks beyond their deadline, and periods left out."""
+        """Number of late blocks and skipped periods."""
         return self.late + self._pace.skipped
 
     def begun(self, begun_ns: int) -> None:
-        """A block was in hand at a time (monotonic clock, ns)."""
+        """Note that work on a block began at this time (monotonic clock, ns)."""
         self._begun_ns, self._release_ns = begun_ns, self._pace.release(begun_ns)
 
     def done(self) -> int:
-        """The outputs of the block are handed over now; returns how long after its release, ns."""
+        """Note that the outputs of the block are handed over now; return the time since its release, ns."""
         begun, release = self._begun_ns, self._release_ns
         if not begun:
             return 0

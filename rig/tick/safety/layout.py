@@ -122,7 +122,6 @@ output outside ``stop_below_v`` to ``stop_above_v`` and may stand still otherwis
 INPUT_WATCH = np.dtype(
     [
         ("mean", "f8"),
-        ("estimate", "c16"),
         ("velocity", "f8"),
         ("displacement", "f8"),
         ("last_v", "f8"),

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-__all__ = ["OUTCOME", "PROGRESS", "SEGMENT", "SETTLE_RULE", "SETTLING", "Drive", "OnFailure", "Outcome", "SegmentKind"]
+__all__ = ["OUTCOME", "PROGRESS", "SEGMENT", "Drive", "OnFailure", "Outcome", "SegmentKind"]
 
 
 class SegmentKind(IntEnum):
@@ -108,34 +108,13 @@ OUTCOME = np.dtype(
 )
 """How each segment went: samples [first, end), periods used, last averaged phase error, last relative amplitude drift."""
 
-SETTLE_RULE = np.dtype([("phase_rad", "f8"), ("amplitude", "f8"), ("average_periods", "i8"), ("settled_periods", "i8")])
-"""The settle rule (one record); see `rig.tick.sequencer.kernels.judge_period`."""
-
-LONGEST_AVERAGE = 64
-
-SETTLING = np.dtype(
-    [
-        ("errors", "f8", (2 * LONGEST_AVERAGE,)),
-        ("responses", "f8", (2 * LONGEST_AVERAGE,)),
-        ("forces", "f8", (2 * LONGEST_AVERAGE,)),
-        ("controlled", "f8", (2 * LONGEST_AVERAGE,)),
-        ("count", "i8"),
-        ("good_periods", "i8"),
-        ("bad_periods", "i8"),
-        ("saturated_periods", "i8"),
-        ("clamped_periods", "i8"),
-        ("clamped_in_row", "i8"),
-        ("mean_error_rad", "f8"),
-        ("drift", "f8"),
-    ]
-)
-"""Period means of the last periods, as a ring, and what the settle rule made of them (one record).
-``clamped_in_row`` counts at any time, ``clamped_periods`` since the present settling."""
-
 PROGRESS = np.dtype(
     [
         ("segment", "i8"),
         ("segments", "i8"),
+        ("cycle", "f8"),
+        ("sample", "i8"),
+        ("unreached", "i8"),
         ("start_cycle", "f8"),
         ("last_cycle", "f8"),
         ("frozen_cycles", "f8"),
@@ -151,5 +130,6 @@ PROGRESS = np.dtype(
         ("unlocked", "i8"),
     ]
 )
-"""Where in the plan the run stands (one record); ``frozen_cycles`` of a ramp that its level could not follow,
-``unlocked``: no lock was ever gained."""
+"""Where in the plan the run stands (one record). ``cycle``: oscillator periods that the inputs have seen so far, with the
+fraction; ``unreached``: the output stands at its limit and the level of the moment is not reached; ``frozen_cycles`` of a ramp
+that its level could not follow; ``unlocked``: no lock was ever gained."""

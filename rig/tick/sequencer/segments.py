@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 
 from controller import AmplitudeLaw
 from rig.bench.configuration import Configured
-from rig.tick.sequencer.layout import LONGEST_AVERAGE, OUTCOME, SEGMENT, SETTLE_RULE, Drive, OnFailure, SegmentKind
+from rig.tick.sequencer.judgement import LONGEST_AVERAGE, SETTLE_RULE
+from rig.tick.sequencer.layout import OUTCOME, SEGMENT, Drive, OnFailure, SegmentKind
 
 __all__ = ["Excitation", "Segment", "SettleRule", "segment_table"]
 

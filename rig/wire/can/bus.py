@@ -1,4 +1,4 @@
-"""Where frames go in and out: any backend of python-can. A sibling for adapters on a serial line is in `rig.wire.can.slcan`."""
+"""Buses that frames are sent to and received from, and any backend of python-can as one (see also `rig.wire.can.slcan`)."""
 
 import contextlib
 import errno
@@ -9,13 +9,13 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from rig.errors import DaqDisconnected, DaqRefused
-from rig.wire.can.definition import NODE_MASK
-from rig.wire.can.frames import Frame
+from rig.wire.can.frames import BusTiming, Frame
+from rig.wire.can.protocol import NODE_MASK
 
 __all__ = ["BUS_COUNTERS", "FrameBus", "PythonCanBus", "only_loopback"]
 
 BUS_COUNTERS = ("error_frames", "expired_frames", "foreign_frames", "send_errors")
-"""What a bus counts: error frames, own frames dropped because they could not be sent in time, other frames, failed sends."""
+"""Counters of a bus: error frames, own frames not sent in time, foreign frames, failed sends."""
 
 _BUS_OFF = 0x40  # class of an error frame, in its identifier (Linux: can/error.h)
 _RETRY_S = 2e-4
@@ -38,15 +38,15 @@ class FrameBus(ABC):
 
     @abstractmethod
     def send(self, frame: Frame, timeout_s: float) -> bool:
-        """Send a frame, whole or not at all; False where it could not be sent within the time: then it has expired."""
+        """Send a frame; False if it could not be sent within the time and was dropped."""
 
     @abstractmethod
     def receive(self, timeout_s: float) -> Frame | None:
-        """The next data frame; waits at most so long, or 0 not at all."""
+        """The next data frame, or None after ``timeout_s``; 0 does not wait."""
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the interface, any number of times."""
+        """Close the interface; may be called again."""
 
 
 def only_loopback() -> bool:
@@ -65,20 +65,18 @@ class PythonCanBus(FrameBus):
         self,
         interface: str,
         channel: str | int,
-        fd: bool,
-        bit_rate_hz: int,
-        data_bit_rate_hz: int,
+        timing: BusTiming,
         node: int | None = None,
         options: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(f"{interface} {channel}")
-        self._interface, self._fd = interface, fd
-        self._arguments: dict[str, Any] = {"interface": interface, "channel": channel, "bitrate": bit_rate_hz}
-        if fd or interface == "udp_multicast":
-            self._arguments["fd"] = fd
-        if fd:
-            self._arguments["data_bitrate"] = data_bit_rate_hz
-        if node is not None:  # ours, and the emergency stop
+        self._interface = interface
+        self._arguments: dict[str, Any] = {"interface": interface, "channel": channel, "bitrate": timing.bit_rate_hz}
+        if timing.fd or interface == "udp_multicast":
+            self._arguments["fd"] = timing.fd
+        if timing.fd:
+            self._arguments["data_bitrate"] = timing.data_bit_rate_hz
+        if node is not None:  # receive frames of this node, and the emergency stop
             shared = {"extended": False}
             self._arguments["can_filters"] = [
                 {"can_id": node, "can_mask": NODE_MASK, **shared},
@@ -107,7 +105,7 @@ class PythonCanBus(FrameBus):
             _enlarge(self._bus.fileno())
 
     def send(self, frame: Frame, timeout_s: float) -> bool:
-        """Hand a frame to the backend; a full queue is tried again until the time is over."""
+        """Hand a frame to the backend; if its queue is full, try again until the time is over."""
         import can
 
         message = can.Message(
@@ -118,7 +116,7 @@ class PythonCanBus(FrameBus):
             data=frame.data,
         )
         deadline = time.monotonic() + timeout_s
-        left_s = timeout_s  # the same time after time: backends are slow to change it
+        left_s = timeout_s  # kept the same from call to call: backends are slow to change it
         while True:
             try:
                 self._bus.send(message, timeout=left_s)
@@ -135,7 +133,7 @@ class PythonCanBus(FrameBus):
             left_s = max(deadline - time.monotonic(), 0.0)
 
     def receive(self, timeout_s: float) -> Frame | None:
-        """The next data frame; error frames are counted, and end the connection where they say that the bus is off."""
+        """The next data frame. Error frames are counted; one that reports bus-off raises `DaqDisconnected`."""
         import can
 
         try:
@@ -162,12 +160,12 @@ class PythonCanBus(FrameBus):
         if bus is not None:
             try:
                 bus.shutdown()
-            except Exception:  # whatever a backend says of an interface that is gone, it is closed
+            except Exception:  # a backend may raise anything for an interface that is gone
                 return
 
 
 def _enlarge(descriptor: int) -> None:
-    """More room for frames that come while we stall, as much as the system grants."""
+    """Enlarge the receive buffer for frames that arrive while this process stalls, as far as the system permits."""
     with socket.socket(fileno=os.dup(descriptor)) as copy:
         for option in (_FORCED, socket.SO_RCVBUF):
             with contextlib.suppress(OSError):

@@ -5,16 +5,15 @@ import struct
 import numpy as np
 
 from rig.errors import DaqRefused
+from rig.wire.can.blocks import COUNT, Blocks, StreamFrames, check_stream
 from rig.wire.can.frames import Frame
-from rig.wire.can.groups import Blocks
 from rig.wire.can.protocol import FrameKind, Protocol
-from rig.wire.can.streams import COUNT, StreamFrames, check_stream
 from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
 
 __all__ = ["COUNTERS", "CanCodec"]
 
 COUNTERS = ("foreign_frames", "own_frames", "damaged_frames", "repeated_frames", "incomplete_blocks", "resynchronised")
-"""What a codec counts: frames of others, our own come back, of a wrong length, come twice; torn blocks; indices put right."""
+"""Counters of a codec: foreign frames, own frames returned, wrong lengths, repeated frames, torn blocks, corrected indices."""
 
 _LARGEST_DROPPED = 255
 _NEVER = -(1 << 30)
@@ -23,7 +22,7 @@ _NEVER = -(1 << 30)
 class CanCodec:
     """One end of the protocol on a bus: `encode` what it sends, `decode` what it receives.
 
-    ``device`` is whether this is the device's end: samples go out and outputs come in. Streams need `configure` first.
+    ``device``: this is the device's end, which sends samples and receives outputs. Streams need `configure` first.
     """
 
     def __init__(self, protocol: Protocol, device: bool, counters: dict[str, int]) -> None:
@@ -42,11 +41,11 @@ class CanCodec:
         self._flags_told = 0
 
     def configure(self, stream: Stream) -> None:
-        """Agree on the shape of samples and outputs; both begin anew. Errors: those of `check_stream`."""
+        """Set the shape of samples and outputs; both start at index 0. Errors: those of `check_stream`."""
         check_stream(self._shape, stream)
         self._stream = stream
         self._flags, self._dropped = 0, 0
-        self._reported = _NEVER  # group at which the receiver was last told its index
+        self._reported = _NEVER  # group whose index the receiver was told last
         samples, outputs = (
             StreamFrames(self.protocol, kind, stream.block) for kind in (FrameKind.SAMPLES, FrameKind.OUTPUT)
         )
@@ -56,7 +55,7 @@ class CanCodec:
             self._incoming.begin(stream.queue)
 
     def encode(self, message: Message) -> list[Frame]:
-        """The frames of a message, in the order in which they must be sent."""
+        """The frames of a message, in sending order."""
         if isinstance(message, Samples):
             return self._encode_samples(message)
         if isinstance(message, Output):
@@ -98,13 +97,13 @@ class CanCodec:
         return (first // sent.block + 1) * sent.groups - self._reported > sent.wrap // 2
 
     def decode(self, frame: Frame) -> Message | None:
-        """The message that a frame completes, if any; frames that are none of ours are counted and dropped."""
+        """The message that a frame completes, if any; foreign frames are counted and dropped."""
         known = None if frame.extended else self._kinds.get(frame.identifier)
         if known is None:
             self._counters["foreign_frames"] += 1
             return None
         kind, number = known
-        if kind is FrameKind.EMERGENCY_STOP:  # of any length, and rather once too often than too seldom
+        if kind is FrameKind.EMERGENCY_STOP:  # accepted with any length: a false stop is safer than a missed one
             return EmergencyStop(frame.data[0] if frame.data else 0)
         if kind is (FrameKind.OUTPUT if self._device else FrameKind.SAMPLES):
             return self._decode_stream(frame, number)
@@ -129,7 +128,7 @@ class CanCodec:
             if self._stream is not None and state != DeviceState.IDLE:
                 self._incoming.mark(samples)
             return Heartbeat(state, flags, boot, samples, dropped)
-        self._counters["own_frames"] += 1  # some buses return what one sends
+        self._counters["own_frames"] += 1  # some buses return the frames that one sends
         return None
 
     def _decode_stream(self, frame: Frame, number: int) -> Message | None:

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-__all__ = ["DATA_BIT_RATE_HZ", "FD_LENGTHS", "Frame", "frame_seconds", "padded_length"]
+__all__ = ["DATA_BIT_RATE_HZ", "FD_LENGTHS", "BusTiming", "Frame", "frame_seconds", "padded_length"]
 
 DATA_BIT_RATE_HZ = 5_000_000
 """CAN FD's bit rate within the data where none is given: common adapters have it, and it carries 5 kHz sample by sample."""
@@ -11,6 +11,17 @@ FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 """Bytes of a CAN FD frame by its length code; a classical frame has 0 to 8."""
 
 _PADDED = tuple(next(length for length in FD_LENGTHS if length >= wanted) for wanted in range(65))
+
+
+class BusTiming(NamedTuple):
+    """Frames and bit rates of a bus, the same for all who speak on it."""
+
+    fd: bool = False
+    """CAN FD, or classical CAN."""
+    bit_rate_hz: int = 1_000_000
+    """Bit rate of the bus."""
+    data_bit_rate_hz: int = DATA_BIT_RATE_HZ
+    """CAN FD: bit rate within the data."""
 
 
 class Frame(NamedTuple):

@@ -1,49 +1,103 @@
-"""`CanLink`: one end of the protocol on a bus, host or device."""
+"""`CanLink`: one end of the protocol on a bus, and what a stream asks of the bus."""
 
 import time
 from pathlib import Path
+from typing import NamedTuple
 
+from rig.wire.can.blocks import check_stream
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
-from rig.wire.can.frames import DATA_BIT_RATE_HZ
-from rig.wire.can.load import bus_load
-from rig.wire.can.protocol import protocol
-from rig.wire.can.streams import check_stream
+from rig.wire.can.frames import BusTiming, frame_seconds, padded_length
+from rig.wire.can.protocol import Shape, protocol
 from rig.wire.link import Link, Load
-from rig.wire.messages import Message, Output, Samples, Stream
+from rig.wire.messages import HEARTBEATS_HZ, Message, Output, Samples, Stream
 
-__all__ = ["CanLink"]
+__all__ = ["CanLink", "Traffic", "bus_load", "frame_lengths", "traffic"]
+
+
+class Traffic(NamedTuple):
+    """Frames of one kind."""
+
+    name: str
+    frames_hz: float
+    share: float
+    """Of the bus's time."""
+
+
+def frame_lengths(shape: Shape, block: int, outputs: bool) -> list[int]:
+    """Bytes of every frame that a block takes, samples or outputs."""
+    rows = shape.output_rows if outputs else shape.rows
+    out = []
+    for first in range(0, block, rows):
+        for part in range(1 if outputs else shape.parts):
+            columns = shape.columns(part)
+            width = 1 if outputs else columns.stop - columns.start
+            n_bytes = shape.header + 2 * width * min(rows, block - first)
+            out.append(padded_length(n_bytes) if shape.fd else n_bytes)
+    return out
+
+
+def traffic(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float) -> list[Traffic]:
+    """Samples, outputs, heartbeats and output indices of a stream."""
+    blocks_hz = stream.rate_hz / stream.block
+    out = []
+    for name, outputs in (("samples", False), ("outputs", True)):
+        lengths = frame_lengths(shape, stream.block, outputs)
+        seconds = sum(frame_seconds(length, shape.fd, bit_rate_hz, data_bit_rate_hz) for length in lengths)
+        out.append(Traffic(name, blocks_hz * len(lengths), blocks_hz * seconds))
+    groups, wrap = len(frame_lengths(shape, stream.block, False)) // shape.parts, shape.wrap
+    beats_hz = HEARTBEATS_HZ + _marks_hz(blocks_hz, groups, wrap)
+    out.append(Traffic("heartbeats", beats_hz, beats_hz * frame_seconds(8, False, bit_rate_hz)))
+    marks_hz = _marks_hz(blocks_hz, len(frame_lengths(shape, stream.block, True)), shape.output_wrap)
+    out.append(Traffic("indices", marks_hz, marks_hz * frame_seconds(4, False, bit_rate_hz)))
+    return out
+
+
+def _marks_hz(blocks_hz: float, groups: int, wrap: int) -> float:
+    """Rate of index messages: one with each block that would end more than half a wrap after the last message."""
+    return blocks_hz / max((wrap - wrap % groups) // 2 // groups, 1)
+
+
+def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float) -> Load:
+    """Load of the bus in bits of its bit rate; the faster bits of CAN FD count by their duration."""
+    parts = traffic(shape, stream, bit_rate_hz, data_bit_rate_hz)
+    share = sum(part.share for part in parts)
+    terms = " + ".join(
+        f"{part.name} {part.frames_hz:.0f}/s x {part.share / part.frames_hz * 1e6:.0f} us" for part in parts
+    )
+    rate = f"{bit_rate_hz / 1e6:g}" + (f"/{data_bit_rate_hz / 1e6:g}" if shape.fd else "") + " Mbit/s"
+    text = f"{terms} = {share * 1e3:.0f} ms of every second on a bus of {rate}: {share:.0%}"
+    return Load(share * bit_rate_hz, bit_rate_hz, text)
+
 
 COMMAND_S = 0.1
 """How long a command may wait for the bus."""
 SHORTEST_DEADLINE_S = 0.005
-_FRAMES_A_CALL = 256  # a bus full of strangers does not keep a call that must not wait
+_FRAMES_A_CALL = 256  # bounds a call with a time-out of 0 on a bus full of foreign frames
 
 
 class CanLink(Link):
     """The protocol on a bus, for a number of channels and a node.
 
-    Samples and outputs that cannot be sent within the time of a block expire: they are dropped and counted ("expired_frames").
-    A device's answers to one host are its own business: two devices under one node are noticed by who asks them.
+    Samples and outputs that cannot be sent within the duration of a block are dropped and counted ("expired_frames"). The link
+    does not notice two devices with the same node; `rig.drivers.wire.dialogue.Dialogue` does.
     """
 
     def __init__(
         self,
         bus: FrameBus,
         n_channels: int,
-        fd: bool = False,
+        timing: BusTiming = BusTiming(),  # noqa: B008 (a tuple)
         node: int = 1,
-        bit_rate_hz: float = 1e6,
-        data_bit_rate_hz: float = DATA_BIT_RATE_HZ,
         dbc: str | Path | None = None,
         device: bool = False,
     ) -> None:
         super().__init__(f"{bus.name}, node {node}")
         self._bus = bus
-        self._protocol = protocol(n_channels, fd, node, dbc)
+        self._protocol = protocol(n_channels, timing.fd, node, dbc)
         self.counters = bus.counters
         self._codec = CanCodec(self._protocol, device, self.counters)
-        self._rates_hz = (bit_rate_hz, data_bit_rate_hz)
+        self._rates_hz = timing.bit_rate_hz, timing.data_bit_rate_hz
         self._deadline_s = COMMAND_S
 
     def open(self) -> None:
@@ -56,7 +110,7 @@ class CanLink(Link):
         self._deadline_s = max(stream.block / stream.rate_hz, SHORTEST_DEADLINE_S)
 
     def send(self, message: Message) -> None:
-        """Send one message; one that cannot be sent in time is dropped, for what it says will be out of date."""
+        """Send one message; one that cannot be sent in time is dropped, because it would be out of date."""
         left_s = self._deadline_s if isinstance(message, Samples | Output) else COMMAND_S
         frames = self._codec.encode(message)
         if len(frames) == 1:
@@ -65,7 +119,7 @@ class CanLink(Link):
         deadline = time.monotonic() + left_s
         for frame in frames:
             if not self._bus.send(frame, max(deadline - time.monotonic(), 0.0)):
-                return  # a block without one of its frames is none
+                return  # the rest of an incomplete block is useless
 
     def receive(self, timeout_s: float) -> Message | None:
         """The next message."""
@@ -97,9 +151,9 @@ class CanLink(Link):
 
     @property
     def largest_block(self) -> int:
-        """Samples a block may have on this bus."""
+        """Largest number of samples in a block on this bus."""
         return self._protocol.shape.largest_block
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Close the bus."""
         self._bus.close()

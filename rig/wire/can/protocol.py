@@ -1,4 +1,14 @@
-"""The protocol's own messages in a compiled layout: which identifier is what."""
+"""The protocol on CAN for any number of channels: identifiers, frames of a row, the DBC file, and what an identifier means.
+
+An identifier of 11 bits is 16 times a function plus the node (0 to 15). The lower it is, the sooner a frame wins the bus:
+
+    0x000        EmergencyStop (of all nodes: not shifted)
+    0x010        Heartbeat
+    0x020, 0x030 Request, Answer
+    0x040        OutputIndex
+    0x100-0x2F0  Output (classical: 32 messages of one layout, the sequence is in the identifier)
+    0x300-0x6F0  Samples (classical: up to 64 such messages; of each sequence one per part where a row needs several frames)
+"""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -6,16 +16,148 @@ from functools import cached_property
 from pathlib import Path
 from struct import Struct
 
-from rig.errors import ConfigurationError
-from rig.wire.can.dbc import compile_layout, compile_text
-from rig.wire.can.definition import HIGHEST_NODE, NODE_MASK, Shape, definition, shape_of
-from rig.wire.can.layout import Layout
+from rig.errors import ConfigurationError, DaqRefused
+from rig.wire.can.frames import padded_length
+from rig.wire.can.layout import Layout, compile_layout, compile_text
 
-__all__ = ["FrameKind", "Protocol", "protocol"]
+__all__ = [
+    "CLASSICAL_OUTPUTS",
+    "HIGHEST_NODE",
+    "NODE_MASK",
+    "FrameKind",
+    "Protocol",
+    "Shape",
+    "definition",
+    "protocol",
+    "shape_of",
+]
+
+HIGHEST_NODE = 15
+NODE_MASK = 0x00F
+CLASSICAL_OUTPUTS = 32
+FD_WRAP = 256
+CLASSICAL_SAMPLES = 64
+FD_PARTS = 8
+CLASSICAL_PARTS = 4
+CHANNELS_A_FRAME = {True: 31, False: 4}
+OUTPUTS_A_FRAME = {True: 31, False: 4}
+HEADER = {True: 2, False: 0}
+FD_ROWS = 31  # int16 in a frame of 64 bytes behind the header
+
+
+@dataclass(frozen=True)
+class Shape:
+    """How rows of samples are spread over frames.
+
+    A group is what one sequence number counts: ``rows`` rows of all channels, in ``parts`` frames.
+    """
+
+    n_channels: int
+    fd: bool
+    parts: int
+    """Frames of a group, each with up to ``channels`` channels."""
+    channels: int
+    """Channels of a frame; the last part may have fewer."""
+    rows: int
+    """Rows of a group; the last group of a block may have fewer."""
+    wrap: int
+    """Sequence numbers of samples, 0 to wrap - 1."""
+
+    @property
+    def header(self) -> int:
+        """Bytes before the first count: sequence and flags over CAN FD."""
+        return HEADER[self.fd]
+
+    @property
+    def output_rows(self) -> int:
+        """Outputs of a frame; the last frame of a block may have fewer."""
+        return OUTPUTS_A_FRAME[self.fd]
+
+    @property
+    def output_wrap(self) -> int:
+        """Sequence numbers of outputs."""
+        return FD_WRAP if self.fd else CLASSICAL_OUTPUTS
+
+    @property
+    def largest_block(self) -> int:
+        """Largest block: half of the sequence numbers, so that a missing frame can be told from a repeated one."""
+        return min(self.wrap // 2 * self.rows, self.output_wrap // 2 * self.output_rows)
+
+    def columns(self, part: int) -> slice:
+        """Channels of a part."""
+        return slice(part * self.channels, min((part + 1) * self.channels, self.n_channels))
+
+
+def shape_of(n_channels: int, fd: bool) -> Shape:
+    """How rows of ``n_channels`` are spread over frames; `DaqRefused` for too many channels."""
+    largest = CHANNELS_A_FRAME[fd] * (FD_PARTS if fd else CLASSICAL_PARTS)
+    if not 1 <= n_channels <= largest:
+        bus = "CAN FD" if fd else "classical CAN"
+        raise DaqRefused(f"{n_channels} channels: allowed over {bus} is 1 to {largest}")
+    parts = -(-n_channels // CHANNELS_A_FRAME[fd])
+    channels = -(-n_channels // parts)
+    rows = FD_ROWS // n_channels if fd and parts == 1 else 1
+    return Shape(n_channels, fd, parts, channels, rows, FD_WRAP if fd else CLASSICAL_SAMPLES // parts)
+
+
+def definition(n_channels: int, fd: bool) -> str:
+    """The DBC file of the protocol for so many channels, as text, for node 0.
+
+    It is written here because the output of cantools changes with its version; the tests read it with cantools.
+    """
+    shape = shape_of(n_channels, fd)
+    messages = [
+        _message(0x000, "EmergencyStop", "Host", _unsigned(reason=8), False),
+        _message(0x010, "Heartbeat", "Device", _unsigned(state=8, flags=8, boot=8, dropped=8, samples=32), False),
+        _message(0x020, "Request", "Host", _unsigned(number=8, command=8, parameter=8, item=8, value=32), False),
+        _message(0x030, "Answer", "Device", _unsigned(number=8, status=8, parameter=8, item=8, value=32), False),
+        _message(0x040, "OutputIndex", "Host", _unsigned(first=32), False),
+    ]
+    outputs = [(f"sample_{row}", 16, True) for row in range(shape.output_rows)]
+    if fd:
+        messages.append(_message(0x100, "Output", "Host", _unsigned(sequence=8, reserved=8) + outputs, True))
+    for index in range(0 if fd else CLASSICAL_OUTPUTS):
+        messages.append(_message(0x100 + 16 * index, f"Output_{index:02d}", "Host", outputs, False))
+    head = _unsigned(sequence=8, flags=8) if fd else []
+    for index in range(shape.parts if fd else shape.wrap * shape.parts):
+        counts = _counts(shape, index % shape.parts)
+        messages.append(_message(0x300 + 16 * index, f"Samples_{index:02d}", "Device", head + counts, fd))
+    return _HEAD + "\n".join(text for text, _ in messages) + _FORMATS + "".join(note for _, note in messages)
+
+
+_HEAD = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: Host Device\n\n'
+_FD_FORMAT = 14  # place of StandardCAN_FD in the list of formats below
+_FORMATS = (
+    '\nBA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG",'
+    + '"reserved",' * 10
+    + '"StandardCAN_FD","ExtendedCAN_FD";\nBA_DEF_DEF_ "VFrameFormat" "StandardCAN";\n'
+)
+
+
+def _unsigned(**bits: int) -> list[tuple[str, int, bool]]:
+    return [(name, length, False) for name, length in bits.items()]
+
+
+def _counts(shape: Shape, part: int) -> list[tuple[str, int, bool]]:
+    columns = range(shape.n_channels)[shape.columns(part)]
+    names = (f"channel_{channel}" + f"_sample_{row}" * shape.fd for row in range(shape.rows) for channel in columns)
+    return [(name, 16, True) for name in names]
+
+
+def _message(frame_id: int, name: str, sender: str, signals: list[tuple[str, int, bool]], fd: bool) -> tuple[str, str]:
+    """A message with its signals one behind the other, and the note that it is of CAN FD."""
+    receiver = "Device" if sender == "Host" else "Host"
+    lines, end = [], 0
+    for signal, bits, signed in signals:
+        lines.append(f' SG_ {signal} : {end}|{bits}@1{"-" if signed else "+"} (1,0) [0|0] "" {receiver}\n')
+        end += bits
+    length = padded_length(end // 8) if fd else end // 8
+    note = f'BA_ "VFrameFormat" BO_ {frame_id} {_FD_FORMAT};\n' if fd else ""
+    return f"BO_ {frame_id} {name}: {length} {sender}\n{''.join(lines)}", note
 
 
 class FrameKind(Enum):
-    """Messages that a bus carries; outputs and samples as many of one layout over classical CAN."""
+    """Kinds of messages on a bus; over classical CAN, outputs and samples are many messages of one layout."""
 
     EMERGENCY_STOP = "EmergencyStop"
     HEARTBEAT = "Heartbeat"
@@ -36,7 +178,7 @@ class Protocol:
 
     @cached_property
     def kinds(self) -> dict[int, tuple[FrameKind, int]]:
-        """What an identifier stands for: kind and number within its kind (sequence and part), by identifier."""
+        """Kind and number within the kind (sequence and part), by identifier."""
         out: dict[int, tuple[FrameKind, int]] = {}
         for name, message in self.layout.messages.items():
             base, _, number = name.partition("_")

@@ -1,16 +1,104 @@
-"""CAN adapters on a serial line (slcan), or such an adapter itself."""
+"""CAN by an adapter on a serial line (slcan), as the host and as the adapter itself."""
 
 import contextlib
+import errno
+import os
 import time
+from collections.abc import Callable
+from select import select
 from typing import Any
 
 from rig.errors import DaqDisconnected
 from rig.wire.can.bus import FrameBus
-from rig.wire.can.frames import DATA_BIT_RATE_HZ, Frame
+from rig.wire.can.frames import BusTiming, Frame
 from rig.wire.can.slcan_lines import SlcanLines, encode_line, opening
-from rig.wire.can.slcan_port import TextPort
 
-__all__ = ["SlcanBus"]
+__all__ = ["SlcanBus", "TextPort"]
+
+_READ_BYTES = 4096
+_NOBODY_S = 0.01
+
+
+class TextPort:
+    """Lines over an open file descriptor, which the caller closes.
+
+    If the other end hangs up, ``on_hang_up`` is called and the port goes on waiting; without it `DaqDisconnected` is raised.
+    """
+
+    def __init__(self, name: str, descriptor: int, on_hang_up: Callable[[], None] | None = None) -> None:
+        self.name = name
+        self._descriptor, self._on_hang_up = descriptor, on_hang_up
+        self._tail = b""
+        """Rest of a line whose beginning is written."""
+        os.set_blocking(descriptor, False)
+
+    def forget(self, longest_s: float) -> None:
+        """Drop what an earlier conversation has left on the line."""
+        deadline = time.monotonic() + longest_s
+        while time.monotonic() < deadline and self._has_come(0.0):
+            if not self._bytes():
+                return
+
+    def read(self, timeout_s: float) -> bytes:
+        """Bytes that have arrived, after a wait of at most ``timeout_s``."""
+        if timeout_s > 0.0 and not self._has_come(timeout_s):
+            return b""
+        data = self._bytes()
+        if not data and timeout_s > 0.0:
+            time.sleep(min(timeout_s, _NOBODY_S))  # without another end, select returns at once
+        return data
+
+    def _has_come(self, timeout_s: float) -> bool:
+        try:
+            return bool(select((self._descriptor,), (), (), timeout_s)[0])  # poll knows whole milliseconds only
+        except (OSError, ValueError) as error:
+            raise DaqDisconnected(f"{self.name}: is gone ({error})") from None
+
+    def _bytes(self) -> bytes:
+        try:
+            data = os.read(self._descriptor, _READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            self._gone(error)
+            return b""
+        if not data:
+            self._gone(OSError(errno.EIO, "end of file"))
+        return data
+
+    def write(self, line: bytes, timeout_s: float) -> bool:
+        """Write a line within the time; False if nothing of it was written."""
+        deadline = 0.0
+        started = False
+        data = self._tail + line
+        whole = len(data)
+        while True:
+            try:
+                data = data[os.write(self._descriptor, data) :]
+            except BlockingIOError:
+                pass
+            except OSError as error:
+                self._gone(error)
+                self._tail = b""
+                return False
+            if not data:
+                self._tail = b""
+                return True
+            started = whole - len(data) > len(self._tail)
+            now = time.monotonic()
+            deadline = deadline or now + timeout_s
+            left = deadline - now
+            if left <= 0:
+                self._tail = data if started else data[: len(data) - len(line)]
+                return started  # a line that was begun is ended before the next one, so it counts as sent
+            select((), (self._descriptor,), (), left)
+
+    def _gone(self, error: OSError) -> None:
+        if self._on_hang_up is not None and error.errno == errno.EIO:
+            self._on_hang_up()
+            return
+        raise DaqDisconnected(f"{self.name}: is gone ({error.strerror or error})") from None
+
 
 _OPENING_S = 0.1
 _CLOSING_S = 0.05
@@ -26,15 +114,12 @@ class SlcanBus(FrameBus):
     def __init__(
         self,
         port: str | int,
-        fd: bool = False,
-        bit_rate_hz: int = 1_000_000,
-        data_bit_rate_hz: int = DATA_BIT_RATE_HZ,
+        timing: BusTiming = BusTiming(),  # noqa: B008 (a tuple)
         baud: int = 3_000_000,
         adapter: bool = False,
     ) -> None:
         super().__init__(f"slcan {port}" if isinstance(port, str) else "slcan")
-        self._given, self._fd, self._baud = port, fd, baud
-        self._bit_rate_hz, self._data_bit_rate_hz = bit_rate_hz, data_bit_rate_hz
+        self._given, self._timing, self._baud = port, timing, baud
         self._adapter = adapter
         self._port: Any = None
         self._text: TextPort | None = None
@@ -43,7 +128,7 @@ class SlcanBus(FrameBus):
 
     def open(self) -> None:
         """Open port and adapter. `DaqRefused` for a bit rate that adapters have no command for."""
-        commands = opening(self._fd, self._bit_rate_hz, self._data_bit_rate_hz)
+        commands = opening(self._timing)
         if isinstance(self._given, int):
             descriptor = self._given
         else:
@@ -66,7 +151,7 @@ class SlcanBus(FrameBus):
         return self._text
 
     def send(self, frame: Frame, timeout_s: float) -> bool:
-        """Write a line; one that is half written when the time is over is ended before the next one."""
+        """Write the line of a frame; one that is half written when the time is over is ended before the next."""
         if not self._on_bus:
             return True  # as on a bus without listeners
         if self._line().write(encode_line(frame), timeout_s):
@@ -107,7 +192,7 @@ class SlcanBus(FrameBus):
                 return
 
     def _obey(self) -> None:
-        """Do, as an adapter, what the other end commands."""
+        """As an adapter, carry out the commands of the other end."""
         while self._lines.commands:
             command = self._lines.commands.popleft()
             if not self._adapter:

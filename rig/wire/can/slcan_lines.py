@@ -8,7 +8,7 @@ data, ``O`` opens, ``C`` closes. The text has no checksum: a digit damaged betwe
 from collections import deque
 
 from rig.errors import DaqRefused
-from rig.wire.can.frames import FD_LENGTHS, Frame
+from rig.wire.can.frames import FD_LENGTHS, BusTiming, Frame
 
 __all__ = ["LONGEST_LINE", "SlcanLines", "encode_line", "opening"]
 
@@ -23,8 +23,9 @@ _REMOTE = b"rR"
 _COMMANDS = b"SYOLCXZVNFsmM"
 
 
-def opening(fd: bool, bit_rate_hz: int, data_bit_rate_hz: int) -> bytes:
+def opening(timing: BusTiming) -> bytes:
     """The commands that open an adapter; `DaqRefused` for a bit rate that adapters have no command for."""
+    fd, bit_rate_hz, data_bit_rate_hz = timing
     if bit_rate_hz not in BIT_RATES:
         allowed = ", ".join(str(rate) for rate in BIT_RATES)
         raise DaqRefused(f"driver.options.bitrate = {bit_rate_hz}: adapters know {allowed}")
@@ -66,7 +67,7 @@ def _decode_line(line: bytes) -> Frame | None:
 
 
 class SlcanLines:
-    """Cuts a stream of bytes into frames and commands; garbage is counted, and costs no frame behind the next line end."""
+    """Splits a stream of bytes into frames and commands; garbage is counted and ends at the next line end."""
 
     def __init__(self, counters: dict[str, int]) -> None:
         self._counters = counters
@@ -84,7 +85,7 @@ class SlcanLines:
             rest = rest[-LONGEST_LINE:]
         self._rest = rest
         for line in lines:
-            line = line.lstrip(b"\a")  # an adapter's word for an error, without a line end
+            line = line.lstrip(b"\a")  # an adapter reports an error by this character, without a line end
             if line:
                 self._take(line)
 

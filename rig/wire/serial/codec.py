@@ -10,7 +10,7 @@ from rig.wire.messages import VERSION, Answer, EmergencyStop, Heartbeat, Message
 __all__ = ["HEARTBEAT_BODY", "LARGEST_PAYLOAD", "Codec", "Damaged", "ForeignVersion", "Malformed", "Oversize"]
 
 LARGEST_PAYLOAD = 65_536
-"""Bytes of the largest header and body, whatever the stream: what bounds a receiver's memory."""
+"""Largest header and body of any message, bytes; it bounds a receiver's memory."""
 
 
 REQUEST, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP = range(1, 7)  # second byte of a payload
@@ -33,7 +33,7 @@ class Malformed(ValueError):  # noqa: N818 (a remark on a frame)
 
 
 class ForeignVersion(Malformed):
-    """A message of another version, whose form may have changed since."""
+    """A message of another version of the protocol, whose form may differ."""
 
     counter = "foreign_versions"
 
@@ -45,13 +45,13 @@ class Damaged(Malformed):
 
 
 class Oversize(Malformed):
-    """More bytes without a zero than any frame has."""
+    """More bytes without a zero than the longest frame has."""
 
     counter = "oversize_frames"
 
 
 class Codec:
-    """Messages to payloads and back. Without memory but for the stream: no payload depends on the one before."""
+    """Messages to payloads and back; its only state is the shape of the stream, so no payload depends on an earlier one."""
 
     def __init__(self) -> None:
         self._counts = np.dtype("<i2")

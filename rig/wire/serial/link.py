@@ -1,5 +1,6 @@
-"""`SerialLink`: messages over a serial port or any other descriptor that carries bytes."""
+"""`SerialLink`: one end of the protocol on a serial line, and what a stream asks of the line."""
 
+import math
 import os
 import time
 from collections import deque
@@ -10,14 +11,31 @@ from typing import Self
 
 from rig.errors import DaqDisconnected, DaqTimeout
 from rig.wire.link import Link, Load
-from rig.wire.messages import Message, Output, Samples, Stream
-from rig.wire.serial.codec import Codec
-from rig.wire.serial.frames import FrameReader, frame
-from rig.wire.serial.load import line_load
-from rig.wire.serial.pty import is_pseudo_terminal
+from rig.wire.messages import HEARTBEATS_HZ, Message, Output, Samples, Stream
+from rig.wire.serial.codec import HEARTBEAT_BODY, Codec
+from rig.wire.serial.frames import FrameReader, frame, largest_frame
+from rig.wire.serial.port import is_pseudo_terminal
 from rig.wire.serial.reading import Input, NoInput, PolledInput, TimedInput
 
-__all__ = ["SerialLink"]
+__all__ = ["SerialLink", "line_load"]
+
+BITS_A_BYTE = 10  # 8N1: start, eight bits, stop
+
+
+def line_load(stream: Stream, baud: int | None) -> Load:
+    """Bits per second that a stream needs against the baud rate; None is a line without a rate.
+
+    Only the direction from the device counts: the line carries both at once, and outputs are always fewer than samples.
+    """
+    blocks_hz = stream.rate_hz / stream.block
+    samples = largest_frame(Codec.sizes(stream)[0])
+    heartbeat = largest_frame(HEARTBEAT_BODY.size) + 1  # and the zero before it
+    needed = BITS_A_BYTE * (blocks_hz * samples + HEARTBEATS_HZ * heartbeat)
+    terms = f"{blocks_hz:g}/s x {samples} bytes of samples + {HEARTBEATS_HZ}/s x {heartbeat} bytes of heartbeats"
+    carried = "a pseudo-terminal carries any" if baud is None else f"{baud} baud carry {baud / 1e3:g} kbit/s"
+    sum_text = f"({terms}) x {BITS_A_BYTE} bits = {needed / 1e3:.1f} kbit/s; {carried}"
+    return Load(needed, math.inf if baud is None else float(baud), sum_text)
+
 
 STREAMED = (Samples, Output)
 PATIENCE_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
@@ -89,10 +107,10 @@ class SerialLink(Link):
         self._reader.configure(stream)
 
     def send(self, message: Message) -> None:
-        """Send one message; `DaqTimeout` says that the line takes no more, and that nothing of it was sent."""
+        """Send one message. `DaqTimeout`: the line takes no more bytes, and nothing of the message was sent."""
         data = frame(self._codec.encode(message))
         if message.__class__ not in STREAMED:
-            data = b"\0" + data  # ends what noise on an idle line may have begun
+            data = b"\0" + data  # a leading zero ends a false frame that noise on the idle line may have begun
         if self._unfinished:
             data = self._unfinished + data
         written = self._write(data)
@@ -102,7 +120,7 @@ class SerialLink(Link):
             self._unfinished = b""
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait for it at most so long."""
+        """Return the next message, or None after ``timeout_s``."""
         received = self._received
         if received:
             return received.popleft()
@@ -127,11 +145,11 @@ class SerialLink(Link):
         return line_load(stream, None if unlimited else self._baud)
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         self._descriptor, self._input = -1, NoInput()
         self._received.clear()
         self._unfinished = b""
-        with suppress(Exception):  # what a vanished port raises differs by system, and it is gone either way
+        with suppress(Exception):  # errors of a vanished port differ by system, and the port is gone in any case
             self._held.close()
 
     def _write(self, data: bytes) -> int:
@@ -152,7 +170,7 @@ class SerialLink(Link):
                 raise self._gone(error) from error
             written += self._write(data[written:])
         if written > old:
-            self._unfinished = data[written:]  # the rest goes before the next message
+            self._unfinished = data[written:]  # the rest is sent before the next message
             return
         self._unfinished = data[written:old]
         self.counters["unsent_frames"] += 1

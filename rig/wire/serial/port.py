@@ -1,4 +1,4 @@
-"""Serial ports: found, opened and configured by pyserial, then read and written by their descriptor."""
+"""Serial ports, opened and configured by pyserial, and pseudo-terminals."""
 
 import errno
 import os
@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import serial
 from serial.tools import list_ports
@@ -17,21 +17,68 @@ from rig.wire.serial.reading import wait_of_a_read
 if sys.platform != "win32":
     import termios
 
-__all__ = ["open_port", "port_names", "second_descriptor"]
+__all__ = [
+    "PseudoTerminal",
+    "is_pseudo_terminal",
+    "open_port",
+    "open_pseudo_terminal",
+    "port_names",
+    "second_descriptor",
+]
 
-BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: somebody holds its lock
+MASTER_DEVICE = (5, 2)  # /dev/ptmx in Linux's list of devices
+SLAVE_MAJORS = range(136, 144)  # /dev/pts/*
+
+
+class PseudoTerminal(NamedTuple):
+    """A line whose near end is a descriptor and whose far end is a port that any program can open."""
+
+    descriptor: int
+    far_descriptor: int
+    """Kept open, so that the near end survives when a program at the far end closes it."""
+    path: str
+
+    def close(self) -> None:
+        """Close both ends; a program that has the port open sees it unplugged. May be called again."""
+        for descriptor in (self.descriptor, self.far_descriptor):
+            with suppress(OSError):
+                os.close(descriptor)
+
+
+def open_pseudo_terminal() -> PseudoTerminal:
+    """A new line that passes bytes as they are. Raises `OSError` where the system has no pseudo-terminals."""
+    import pty
+    import tty
+
+    near, far = pty.openpty()
+    tty.setraw(far)
+    return PseudoTerminal(near, far, os.ttyname(far))
+
+
+def is_pseudo_terminal(descriptor: int) -> bool:
+    """Whether a descriptor is an end of a pseudo-terminal or no terminal at all, so that its baud rate has no meaning."""
+    if not os.isatty(descriptor):
+        return True
+    if sys.platform == "linux":
+        device = os.fstat(descriptor).st_rdev
+        numbers = os.major(device), os.minor(device)
+        return numbers == MASTER_DEVICE or numbers[0] in SLAVE_MAJORS
+    return os.ttyname(descriptor).startswith("/dev/ttys")  # macOS names its serial ports /dev/tty.* and /dev/cu.*
+
+
+BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: another program holds its lock
 LASTING_NAMES = "/dev/serial/by-id"
-ALIKE = 0.8  # of two names: a character or two that differ
+ALIKE = 0.8  # similarity of two names from which one is suggested for the other
 
 
 def port_names() -> list[str]:
-    """Serial ports that the system knows of, by device and by the names that stay; no pseudo-terminals."""
+    """Serial ports of this system, by device name and by persistent name; no pseudo-terminals."""
     lasting = (str(path) for path in Path(LASTING_NAMES).glob("*"))
     return sorted({*(str(port.device) for port in list_ports.comports()), *lasting})
 
 
 def open_port(path: str, baud: int) -> Any:
-    """A port of pyserial, 8N1, held for us alone, old input dropped; reading its descriptor never waits.
+    """A pyserial port, 8N1, opened exclusively, with old input dropped; reading its descriptor never blocks.
 
     Raises `DaqBusy`, `DaqDisconnected` or `DaqRefused` with what is there and what to do.
     """
@@ -44,7 +91,9 @@ def open_port(path: str, baud: int) -> Any:
     except (OSError, ValueError, OverflowError, termios.error) as error:
         raise _refusal(path, baud, error) from error
     try:
-        with suppress(ValueError, OSError):  # an adapter may keep bytes back for 16 ms, and has no such setting or does
+        with suppress(
+            ValueError, OSError
+        ):  # some adapters otherwise hold bytes back for 16 ms; others have no such setting
             port.set_low_latency_mode(True)
         _no_bytes_means_gone(port.fileno())
         port.reset_input_buffer()
@@ -55,7 +104,7 @@ def open_port(path: str, baud: int) -> Any:
 
 
 def second_descriptor(path: str) -> int:
-    """Another descriptor of a port that is open already: for writing, which never waits, while reading may."""
+    """A second descriptor of an open port, for writing: writing then never blocks, while reading may."""
     try:
         return os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
     except OSError as error:
@@ -63,7 +112,7 @@ def second_descriptor(path: str) -> int:
 
 
 def _no_bytes_means_gone(descriptor: int) -> None:
-    """VMIN = 1: a read without input says so (EAGAIN), and one of 0 bytes can only mean that the port is gone."""
+    """Set VMIN = 1: a read without input raises EAGAIN, so a read of 0 bytes means that the port is gone."""
     os.set_blocking(descriptor, False)
     wait_of_a_read(descriptor, 1, 0)
 
@@ -89,7 +138,7 @@ def _refusal(path: str, baud: int, error: Exception) -> DaqError:
 
 
 def _number_of(error: BaseException) -> int | None:
-    """The system's number for an error; pyserial words those of termios anew and drops it."""
+    """The system's error number; pyserial drops that of a termios error, so it is taken from the cause."""
     cause = error.__context__
     if isinstance(cause, termios.error) and cause.args:
         return int(cause.args[0])

@@ -1,7 +1,7 @@
-"""Reading a descriptor with a time-out, in as few calls of the system as each kind of descriptor allows.
+"""Reading a descriptor with a time-out, in as few system calls as each kind of descriptor allows.
 
-An input's ``read(timeout_s)`` returns what there is, at most `CHUNK` bytes, as soon as there is any; nothing once the time is
-over; and raises `OSError` once nothing can come any more.
+An input's ``read(timeout_s)`` returns up to `CHUNK` bytes as soon as there are any, and no bytes after the time-out. It raises
+`OSError` once the descriptor is at its end.
 """
 
 import errno
@@ -13,10 +13,10 @@ __all__ = ["CHUNK", "Input", "NoInput", "PolledInput", "TimedInput", "wait_of_a_
 
 CHUNK = 4096  # bytes a read; a pseudo-terminal holds no more
 CONTROL_CHARACTERS = 6  # in the list that termios returns
-COARSE_S = 0.01  # a wait from which on the milliseconds that epoll counts in are fine enough
+COARSE_S = 0.01  # from this wait on, the milliseconds of epoll are fine enough
 MILLISECOND_S = 0.001
 SYSTEM_WAIT_S = 0.1  # VTIME = 1
-SYSTEM_SLACK_S = 0.02  # by which the system's own time-out may come late: ticks of its clock
+SYSTEM_SLACK_S = 0.02  # the system's own time-out may be this late, for it counts clock ticks
 
 
 def wait_of_a_read(descriptor: int, least_bytes: int, tenths_s: int) -> None:
@@ -33,22 +33,22 @@ class Input(Protocol):
     """What a link reads from."""
 
     def read(self, timeout_s: float) -> bytes:
-        """What there is, or has come within the time."""
+        """Bytes that have arrived within the time."""
 
 
 class NoInput:
-    """That of a port that is not open."""
+    """Input of a port that is not open: every read raises."""
 
     def read(self, timeout_s: float) -> bytes:
-        """Nothing can come."""
+        """Raise `OSError`."""
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
 
 
 class PolledInput:
-    """Any descriptor: waited for, then read. Makes it a descriptor that never blocks.
+    """Waits for any descriptor, then reads it; sets the descriptor to non-blocking.
 
-    A wait ends at news (edges: the system need not look twice), and whatever ends it, what has come is read: so
-    nothing stays unread beyond the wait.
+    The wait is edge-triggered, which costs the system less. Every wait is followed by a read, so that no bytes that have
+    arrived stay unread.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -63,7 +63,7 @@ class PolledInput:
                 self.close()
 
     def read(self, timeout_s: float) -> bytes:
-        """What there is, or has come within the time; a long wait may end a millisecond early."""
+        """Bytes that have arrived within the time; a long wait may end a millisecond early."""
         if timeout_s >= COARSE_S and self._epoll is not None:
             self._epoll.poll(timeout_s - MILLISECOND_S)  # which it rounds up
         elif timeout_s > 0.0 and not select.select(self._watched, (), (), timeout_s)[0]:
@@ -77,17 +77,17 @@ class PolledInput:
         return data
 
     def close(self) -> None:
-        """Let go of what waits."""
+        """Close the epoll object."""
         epoll, self._epoll = self._epoll, None
         if epoll is not None:
             epoll.close()
 
 
 class TimedInput:
-    """A terminal whose reads wait by themselves, for a tenth of a second at most (VMIN = 0, VTIME = 1): one call a block.
+    """A terminal whose reads wait in the system for up to 0.1 s (VMIN = 0, VTIME = 1): one call per block.
 
-    A read of no bytes is then such a time-out, or a port that is gone; which of the two, is asked only then. The
-    descriptor blocks, so it is not to be written to by somebody in a hurry.
+    A read of no bytes is either that time-out or a port that is gone; a further call tells which. The descriptor blocks, so
+    write through another one (`rig.wire.serial.port.second_descriptor`).
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -97,7 +97,7 @@ class TimedInput:
         self._watched = (descriptor,)
 
     def read(self, timeout_s: float) -> bytes:
-        """What there is, or has come within the time; may be back after a tenth of a second already."""
+        """Bytes that have arrived within the time; may return without any after 0.1 s already."""
         if timeout_s < SYSTEM_WAIT_S + SYSTEM_SLACK_S and not self._ready(timeout_s):
             return b""
         data = os.read(self._descriptor, CHUNK)

@@ -9,7 +9,7 @@ from rig.daq import LOST
 from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.emulator import Device, Faults, VirtualPlant, Wiring
-from rig.emulator.description import described
+from rig.emulator.parameters import described
 from rig.errors import DaqTimeout
 from rig.wire.link import Link
 from tests.reliability.faults.plant import BrokenRig

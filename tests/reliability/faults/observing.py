@@ -14,10 +14,10 @@ import numpy as np
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench
 from rig.campaigns.running.runner import carry_out
+from rig.recording.conversion import finalise
 from rig.recording.journal import journal_path
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from tests.reliability.faults.devices import EmulatedRig, HostKilledError, VirtualRigInProcess
 from tests.reliability.faults.plans import bench_for, plan_for
 from tests.reliability.faults.plant import BrokenRig

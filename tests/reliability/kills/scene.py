@@ -16,7 +16,7 @@ import numpy as np
 
 import rig
 import rig.campaigns.running.runner as runner
-import rig.recording.store as store
+import rig.recording.conversion as store
 from rig.bench import Bench
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.running.output_file import forget_before

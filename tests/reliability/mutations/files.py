@@ -14,12 +14,12 @@ from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
 from rig.models.files.files import load, save
 from rig.recording.arrays import read_arrays
-from rig.recording.contents import JournalContents
+from rig.recording.conversion import finalise
 from rig.recording.integrity import VERIFIED
 from rig.recording.journal import JournalWriter, journal_path
+from rig.recording.journal_contents import JournalContents
 from rig.recording.layout import file_integrity
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from tests.reliability.mutations.byte_mutations import BYTE_MUTATIONS
 from tests.reliability.mutations.judging import Verdict, judged
 from tests.rig.recording.samples import fill, header

@@ -12,7 +12,7 @@ from rig.campaigns.plans import load_plan, plan_from
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.exchange.reading import import_file, read_mapping
-from rig.wire.can.dbc import compile_layout
+from rig.wire.can.layout import compile_layout
 
 
 def refusal(use, *arguments):

@@ -8,10 +8,10 @@ from scipy.signal import freqs
 
 from rig.campaigns.running.level_search import share_of_limits
 from rig.check.findings import graded
+from rig.check.judging import best_assignment, by_magnitude
 from rig.check.responses import fit_mode
 from rig.check.run import SEARCH, seen_in
 from rig.check.silence import hum, silent_findings
-from rig.check.wiring import best_assignment, by_magnitude
 from rig.tick.layout import recorded_row
 from tests.rig.rigs import bench_with
 

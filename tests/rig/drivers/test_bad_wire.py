@@ -9,7 +9,7 @@ import pytest
 from rig.daq import LOST
 from rig.drivers.wire import WireOptions
 from rig.emulator import Device, VirtualPlant
-from rig.emulator.description import described
+from rig.emulator.parameters import described
 from rig.errors import DaqProtocol, DaqTimeout, DaqWatchdog
 from rig.wire.messages import DeviceState, Message, Output, Request
 from tests.rig.drivers.test_wire import BLOCKS, answers, drive, message_of, virtual

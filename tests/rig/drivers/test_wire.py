@@ -12,7 +12,7 @@ from rig.daq import LOST, State
 from rig.drivers import make_daq
 from rig.drivers.wire import WireOptions
 from rig.emulator import Device, Faults, VirtualPlant
-from rig.emulator.description import described
+from rig.emulator.parameters import described
 from rig.errors import (
     DaqDisconnected,
     DaqEmergencyStop,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.emulator import Device, Faults
-from rig.emulator.description import described
+from rig.emulator.parameters import described
 from rig.errors import DaqTimeout
 from rig.wire.link import Link, Load
 from rig.wire.messages import (

@@ -20,11 +20,12 @@ from rig.drivers import make_daq
 from rig.drivers.can import CanOptions
 from rig.emulator import VirtualPlant, Wiring
 from rig.emulator.emulated import Emulator, emulated
-from rig.emulator.output_log import LoggedPlant
+from rig.emulator.plant import LoggedPlant
 from rig.emulator.ports import device_end
 from rig.emulator.process import Ready
 from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqEmergencyStop, DaqTimeout
+from rig.wire.can.frames import BusTiming
 from rig.wire.can.slcan_lines import opening
 from tests.rig.drivers.test_wire import answers, virtual, voltages
 from tests.rig.emulator.host_process import BLOCK, RAMP_S
@@ -186,7 +187,7 @@ def test_the_bench_it_writes_has_blocks_of_2_ms_where_the_clock_does_not_wait(
 def test_driver_and_emulator_agree_on_a_data_bit_rate_that_adapters_have() -> None:
     default = CanOptions(channel="can0").data_bitrate
     assert EmulatorSettings(wire="can", bench=bench_with()).data_bitrate == default
-    assert b"Y5" in opening(True, 1_000_000, default)
+    assert b"Y5" in opening(BusTiming(True, data_bit_rate_hz=default))
 
 
 def test_what_cannot_be_emulated_is_refused_in_one_line() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rig.emulator import Device
-from rig.emulator.description import described
-from rig.emulator.pace import keep_serving
+from rig.emulator.parameters import described
+from rig.emulator.process import keep_serving
 from rig.wire.messages import ARM_KEY, Command, Message, Output, Parameter, Request, Samples
 from tests.rig.emulator.test_device import BLOCK, QUEUE, RATE_HZ, Notebook, Outbox
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rig.exchange import mat
 from rig.exchange.mat import ImportFailed, read_mat
-from rig.exchange.mat_values import read_values, write_values
+from rig.exchange.mat_process import read_values, write_values
 from rig.system.child import ChildFailed
 
 THINGS = {

@@ -13,8 +13,7 @@ from rig.exchange.kinds import KINDS, put_together, taken_apart
 from rig.exchange.mat import read_mat, structures_of_ours
 from rig.exchange.reading import import_file
 from rig.exchange.time_data import TimeData
-from rig.exchange.uff.reading import read_uff
-from rig.exchange.uff.time_data import time_data_in
+from rig.exchange.uff.reading import read_uff, time_data_in
 from tests.rig.exchange.conftest import CHANNELS
 
 NAMES = ("backbone", "mode", "matrix", "modes", "responses")

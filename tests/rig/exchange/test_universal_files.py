@@ -11,8 +11,7 @@ from rig.exchange.export import write_contents
 from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import ImportFailed, import_file
 from rig.exchange.time_data import TimeData
-from rig.exchange.uff.reading import read_uff
-from rig.exchange.uff.time_data import time_data_in
+from rig.exchange.uff.reading import read_uff, time_data_in
 from tests.rig.exchange.conftest import CHANNELS
 
 FREQUENCY = np.arange(20.0, 30.0, 0.5)

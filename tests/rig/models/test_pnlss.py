@@ -299,7 +299,7 @@ def test_progress_says_which_start_is_compared(capsys):
         ("identify lines.h5 --model pnlss --states 0", "--states = 0: allowed is 1 and above"),
         (
             "identify F.h5 --model pnlss",
-            "F.h5: is a file of kind pnlss; a PNLSS model comes from recordings: multisine, ",
+            "F.h5: is a file of kind pnlss; a PNLSS model comes from recordings: backbone, ",
         ),
         ("identify backbone.h5 --model pnlss", "backbone.h5 (backbone): no multisine among them"),
         (

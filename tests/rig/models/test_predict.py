@@ -170,7 +170,7 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
         ("NM.h5 --frequency-response 1e-12", "force_n: is 1e-12 N, too small"),
         (
             "NM.h5 --frequency-response 2",
-            "measure higher levels, or allow extrapolation (allow_extrapolation, --allow-",
+            "measure higher levels, or allow extrapolation (--allow-",
         ),
         ("NM.h5 --frequency-response 0.1 --force peak", "--force = 'peak': allowed are fundamental, rms, pure-sine"),
         ("NM.h5 --reference stepped.h5 --over time", "--over = 'time': allowed are frequency, phase"),

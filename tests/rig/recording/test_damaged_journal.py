@@ -10,8 +10,8 @@ from rig.arming.run_options import Silent
 from rig.cli import main
 from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path
+from rig.recording.journal_blocks import read_journal
 from rig.recording.reader import Recording
-from rig.recording.sequence import read_journal
 from tests.rig.campaigns.running.test_runs import plan_with
 
 PLAN = plan_with(levels_v=(0.4, 0.8))

@@ -10,11 +10,11 @@ import pytest
 from rig.errors import RecordingError
 from rig.recording import examination, tables
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
+from rig.recording.conversion import finalise
+from rig.recording.integrity import append_trailer
 from rig.recording.journal import journal_path
 from rig.recording.layout import identify, new_file
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
-from rig.recording.trailer import append_trailer
 from tests.rig.recording.samples import journal
 
 

@@ -11,10 +11,10 @@ import pytest
 from rig.errors import RecordingError
 from rig.recording import integrity
 from rig.recording.arrays import read_arrays, write_arrays
+from rig.recording.conversion import continue_recording, finalise
 from rig.recording.journal import journal_path
 from rig.recording.layout import file_integrity
 from rig.recording.reader import Recording
-from rig.recording.store import continue_recording, finalise
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
 from rig.system.child import ChildFailed

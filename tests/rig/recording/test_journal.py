@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from rig.errors import RecordingError
 from rig.recording import appending
 from rig.recording.blocks import LARGEST_PAYLOAD, BlockKind
-from rig.recording.contents import JournalContents
+from rig.recording.conversion import finalise
 from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path, read_journal
+from rig.recording.journal_contents import JournalContents
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
 
 HEAD = 36

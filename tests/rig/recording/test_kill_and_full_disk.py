@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from rig.errors import RecordingError
-from rig.recording.contents import JournalContents
+from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
+from rig.recording.journal_contents import JournalContents
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from tests.rig.recording.samples import ROW, all_rows, fill, header, journal, rows
 
 ROOT = Path(__file__).parents[3]
@@ -118,7 +118,7 @@ def test_a_conversion_on_a_full_disk_leaves_journal_and_old_file_at_any_moment(t
     old = output.read_bytes()
     code = """
 from rig.recording.journal import journal_path
-from rig.recording.store import continue_recording, finalise
+from rig.recording.conversion import continue_recording, finalise
 from tests.rig.recording.samples import fill
 from pathlib import Path
 output = Path(sys.argv[1])
@@ -232,7 +232,7 @@ def test_an_interrupt_during_the_conversion_leaves_only_the_journal(tmp_path, mo
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("rig.recording.stored._write_part", interrupted)
+    monkeypatch.setattr("rig.recording.hdf5_recording._write_part", interrupted)
     with pytest.raises(KeyboardInterrupt):
         finalise(journal_path(output), output)
     assert [path.name for path in tmp_path.iterdir()] == ["OUT.h5.journal"]

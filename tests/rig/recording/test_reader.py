@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
+from rig.recording.conversion import continue_recording, finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import continue_recording, finalise
 from tests.rig.recording.samples import header, journal, without_digest
 
 

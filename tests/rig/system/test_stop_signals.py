@@ -11,9 +11,9 @@ from rig.arming.run_options import RunOptions, Silent
 from rig.bench import load_bench
 from rig.campaigns.running.runner import carry_out
 from rig.cli.app import _carry
+from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from rig.system.stop_signals import Interrupted, Terminated, asking, ended_in_order, held, insisting
 from tests.rig.campaigns.running.test_runs import plan_with
 

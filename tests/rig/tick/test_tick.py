@@ -37,7 +37,7 @@ def _wired(lead_whole, lead_fraction, samples=20_000, bench=None, skew=(0.0, 0.0
         volts[0, 0] = scale[0] * math.cos(phase[0])
         volts[0, 1:] = scale[1] * math.cos(phase[1] + math.pi / 2)
         tick_block(tick.arrays, volts, np.zeros(1, np.uint16), readings[k : k + 1], rows[k : k + 1], out)
-        estimates[k] = tick.arrays.watches["estimate"][0]
+        estimates[k] = tick.arrays.control["vibration"]["force"][0]
     return estimates, rows
 
 

@@ -6,7 +6,7 @@ from collections import deque
 from rig.bench import Bench
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.emulator import Device, Faults, VirtualPlant, Wiring
-from rig.emulator.description import described
+from rig.emulator.parameters import described
 from rig.errors import DaqDisconnected
 from rig.wire.link import Link, Load
 from rig.wire.messages import Message, Stream

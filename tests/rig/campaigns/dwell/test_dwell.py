@@ -8,14 +8,16 @@ from pydantic import ValidationError
 
 import rig
 from rig.arming.run_options import Silent
-from rig.bench import load_bench
-from rig.campaigns.dwell.campaign import recorded_course
+from rig.bench import Bench, load_bench
 from rig.campaigns.dwell.plan import DwellPlan
-from rig.campaigns.dwell.points import DwellResult, Length, watch_drift
+from rig.campaigns.dwell.points import DwellResult, Length, recorded_course, watch_drift
 from rig.campaigns.evaluation.point import Quality
 from rig.campaigns.plans import load_plan
+from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import point_rows
+from simulators.analysis import phase_resonance_backbone
+from simulators.virtual_rig import VirtualRig
 from tests.rig.campaigns.made_points import made_modal, made_point, made_vibration
 
 SHORT = {"cycles": 750, "mean_s": 0.5, "record_every": 4, "telemetry_s": 0.02, "ramp_periods": 20.0}
@@ -109,6 +111,40 @@ def test_cycles_count_on_after_an_interruption(tmp_path):
         assert sum(point["cycles_in_mean"] for point in points) == pytest.approx(750, abs=0.5)
         middle_of_last = 750 - 0.5 * points[-1]["cycles_in_mean"]
         assert recorded_course(run.recording).cycles[-1] == pytest.approx(middle_of_last, abs=0.5)
+
+
+def ageing(rate_per_s):
+    table = load_bench("friction-beam").model_dump()
+    table["driver"]["options"]["wear"] = {"frequency_per_s": [rate_per_s], "until_s": 60.0, "every_s": 0.1}
+    return Bench.model_validate(table)
+
+
+def test_the_course_is_that_of_a_softening_rig_by_harmonic_balance():
+    bench = ageing(-2e-4)
+    with rig.run(dwell(cycles=1500, mean_s=1.0, record_every=1), bench=bench, seed=3) as run:
+        points = list(run.recording.latest.values())
+    assert all(point["accepted"] for point in points)
+    nominal = VirtualRig.model_validate(VirtualDAQ(bench).rig.model_dump())
+    for point in points[::3]:
+        middle_s = 0.5 * (point["first_sample"] + point["end_sample"]) / bench.sample_rate_hz
+        truth = phase_resonance_backbone(nominal.worn(middle_s), amplitudes_m=[point["amplitude_m"]], harmonics=15)
+        assert point["modal_frequency_hz"] == pytest.approx(truth.frequency_hz[0], rel=3e-5)
+        assert point["damping_ratio"] == pytest.approx(truth.damping_ratio[0], rel=3e-3)
+
+
+def test_an_abort_ramps_down_at_the_first_mean_beyond_it(tmp_path):
+    plan = dwell(cycles=1500, alarm={"frequency": 5e-4}, abort={"frequency": 1e-3})
+    with rig.run(plan, bench=ageing(-4e-4), output=tmp_path / "dwell.h5", seed=3) as run:
+        recording = run.recording
+        accepted = [point for point in recording.latest.values() if point["accepted"]]
+        changes = np.array([point["frequency_change"] for point in accepted])
+        assert not run.complete
+        assert not recording.parts[-1].end["tripped"]
+        assert "abort.frequency is 0.1 %" in recording.parts[-1].end["text"]
+        assert changes[-1] < -1e-3 < changes[-2]
+        alarmed = [any(text.startswith("alarm") for text in point["warnings"]) for point in accepted]
+        assert alarmed == [bool(change < -5e-4) for change in changes]
+        assert abs(recording.parts[-1].rows("output_v")[-1]) == 0.0
 
 
 def mean(frequency_hz, *, quality=Quality.GOOD, force_n=2.0, amplitude_m=1e-4):

@@ -21,8 +21,8 @@ from rig.measurements import point_rows, spectra
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path
+from rig.recording.journal_blocks import read_journal
 from rig.recording.reader import Recording
-from rig.recording.sequence import read_journal
 from rig.show.summary import summarise
 from rig.tick.sequencer.segments import SettleRule
 from tests.rig.campaigns.running.test_runs import plan_with, running

@@ -117,7 +117,7 @@ def test_a_sweep_says_how_well_its_force_was_held_and_where_not():
         (point,) = run.recording.latest.values()
         force = np.abs(run.sweeps()[0].force) / FORCE_N
         with pytest.raises(
-            RecordingError, match="the recording is a sweep, wanted is a stepped-phase or a response-controlled or a "
+            RecordingError, match="the recording is a sweep, wanted is a stepped-phase or a response-controlled"
         ):
             run.force_surface()
     assert (point["held_least"], point["held_most"]) == pytest.approx((force.min(), force.max()))

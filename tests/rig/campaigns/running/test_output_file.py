@@ -5,9 +5,9 @@ import pytest
 import rig
 from rig.campaigns.running.output_file import make_way, put_back
 from rig.errors import RecordingError
+from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from tests.rig.recording.samples import fill, header, journal
 
 

@@ -57,7 +57,7 @@ def test_the_level_that_tripped_is_not_tried_again_unasked(output):
     before = output.read_bytes()
     level = f"{level_of(output):g} V"
     said = (
-        rf"^run\.h5: the run tripped at {level} \(displacement .*: --plan with levels below {level}, or --retry-tripped"
+        rf"^run\.h5: the run tripped at {level} \(displacement .*: `plan` with levels below {level}, or `retry_tripped`"
     )
     with pytest.raises(ConfigurationError, match=said):
         rig.resume(output)

@@ -7,9 +7,9 @@ import rig
 from rig.errors import DaqError, DaqTimeout
 from rig.loop.loop import Loop
 from rig.loop.session import open_session
+from rig.recording.conversion import finalise
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
-from rig.recording.store import finalise
 from rig.tick.safety.layout import EndReason, GuardMode
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.loop.worker.rigs import VOLTS, slow_bench, tone

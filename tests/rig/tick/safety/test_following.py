@@ -8,14 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.layout import FORCE, RESPONSE
+from controller.amplitude import FORCE, RESPONSE
+from controller.period import PERIOD
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
-from rig.tick.safety.following.expected import expected_record
-from rig.tick.safety.following.kernels import (
+from rig.tick.safety.expected import expected_record
+from rig.tick.safety.following import (
     ASTRAY_PERIODS,
     CREEP,
+    FOLLOWING,
     LARGEST_RISE,
     begin_to_follow,
     contradicts_exciter,
@@ -23,7 +25,6 @@ from rig.tick.safety.following.kernels import (
     permitted_level,
     see_frequency,
 )
-from rig.tick.safety.following.layout import FOLLOWING
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.limits import describe_end
 from rig.tick.tick import TickSettings
@@ -32,6 +33,14 @@ from tests.rig.rigs import bench_with
 FORCE_CHANNEL, DRIVE_CHANNEL = 0, 1
 BLOCK = 10
 PLANT = load_plan("magnet-beam/continuous-backbone").known_plant
+
+
+def _period(output_v, force_n, drive_m_s2):
+    """Means of a period in which the force is held, of whatever law."""
+    period = np.zeros(1, PERIOD)
+    period["output_v"], period["held"] = output_v, force_n
+    period["force_n"], period["drive_m_s2"] = force_n, drive_m_s2
+    return period[0]
 
 
 class Spoilt(VirtualDAQ):
@@ -227,26 +236,26 @@ def test_the_output_of_a_held_level_at_most_doubles_within_a_period(factor, peri
         assert allowed <= LARGEST_RISE * max(amplitude, float(expected["floor_v"]))
         amplitude = allowed
         assert not follow_level(
-            expected, following, amplitude, amplitude, amplitude, amplitude, 10.0, FORCE, False, False
+            expected, following, _period(amplitude, amplitude, 10.0), amplitude, FORCE, False, False
         )
 
 
 @pytest.mark.parametrize("law", [FORCE, RESPONSE])
 def test_what_does_not_follow_goes_astray_after_the_stated_number_of_periods(law):
     expected, following = _fresh()
-    assert not follow_level(expected, following, 1.0, 1.0, 1.0, 1.0, 1.0, law, False, False)
+    assert not follow_level(expected, following, _period(1.0, 1.0, 1.0), 1.0, law, False, False)
     found = [
-        follow_level(expected, following, 1.6, 1.0, 0.6, 0.6, 0.6, law, False, False) for _ in range(ASTRAY_PERIODS)
+        follow_level(expected, following, _period(1.6, 0.6, 0.6), 1.0, law, False, False) for _ in range(ASTRAY_PERIODS)
     ]
     assert found == [False] * (ASTRAY_PERIODS - 1) + [True]
 
 
 def test_a_force_that_drops_while_the_vibration_jumps_follows():
     expected, following = _fresh()
-    assert not follow_level(expected, following, 1.0, 1.0, 1.0, 1.0, 1.0, FORCE, False, True)
+    assert not follow_level(expected, following, _period(1.0, 1.0, 1.0), 1.0, FORCE, False, True)
     for step in range(3 * ASTRAY_PERIODS):
-        response = 1.0 + 0.2 * step
-        assert not follow_level(expected, following, 1.0 + 0.02 * step, 1.0, 0.3, 0.3, response, FORCE, False, True)
+        period = _period(1.0 + 0.02 * step, 0.3, 1.0 + 0.2 * step)
+        assert not follow_level(expected, following, period, 1.0, FORCE, False, True)
 
 
 def test_frequencies_outside_the_band_of_the_known_plant_are_not_judged():

@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.layout import LOCK, AmplitudeLaw, LockState
+from controller import AmplitudeLaw, LockState
+from controller.lock import LOCK
+from controller.period import PERIOD
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import guard_record
-from rig.tick.sequencer.kernels import advance, judge_period
-from rig.tick.sequencer.layout import PROGRESS, SETTLING, OnFailure, Outcome, SegmentKind
+from rig.tick.sequencer.judgement import SETTLING, judge_period
+from rig.tick.sequencer.kernels import advance
+from rig.tick.sequencer.layout import PROGRESS, OnFailure, Outcome, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
 RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)
@@ -19,21 +22,12 @@ RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_peri
 
 def _judge(periods, locked=True, wanted_force=0.0, saturated=False, open_loop=False):
     settling = np.zeros(1, SETTLING)
-    rule = RULE.build()
+    rule, period = RULE.build(), np.zeros(1, PERIOD)
+    period["saturated"] = saturated
     for error_deg, response, force in periods:
-        judge_period(
-            settling[0],
-            rule[0],
-            locked,
-            math.radians(error_deg),
-            response,
-            force,
-            wanted_force,
-            force,
-            saturated,
-            False,
-            open_loop,
-        )
+        period["error_rad"], period["drive_m_s2"] = math.radians(error_deg), response
+        period["force_n"] = period["held"] = force
+        judge_period(settling[0], rule[0], period[0], wanted_force, locked, open_loop)
     return settling[0]
 
 
@@ -85,11 +79,18 @@ class Walk:
         self.cycle, self.sample, self.levels, self.lags = 0.0, 0, [], []
 
     def go(self, periods, per_period=50, unreached=False):
+        self.progress["unreached"] = unreached
         for _ in range(int(periods * per_period)):
+            self.progress["cycle"], self.progress["sample"] = self.cycle, self.sample
             advance(
-                self.progress[0], self.table, self.outcomes, self.settling[0], RULE.build()[0], self.lock[0],
-                self.guard[0], self.cycle, self.sample, unreached,
-            )  # fmt: skip
+                self.progress[0],
+                self.table,
+                self.outcomes,
+                self.settling[0],
+                RULE.build()[0],
+                self.lock[0],
+                self.guard[0],
+            )
             self.levels.append(float(self.progress["level"][0]))
             self.lags.append(float(self.progress["lag"][0]))
             self.cycle += 1.0 / per_period

@@ -9,8 +9,9 @@ import numpy as np
 
 from rig.bench import Bench, DriverChoice, load_bench
 from rig.emulator import Device, Faults, VirtualPlant
-from rig.emulator.description import described
+from rig.emulator.parameters import described
 from rig.wire.can.bus import FrameBus
+from rig.wire.can.frames import BusTiming
 from rig.wire.can.link import CanLink
 
 
@@ -25,7 +26,7 @@ def device_on(
     bus: FrameBus, fd: bool, node: int = 1, faults: Faults | None = None, serial_number: str = "0001"
 ) -> Iterator[Device]:
     """A device at work until the block ends."""
-    link = CanLink(bus, 4, fd, node, device=True)
+    link = CanLink(bus, 4, BusTiming(fd), node, device=True)
     plant = VirtualPlant(load_bench("magnet-beam"))
     plant.reset()
     plant.step(np.zeros(1))  # compiled now, and not while the host waits for an answer

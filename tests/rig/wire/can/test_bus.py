@@ -10,7 +10,7 @@ import pytest
 
 from rig.errors import DaqDisconnected
 from rig.wire.can.bus import PythonCanBus
-from rig.wire.can.frames import Frame
+from rig.wire.can.frames import BusTiming, Frame
 from rig.wire.can.link import CanLink
 from rig.wire.messages import Heartbeat, Request
 
@@ -47,7 +47,7 @@ class Backend:
 def bus(monkeypatch: pytest.MonkeyPatch) -> Iterator[PythonCanBus]:
     backend = Backend()
     monkeypatch.setattr(can, "Bus", lambda **_: backend)
-    bus = PythonCanBus("socketcan", "can0", True, 1_000_000, 2_000_000, 1)
+    bus = PythonCanBus("socketcan", "can0", BusTiming(True, 1_000_000, 2_000_000), 1)
     bus.open()
     yield bus
     bus.close()
@@ -105,14 +105,14 @@ def test_an_interface_that_goes_is_said(bus: PythonCanBus, number: int) -> None:
 
 
 def test_a_bus_full_of_strangers_does_not_hold_a_call_that_must_not_wait(bus: PythonCanBus) -> None:
-    link = CanLink(bus, 4, True)
+    link = CanLink(bus, 4, BusTiming(True))
     bus._bus.received = [can.Message(arbitration_id=0x7E0, is_extended_id=False)] * 1000
     assert link.receive(0.0) is None
     assert 0 < len(bus._bus.received) < 1000
 
 
 def test_a_link_sends_and_receives_whole_messages(bus: PythonCanBus) -> None:
-    link = CanLink(bus, 4, True)
+    link = CanLink(bus, 4, BusTiming(True))
     link.send(Request(1, 2, 3, 4, 5))
     (sent,) = bus._bus.sent
     assert (sent.arbitration_id, bytes(sent.data), sent.is_fd) == (0x021, bytes((1, 2, 3, 4, 5, 0, 0, 0)), False)

@@ -11,14 +11,15 @@ from rig.drivers.can import CanDAQ
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, DaqDisconnected, DaqMismatch, DaqProtocol, DaqRefused
 from rig.wire.can.bus import PythonCanBus
-from rig.wire.can.definition import definition
+from rig.wire.can.frames import BusTiming
+from rig.wire.can.protocol import definition
 from rig.wire.can.slcan import SlcanBus
-from rig.wire.serial.pty import open_pseudo_terminal
+from rig.wire.serial.port import open_pseudo_terminal
 from tests.rig.wire.can.devices import bench_on, device_on
 
 
 def virtual_bus(channel: str, fd: bool, node: int = 1) -> PythonCanBus:
-    return PythonCanBus("virtual", channel, fd, 1_000_000, 2_000_000, node)
+    return PythonCanBus("virtual", channel, BusTiming(fd, 1_000_000, 2_000_000), node)
 
 
 def readings(daq: CanDAQ | VirtualDAQ, block: int, blocks: int = 200) -> np.ndarray:
@@ -54,7 +55,7 @@ def test_a_device_in_lockstep_returns_what_the_virtual_driver_returns_bit_for_bi
 def test_the_same_holds_behind_an_adapter_on_a_pseudo_terminal() -> None:
     line = open_pseudo_terminal()
     try:
-        adapter = SlcanBus(line.descriptor, True, adapter=True)
+        adapter = SlcanBus(line.descriptor, BusTiming(True), adapter=True)
         with device_on(adapter, True):
             for _ in range(2):  # the line lives on when the host has gone
                 daq = CanDAQ(bench_on("slcan", line.path, 5))

@@ -10,9 +10,8 @@ import pytest
 
 import rig.wire.can
 from rig.errors import ConfigurationError, DaqRefused
-from rig.wire.can.dbc import compile_layout, compile_text
-from rig.wire.can.definition import definition, shape_of
-from rig.wire.can.protocol import protocol
+from rig.wire.can.layout import compile_layout, compile_text
+from rig.wire.can.protocol import definition, protocol, shape_of
 
 SHIPPED = {
     fd: Path(rig.wire.can.__file__).parent / f"vibrolock-4-{'fd' if fd else 'classical'}.dbc" for fd in (True, False)

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from rig.wire.can.codec import CanCodec
-from rig.wire.can.definition import shape_of
 from rig.wire.can.frames import frame_seconds
-from rig.wire.can.load import bus_load, frame_lengths, traffic
-from rig.wire.can.protocol import protocol
+from rig.wire.can.link import bus_load, frame_lengths, traffic
+from rig.wire.can.protocol import protocol, shape_of
 from rig.wire.messages import Heartbeat, Output, Samples, Stream
 
 

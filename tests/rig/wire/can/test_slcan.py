@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqRefused
-from rig.wire.can.frames import FD_LENGTHS, Frame
+from rig.wire.can.frames import FD_LENGTHS, BusTiming, Frame
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.can.slcan_lines import LONGEST_LINE, SlcanLines, encode_line
-from rig.wire.serial.pty import PseudoTerminal, open_pseudo_terminal
+from rig.wire.serial.port import PseudoTerminal, open_pseudo_terminal
 
 
 @st.composite
@@ -32,7 +32,7 @@ def line():  # type: ignore[no-untyped-def]
 
 
 def open_pair(line: PseudoTerminal) -> tuple[SlcanBus, SlcanBus]:
-    adapter, host = SlcanBus(line.descriptor, True, adapter=True), SlcanBus(line.path, True)
+    adapter, host = SlcanBus(line.descriptor, BusTiming(True), adapter=True), SlcanBus(line.path, BusTiming(True))
     adapter.open()
     host.open()
     assert adapter.receive(0.1) is None  # it obeys the opening
@@ -117,7 +117,7 @@ def test_an_adapter_and_a_host_pass_frames_both_ways_and_close(line: PseudoTermi
 
 
 def test_python_cans_own_adapter_driver_understands_ours(line: PseudoTerminal) -> None:
-    adapter = SlcanBus(line.descriptor, True, adapter=True)
+    adapter = SlcanBus(line.descriptor, BusTiming(True), adapter=True)
     adapter.open()
     ended = threading.Event()
 
@@ -195,7 +195,7 @@ def test_a_pulled_cable_is_said_and_the_adapter_waits_on(line: PseudoTerminal) -
     assert adapter.receive(0.02) is None
     assert time.monotonic() - begin > 0.005  # it does not spin
     gone = open_pseudo_terminal()
-    bus = SlcanBus(gone.path, True)
+    bus = SlcanBus(gone.path, BusTiming(True))
     bus.open()
     gone.close()
     with pytest.raises(DaqDisconnected, match="is gone"):
@@ -209,6 +209,6 @@ def test_a_port_that_is_held_or_a_rate_without_a_command_is_refused(line: Pseudo
         SlcanBus(line.path).open()
     host.close()
     with pytest.raises(DaqRefused, match="bitrate = 900000"):
-        SlcanBus(line.path, bit_rate_hz=900_000).open()
+        SlcanBus(line.path, BusTiming(bit_rate_hz=900_000)).open()
     with pytest.raises(DaqRefused, match="data_bitrate = 3000000"):
-        SlcanBus(line.path, fd=True, data_bit_rate_hz=3_000_000).open()
+        SlcanBus(line.path, BusTiming(True, data_bit_rate_hz=3_000_000)).open()

@@ -17,9 +17,8 @@ import serial
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqRefused, DaqTimeout
 from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
-from rig.wire.serial.link import SerialLink
-from rig.wire.serial.load import line_load
-from rig.wire.serial.pty import is_pseudo_terminal, open_pseudo_terminal
+from rig.wire.serial.link import SerialLink, line_load
+from rig.wire.serial.port import is_pseudo_terminal, open_pseudo_terminal
 from tests.docs.wire import on_the_line
 from tests.rig.wire.serial.strategies import same
 

@@ -1,0 +1,170 @@
+"""The amplitude law: which loop makes the output's amplitude, and how one takes over from another without a bump."""
+
+import math
+from enum import IntEnum
+
+import numpy as np
+
+from controller.force import FORCE_LOOP, FORCE_LOOP_STATE, THROUGH_RESPONSE, ForceSettings, begin_force, hold_force
+from controller.primitives import wrap
+from controller.response import RESPONSE_LOOP, RESPONSE_LOOP_STATE, ResponseSettings, begin_response, hold_response
+from controller.through_response import (
+    REFERENCE,
+    REFERENCE_STATE,
+    ThroughResponseSettings,
+    begin_reference,
+    force_at_lag,
+    force_slope,
+    wanted_displacement,
+)
+from vibrolock.compiled import Record, inner_kernel, kernel
+
+__all__ = ["AMPLITUDE", "AMPLITUDE_STATE", "AmplitudeLaw", "AmplitudeSettings"]
+
+SMALLEST_PART = 1e-5  # of the largest voltage: where a logarithmic law begins from rest
+HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
+
+
+class AmplitudeLaw(IntEnum):
+    """What a level is, and so which loop makes the output's amplitude."""
+
+    VOLTAGE = 0
+    """Amplitude of the output voltage (V, peak): no loop."""
+    FORCE = 1
+    """Amplitude of the fundamental force (N, peak)."""
+    FORCE_RMS = 2
+    """Root mean square of the force without its mean, all harmonics together (N)."""
+    RESPONSE = 3
+    """Amplitude of the drive point's fundamental displacement (m, peak)."""
+
+
+VOLTAGE, FORCE, FORCE_RMS, RESPONSE = (int(law) for law in AmplitudeLaw)
+
+AMPLITUDE = np.dtype(
+    [("largest_v", "f8"), ("force", FORCE_LOOP), ("response", RESPONSE_LOOP), ("reference", REFERENCE)]
+)
+"""Parameters of the amplitude law (one record), with one record for each of its loops."""
+
+OUTPUT = np.dtype([("amplitude_v", "f8"), ("turn", "f8"), ("behind", "i8"), ("turn_behind", "i8")])
+"""The output that was put out last (one record): amplitude and angle of ``u = Re(U exp(i theta))``, and whether they are held
+back from what the law demands: 1 while they cannot rise there as fast as they should, -1 while they cannot fall."""
+
+AMPLITUDE_STATE = np.dtype(
+    [
+        ("law", "i8"),
+        ("demanded_v", "f8"),
+        ("demanded_turn", "f8"),
+        ("saturated", "i8"),
+        ("output", OUTPUT),
+        ("force", FORCE_LOOP_STATE),
+        ("response", RESPONSE_LOOP_STATE),
+        ("reference", REFERENCE_STATE),
+    ]
+)
+"""State of the amplitude law (one record): the `AmplitudeLaw` of the moment, amplitude and angle that it demands, whether they
+stand at the largest voltage, the output that there was, and one record for each loop."""
+
+
+class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings):
+    """The loops behind levels in newtons and metres."""
+
+    def build_amplitude(
+        self, amplitude_law: AmplitudeLaw, largest_v: float, dt_s: float, gain: float, sees_rest: bool
+    ) -> np.ndarray:
+        """One record of `AMPLITUDE`; ``gain`` is the detector's, ``sees_rest`` whether the force at rest is estimated.
+
+        Raises ValueError for levels that no loop would hold.
+        """
+        through = self.force_loop == "through-response"
+        if amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
+            if self.force_loop == "linear" and self.k4 == 0.0:
+                raise ValueError("k4 = 0: levels in newtons need the force loop's integral gain, allowed is above 0")
+            if through and self.reference_integral_per_s == 0.0:
+                raise ValueError("reference_integral_per_s = 0: a force held through the response needs it above 0")
+        held = amplitude_law is AmplitudeLaw.RESPONSE or (through and amplitude_law is not AmplitudeLaw.VOLTAGE)
+        if held and self.response_integral_per_s == 0.0:
+            raise ValueError("response_integral_per_s = 0: a response is held with a gain above 0")
+        smallest_v = SMALLEST_PART * largest_v
+        out = np.zeros(1, AMPLITUDE)
+        out["largest_v"] = largest_v
+        out["force"] = self.build_force(smallest_v, largest_v, dt_s)
+        out["response"] = self.build_response(smallest_v, largest_v, dt_s, gain)
+        out["reference"] = self.build_reference(dt_s, sees_rest)
+        return out
+
+
+@inner_kernel
+def held_size(state: Record, vibration: Record) -> float:
+    """What the loop of the moment holds: a force (N), its RMS (N) or a displacement (m); 0 without a loop."""
+    if state.law == FORCE:
+        return float(vibration.force_n)
+    if state.law == FORCE_RMS:
+        return float(vibration.force_rms_n)
+    return float(vibration.displacement_m) if state.law == RESPONSE else 0.0
+
+
+@kernel
+def take_over(parameters: Record, state: Record, vibration: Record, law: int) -> float:
+    """Another `AmplitudeLaw` takes over; returns the level of the moment (V, N or m), where its levels begin.
+
+    All integrals begin where the rig is, so that the output does not jump.
+    """
+    state.law = law
+    state.demanded_turn = state.output.turn
+    state.output.turn_behind = 0
+    begin_force(parameters.force, state.force, state.output.amplitude_v)
+    begin_response(parameters.response, state.response, vibration, state.output)
+    begin_reference(state.reference, vibration.displacement_m)
+    return float(state.output.amplitude_v if law == VOLTAGE else held_size(state, vibration))
+
+
+@inner_kernel
+def demand(
+    parameters: Record, state: Record, vibration: Record, level: float, wanted_lag: float, omega: float, by_loop: bool
+) -> float:
+    """One sample of the amplitude law: the output amplitude (V) for ``level`` (V, N or m); its angle is ``demanded_turn``.
+
+    Loops on the response keep what they demand while force and motion are not ``present``. ``by_loop``: the frequency law
+    gives the frequency ``omega`` (rad/s) for ``wanted_lag`` (rad); a tone of the plan has no wanted lag.
+    """
+    output, behind = state.output, state.output.behind
+    held = held_size(state, vibration)
+    if state.law == VOLTAGE:
+        state.demanded_v = level
+    elif state.law != RESPONSE and parameters.force.loop != THROUGH_RESPONSE:
+        state.demanded_v = hold_force(parameters.force, state.force, level, held, behind)
+    elif vibration.present == 1:
+        wanted_m = level
+        if state.law != RESPONSE:
+            active, slope = held, 1.0
+            if by_loop:
+                active = force_at_lag(vibration, held, wanted_lag, state.law == FORCE_RMS)
+                slope = force_slope(parameters.reference, state.reference, vibration, wanted_lag, omega)
+            wanted_m = wanted_displacement(
+                parameters.reference, state.reference, level, active, slope, state.saturated == 1, behind
+            )
+        state.demanded_v, turn = hold_response(parameters.response, state.response, vibration, output, wanted_m)
+        if parameters.response.turns == 1:
+            state.demanded_turn = turn
+    state.saturated = 1 if state.demanded_v >= parameters.largest_v else 0
+    return float(state.demanded_v)
+
+
+@inner_kernel
+def see_output(state: Record, demanded_v: float, amplitude_v: float, turn: float) -> None:
+    """The output that was put out for ``demanded_v`` and the state's ``demanded_turn``, after all limits (V, rad)."""
+    output = state.output
+    output.amplitude_v, output.turn = amplitude_v, turn
+    output.behind = output.turn_behind = 0
+    if abs(amplitude_v - demanded_v) > HELD_BACK * abs(demanded_v):
+        output.behind = 1 if demanded_v > amplitude_v else -1
+    if turn != state.demanded_turn:
+        output.turn_behind = 1 if wrap(state.demanded_turn - turn) > 0.0 else -1
+
+
+def amplitude_state(parameters: np.ndarray) -> np.ndarray:
+    """State of an amplitude law that begins at rest."""
+    out = np.zeros(1, AMPLITUDE_STATE)
+    log_smallest_v = math.log(float(parameters["force"]["smallest_v"][0]))
+    out["force"]["log_integral"] = out["response"]["log_integral"] = log_smallest_v
+    return out

@@ -1,1 +1,0 @@
-"""The amplitude laws: loops that hold a force or a response."""

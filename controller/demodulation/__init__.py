@@ -1,1 +1,0 @@
-"""Demodulation: synchronous, by adaptive filter, by signs."""

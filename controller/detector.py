@@ -1,0 +1,171 @@
+"""The detector: from samples of force and acceleration to their complex amplitudes, and from these to a phase error."""
+
+import math
+from enum import IntEnum
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from controller.adaptive_filter import MOST_HARMONICS, adapt, root_mean_square, turn_phasors
+from controller.primitives import size, track, wrap
+from controller.settings import Settings
+from vibrolock.compiled import Record, inner_kernel, kernel
+
+__all__ = ["DETECTOR", "DETECTOR_STATE", "VIBRATION", "Detector", "DetectorSettings"]
+
+
+class Detector(IntEnum):
+    """How force and response become complex amplitudes, and these a phase error."""
+
+    TWO_PHASE = 0
+    """Synchronous demodulation through a first-order low-pass."""
+    SIGN = 1
+    """Product of the signs of force and response; amplitudes as with two phases."""
+    ADAPTIVE = 2
+    """Adaptive filter: several harmonics and the mean at once."""
+
+
+SIGN, ADAPTIVE = int(Detector.SIGN), int(Detector.ADAPTIVE)
+KINDS = {"two-phase": Detector.TWO_PHASE, "sign": Detector.SIGN, "adaptive": Detector.ADAPTIVE}
+
+DETECTOR = np.dtype([("kind", "i8"), ("harmonics", "i8"), ("gain", "f8"), ("mean_gain", "f8")])
+"""Parameters of the detector (one record): its `Detector`, harmonics of the adaptive filter, steps of the low-pass behind the
+demodulation and of the one that follows the mean of an input."""
+
+DETECTOR_STATE = np.dtype(
+    [
+        ("sign_mean", "f8"),
+        ("force_square", "f8"),
+        ("phasors", "c16", (MOST_HARMONICS + 1,)),
+        ("force_filter", "c16", (MOST_HARMONICS + 1,)),
+        ("drive_filter", "c16", (MOST_HARMONICS + 1,)),
+    ]
+)
+"""State of the detector (one record); of the last three the first H+1 entries count."""
+
+VIBRATION = np.dtype(
+    [
+        ("force", "c16"),
+        ("drive", "c16"),
+        ("force_n", "f8"),
+        ("drive_m_s2", "f8"),
+        ("displacement_m", "f8"),
+        ("force_rms_n", "f8"),
+        ("present", "i8"),
+        ("error_rad", "f8"),
+        ("rest_force_n", "f8"),
+        ("rest_drive_m_s2", "f8"),
+        ("rest_error_rad", "f8"),
+    ]
+)
+"""What is measured of the vibration at a sample (one record): the laws read it, detector and rest estimate write it.
+
+``force``, ``drive``: fundamentals of the force (N) and the drive point's acceleration (m/s^2), with their sizes and that of the
+displacement. ``force_rms_n``: all harmonics together, where a law holds it. ``present``: whether both stand above the smallest
+amplitudes that a phase can be read from. ``error_rad``: phase error. ``rest_``: sizes and phase error as they will be once the
+vibration keeps still (`controller.rest`)."""
+
+
+class DetectorSettings(Settings):
+    """How force and response are demodulated."""
+
+    detector: Literal["two-phase", "sign", "adaptive"] = "two-phase"
+    """``two-phase`` (reading B of the paper's controller), ``sign`` (reading A) or ``adaptive``: an adaptive filter, which
+    takes harmonics and mean out and so may be ten times as quick."""
+    low_pass_rad_s: float = Field(2.0 * math.pi, gt=0, le=1e4)
+    """a, w_LP: corner of the demodulation's first-order low-pass, rad/s."""
+    harmonics_followed: int = Field(5, ge=1, le=MOST_HARMONICS)
+    """Harmonics of the adaptive filter; what is above makes ripple."""
+    mean_corner_hz: float = Field(0.3, gt=0, le=100)
+    """Corner of the high-pass that takes the mean out of every input before it is demodulated, Hz."""
+
+    def build_detector(self, sample_rate_hz: float) -> np.ndarray:
+        """One record of `DETECTOR`; ValueError where the filter is too quick for the sample rate."""
+        dt = 1.0 / sample_rate_hz
+        gain = -math.expm1(-self.low_pass_rad_s * dt)
+        if self.detector == "adaptive" and gain * (2 * self.harmonics_followed + 1) > 1.0:
+            largest = -math.log1p(-1.0 / (2 * self.harmonics_followed + 1)) / dt
+            raise ValueError(
+                f"low_pass_rad_s = {self.low_pass_rad_s:g}: an adaptive filter with {self.harmonics_followed} harmonics at "
+                f"{sample_rate_hz:g} samples/s allows up to {largest:.4g}"
+            )
+        out = np.zeros(1, DETECTOR)
+        out["kind"] = KINDS[self.detector]
+        out["harmonics"] = self.harmonics_followed
+        out["gain"] = gain
+        out["mean_gain"] = -math.expm1(-2.0 * math.pi * self.mean_corner_hz * dt)
+        return out
+
+
+@kernel
+def demodulate(estimate: complex, value: float, cos_theta: float, sin_theta: float, gain: float) -> complex:
+    """Two-phase (synchronous) demodulation: low-passed ``2 y exp(-i theta)``, which settles on Y_1.
+
+    Passes a ripple at 2 Omega of relative size a/(2 Omega), and harmonics h of y likewise at (h +- 1) Omega.
+    """
+    return complex(
+        estimate.real + gain * (2.0 * value * cos_theta - estimate.real),
+        estimate.imag + gain * (-2.0 * value * sin_theta - estimate.imag),
+    )
+
+
+@kernel
+def sign_product(force: float, acceleration: float) -> float:
+    """Sign detector: sign(force) sign(displacement-like signal), the acceleration's sign reversed standing for displacement.
+
+    For two sines its mean is ``(2/pi) e`` with the phase error e to phase resonance. Harmonics of either signal move
+    the zero crossings and bias it.
+    """
+    if force == 0.0 or acceleration == 0.0:
+        return 0.0
+    return -1.0 if (force > 0.0) == (acceleration > 0.0) else 1.0
+
+
+@kernel
+def phase_lag(force: complex, response: complex) -> float:
+    """Phase lag ``arg F_1 - arg Y_1`` in rad, in [-pi, pi)."""
+    product = force * complex(response.real, -response.imag)
+    return math.atan2(product.imag, product.real)
+
+
+@inner_kernel
+def detect(
+    parameters: Record, state: Record, vibration: Record, force: float, drive: float, phasor: complex, omega: float
+) -> None:
+    """One sample of force (N) and acceleration (m/s^2), without their means, into the fundamentals of ``vibration``.
+
+    ``phasor`` is ``exp(i theta)`` with the phase that was on the output when the sample was taken, ``omega`` the oscillator's
+    frequency (rad/s).
+    """
+    gain = parameters.gain
+    if parameters.kind == ADAPTIVE:
+        harmonics = parameters.harmonics
+        turn_phasors(state.phasors, harmonics, phasor.real, phasor.imag)
+        adapt(state.force_filter, state.phasors, harmonics, force, gain)
+        adapt(state.drive_filter, state.phasors, harmonics, drive, gain)
+        vibration.force, vibration.drive = state.force_filter[1], state.drive_filter[1]
+    else:
+        vibration.force = demodulate(vibration.force, force, phasor.real, phasor.imag, gain)
+        vibration.drive = demodulate(vibration.drive, drive, phasor.real, phasor.imag, gain)
+        state.force_square = track(state.force_square, force * force, gain)
+        if parameters.kind == SIGN:
+            state.sign_mean = track(state.sign_mean, sign_product(force, drive), gain)
+    vibration.force_n, vibration.drive_m_s2 = size(vibration.force), size(vibration.drive)
+    vibration.displacement_m = vibration.drive_m_s2 / (omega * omega)
+
+
+@kernel
+def force_rms(parameters: Record, state: Record) -> float:
+    """Root mean square of the force without its mean, all harmonics together (N)."""
+    if parameters.kind == ADAPTIVE:
+        return root_mean_square(state.force_filter, parameters.harmonics)
+    return math.sqrt(state.force_square)
+
+
+@inner_kernel
+def phase_error(parameters: Record, state: Record, vibration: Record, wanted_lag: float, lag_of_skew: float) -> float:
+    """Wanted minus measured phase lag in rad; ``lag_of_skew`` is the lag (rad) by which the force's channel is later."""
+    if parameters.kind == SIGN:
+        return float(0.5 * math.pi * state.sign_mean - lag_of_skew)
+    return wrap(wanted_lag - phase_lag(vibration.force, vibration.drive) - lag_of_skew)

@@ -1,0 +1,180 @@
+"""The frequency law: what the oscillator's frequency follows while the loop is closed."""
+
+import math
+from enum import IntEnum
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from controller.primitives import proportional_integral
+from controller.settings import Settings
+from vibrolock.compiled import Record, inner_kernel, kernel
+
+__all__ = ["FREQUENCY", "FREQUENCY_STATE", "FrequencyLaw", "FrequencySettings"]
+
+LARGEST_FREQUENCY_ERROR = 0.05  # of the frequency
+
+
+class FrequencyLaw(IntEnum):
+    """What the PI law of the frequency is fed with."""
+
+    PHASE = 0
+    """The phase error, rad."""
+    FREQUENCY_ERROR = 1
+    """The distance of the oscillator from where the structure has the wanted phase, rad/s."""
+
+
+PHASE, FREQUENCY_ERROR = int(FrequencyLaw.PHASE), int(FrequencyLaw.FREQUENCY_ERROR)
+LAWS = {"phase": FrequencyLaw.PHASE, "frequency-error": FrequencyLaw.FREQUENCY_ERROR}
+
+FREQUENCY = np.dtype(
+    [
+        ("law", "i8"),
+        ("kp", "f8"),
+        ("ki", "f8"),
+        ("centre_rad_s", "f8"),
+        ("lowest_rad_s", "f8"),
+        ("highest_rad_s", "f8"),
+        ("period_mean", "i8"),
+        ("mode_shape_squared", "f8"),
+        ("target_lag_rad", "f8"),
+        ("dt_s", "f8"),
+    ]
+)
+"""Parameters of the frequency law (one record). ``target_lag_rad``: the lag that is wanted where a plan names none."""
+
+FREQUENCY_STATE = np.dtype(
+    [("omega", "f8"), ("integral", "f8"), ("mean_error_rad", "f8"), ("clamped", "i8"), ("taking_over", "i8")]
+)
+"""State of the frequency law (one record): the oscillator's frequency (rad/s), mean phase error of the last whole period,
+whether the frequency stands at an end of its window, and whether the law takes over at the next sample."""
+
+
+class FrequencySettings(Settings):
+    """What the frequency follows, and where it may go.
+
+    The frequency follows ``Omega = omega_m + kp e + ki int e``. With ``frequency_law = "phase"`` e is the phase error in rad
+    and the gains are ``k1``, ``k2``. With ``"frequency-error"`` it is the distance to the wanted phase in rad/s,
+    ``eps = (phi_d^2 Omega / 2)(|F_1|/|A_1|) sin(phi* - lag)/|sin phi*|``, exact for one mode near resonance: the slope of the
+    phase, which goes with the damping, is divided out, and the gains are ``frequency_proportional`` and
+    ``frequency_integral_per_s``.
+    """
+
+    frequency_law: Literal["phase", "frequency-error"] = "phase"
+    """What the frequency follows: the phase error, or the frequency error computed from it."""
+    k1: float = Field(0.0, ge=0, le=1e4)
+    """K1 of the paper: proportional gain in 1/s (two-phase, adaptive), corner of the PI law in rad/s (sign)."""
+    k2: float = Field(0.0, ge=0, le=1e6)
+    """K2 of the paper: integral gain in 1/s^2 (two-phase, adaptive), gain of the low-pass in rad/s (sign)."""
+    frequency_proportional: float = Field(0.0, ge=0, le=100)
+    """Proportional gain of the frequency error, 1."""
+    frequency_integral_per_s: float = Field(0.0, ge=0, le=1e4)
+    """Integral gain of the frequency error, 1/s; w_LP/12 to w_LP/8 are good values."""
+    drive_mode_shape: float | None = Field(None, gt=0)
+    """Mass-normalised mode shape at the drive point for the frequency error, kg^-1/2; the bench's if not given. It may be wrong
+    by a factor of 1.5."""
+    centre_frequency_hz: float = Field(gt=0, le=1e5)
+    """omega_m / 2 pi: frequency at which the loop starts, Hz."""
+    frequency_window_hz: tuple[float, float]
+    """Lowest and highest frequency the loop may take, Hz."""
+    phase_lag_deg: float = Field(-90.0, ge=-180, le=180)
+    """Wanted lag of the drive-point acceleration behind the force, deg; -90 is phase resonance."""
+    period_mean: bool = False
+    """Whether the frequency follows the mean of the phase error over the last whole period, instead of every sample of it:
+    the detector's ripple then no longer modulates the output, whose harmonics change those of the force."""
+
+    @model_validator(mode="after")
+    def _frequency_possible(self) -> Self:
+        lowest, highest = self.frequency_window_hz
+        if not 0 < lowest < self.centre_frequency_hz < highest:
+            raise ValueError(
+                f"frequency_window_hz = [{lowest:g}, {highest:g}] must enclose "
+                f"centre_frequency_hz = {self.centre_frequency_hz:g} and begin above 0"
+            )
+        if self.frequency_law == "phase":
+            for name in ("k1", "k2"):
+                if name not in self.model_fields_set:
+                    raise ValueError(f"{name}: is missing, and the phase law needs it")
+            return self
+        if self.frequency_integral_per_s == 0.0:
+            raise ValueError("frequency_integral_per_s = 0: the frequency-error law needs it above 0")
+        if self.period_mean:
+            raise ValueError("period_mean = true: allowed with the phase law only")
+        if abs(math.sin(math.radians(self.phase_lag_deg))) < math.sin(math.radians(5.0)):
+            raise ValueError(
+                f"phase_lag_deg = {self.phase_lag_deg:g}: the frequency-error law allows -175 to -5 and 5 to 175"
+            )
+        return self
+
+    def build_frequency(
+        self, sample_rate_hz: float, drive_mode_shape: float | None, gains: tuple[float, float]
+    ) -> np.ndarray:
+        """One record of `FREQUENCY` for the PI law's ``gains`` (kp, ki) and the drive point's mode shape (kg^-1/2).
+
+        Raises ValueError where the window reaches beyond a quarter of the sample rate or the mode shape is missing.
+        """
+        if self.frequency_window_hz[1] > sample_rate_hz / 4.0:
+            raise ValueError(
+                f"frequency_window_hz ends at {self.frequency_window_hz[1]:g} Hz; at {sample_rate_hz:g} samples/s "
+                f"it may reach {sample_rate_hz / 4.0:g} Hz"
+            )
+        if drive_mode_shape is None and self.frequency_law == "frequency-error":
+            raise ValueError(
+                "drive_mode_shape: the frequency-error law needs it, here or as specimen.drive_mode_shape of the bench"
+            )
+        out = np.zeros(1, FREQUENCY)
+        out["law"] = LAWS[self.frequency_law]
+        out["kp"], out["ki"] = gains
+        out["centre_rad_s"] = 2.0 * math.pi * self.centre_frequency_hz
+        out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in self.frequency_window_hz)
+        out["period_mean"] = self.period_mean
+        out["mode_shape_squared"] = (drive_mode_shape or 0.0) ** 2
+        out["target_lag_rad"] = math.radians(self.phase_lag_deg)
+        out["dt_s"] = 1.0 / sample_rate_hz
+        return out
+
+
+@kernel
+def frequency_error(phase_error: float, compliance: float, omega: float, wanted_lag: float) -> float:
+    """Distance (rad/s) of the oscillator from where a mode has the wanted lag: ``(Omega/2)(phi_d^2 |F|/|A|) sin e/|sin phi*|``.
+
+    ``compliance`` is ``phi_d^2 |F_1|/|A_1|``, ``phase_error`` e the wanted lag phi* less the measured one. With
+    ``phi_d^2 F/A = 1 - (w/Omega)^2 - 2 i zeta w/Omega`` and phi* = -90 deg it is ``w - Omega`` to first order: the slope of the
+    phase over the frequency, which goes with the damping, is divided out. Bounded by a part of Omega.
+    """
+    bound = LARGEST_FREQUENCY_ERROR * omega
+    error = 0.5 * omega * compliance * math.sin(phase_error) / abs(math.sin(wanted_lag))
+    return float(min(max(error, -bound), bound))
+
+
+@inner_kernel
+def followed_error(parameters: Record, state: Record, vibration: Record, wanted_lag: float) -> float:
+    """What the PI law is fed with: one line for each `FrequencyLaw`, in rad or rad/s."""
+    if parameters.law == FREQUENCY_ERROR:
+        ratio = parameters.mode_shape_squared * vibration.rest_force_n / vibration.rest_drive_m_s2
+        return frequency_error(vibration.rest_error_rad, ratio, state.omega, wanted_lag)
+    return float(state.mean_error_rad if parameters.period_mean == 1 else vibration.error_rad)
+
+
+@inner_kernel
+def follow(parameters: Record, state: Record, vibration: Record, wanted_lag: float) -> None:
+    """One sample of the frequency law: from the vibration and the wanted lag (rad) to ``state.omega`` (rad/s).
+
+    Where the law takes over from a frequency that the plan gave, its integral begins so that the frequency goes on from there.
+    """
+    error = followed_error(parameters, state, vibration, wanted_lag)
+    if state.taking_over == 1:
+        state.taking_over = 0
+        state.integral = state.omega - parameters.centre_rad_s - parameters.kp * error
+    state.omega, state.integral = proportional_integral(
+        error,
+        state.integral,
+        parameters.kp,
+        parameters.ki,
+        parameters.dt_s,
+        parameters.centre_rad_s,
+        parameters.lowest_rad_s,
+        parameters.highest_rad_s,
+    )
+    state.clamped = 1 if state.omega == parameters.lowest_rad_s or state.omega == parameters.highest_rad_s else 0

@@ -1,0 +1,115 @@
+"""The phase lock: when it counts as gained and as lost."""
+
+import math
+from enum import IntEnum
+from typing import Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from controller.settings import Settings
+from vibrolock.compiled import Record, kernel
+
+__all__ = ["LOCK", "THRESHOLDS", "LockRule", "LockState"]
+
+
+class LockState(IntEnum):
+    """State of the phase lock."""
+
+    SEARCHING = 0
+    """Force or response is too small for its phase to be read; the frequency is held."""
+    ACQUIRING = 1
+    """The loop is closed and not yet close to the wanted phase."""
+    LOCKED = 2
+    """The phase error has stayed small for several periods."""
+    LOST = 3
+    """Was locked; the error has been large for several periods while the level was held. A fault."""
+
+
+SEARCHING, ACQUIRING, LOCKED, LOST = (int(state) for state in LockState)
+
+THRESHOLDS = np.dtype(
+    [
+        ("locked_rad", "f8"),
+        ("locked_periods", "i8"),
+        ("lost_rad", "f8"),
+        ("lost_periods", "i8"),
+        ("smallest_force_n", "f8"),
+        ("smallest_response", "f8"),
+    ]
+)
+"""When a lock is gained and lost (one record)."""
+
+LOCK = np.dtype([("state", "i8"), ("close_periods", "i8"), ("far_periods", "i8")])
+"""State of the phase lock (one record)."""
+
+
+class LockRule(Settings):
+    """When a phase lock counts as gained and as lost."""
+
+    locked_deg: float = Field(5.0, gt=0, le=45)
+    """Mean phase error of a period below which the period counts as close, deg."""
+    locked_periods: int = Field(10, ge=1, le=1000)
+    """Close periods in a row that make a lock."""
+    lost_deg: float = Field(30.0, gt=0, le=180)
+    """Mean phase error of a period above which the period counts as far, deg."""
+    lost_periods: int = Field(20, ge=1, le=1000)
+    """Far periods in a row, at a held level, that lose a lock."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.lost_deg <= self.locked_deg:
+            raise ValueError(f"lost_deg = {self.lost_deg:g}: allowed is above locked_deg = {self.locked_deg:g}")
+        return self
+
+    def build(self, smallest_force_n: float = 0.0, smallest_response: float = 0.0) -> np.ndarray:
+        """One record of `THRESHOLDS`; the smallest amplitudes (N and the response's unit) come from the bench's sensors."""
+        out = np.zeros(1, THRESHOLDS)
+        out["locked_rad"] = math.radians(self.locked_deg)
+        out["locked_periods"] = self.locked_periods
+        out["lost_rad"] = math.radians(self.lost_deg)
+        out["lost_periods"] = self.lost_periods
+        out["smallest_force_n"] = smallest_force_n
+        out["smallest_response"] = smallest_response
+        return out
+
+
+@kernel
+def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool, error: float) -> None:
+    """Advance the lock state by one oscillator period, from the period's mean phase error (rad).
+
+    ``present``: force and response stand above the smallest amplitudes that a phase can be read from.
+    ``held``: the level is not being ramped; only then is a large error counted towards a lost lock.
+    """
+    size = abs(error)
+    if not present:
+        lock.close_periods = 0
+        if lock.state == LOCKED:
+            lock.far_periods += 1
+            if lock.far_periods >= thresholds.lost_periods:
+                lock.state = LOST
+        elif lock.state != LOST:
+            lock.state = SEARCHING
+        return
+    if lock.state == SEARCHING:
+        lock.state = ACQUIRING
+    lock.close_periods = lock.close_periods + 1 if size < thresholds.locked_rad else 0
+    if size > thresholds.lost_rad and held:
+        lock.far_periods += 1
+    elif size > thresholds.lost_rad and lock.state == LOCKED:
+        lock.state = ACQUIRING
+    else:
+        lock.far_periods = 0
+    if lock.close_periods >= thresholds.locked_periods:
+        lock.state = LOCKED
+        lock.far_periods = 0
+    elif lock.state == LOCKED and lock.far_periods >= thresholds.lost_periods:
+        lock.state = LOST
+
+
+@kernel
+def reacquire(lock: Record) -> None:
+    """A new level is being approached: a lost lock may be sought again."""
+    lock.far_periods = 0
+    lock.close_periods = 0
+    lock.state = ACQUIRING

@@ -1,1 +1,0 @@
-"""The lock: when it counts as gained and as lost."""

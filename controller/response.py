@@ -1,0 +1,135 @@
+"""The loop that holds the response: on the logarithm of the complex output, with a gain that follows the plant."""
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from controller.primitives import log_proportional_integral, log_ratio, size, wrap
+from controller.settings import Settings
+from vibrolock.compiled import Record, kernel
+
+__all__ = ["RESPONSE_LOOP", "RESPONSE_LOOP_STATE", "ResponseSettings"]
+
+PLANT_VARIES = 3.0  # factor by which the plant's gain may be off and is still followed
+
+RESPONSE_LOOP = np.dtype(
+    [
+        ("kp", "c16"),
+        ("ki", "f8"),
+        ("plant_gain", "c16"),
+        ("turns", "i8"),
+        ("gain", "f8"),
+        ("smallest_v", "f8"),
+        ("largest_v", "f8"),
+        ("dt_s", "f8"),
+    ]
+)
+"""Parameters of the response's loop (one record). ``turns``: whether it holds the response's phase too, by turning the
+output's; ``gain``: step of the low-pass that its error passes."""
+
+RESPONSE_LOOP_STATE = np.dtype(
+    [("log_integral", "c16"), ("reference_turn", "f8"), ("error", "c16"), ("plant_ratio", "c16")]
+)
+"""State of the response's loop (one record). ``reference_turn``: angle at which the acceleration is held (rad);
+``plant_ratio``: the plant's gain over the one for which kp is right."""
+
+
+class ResponseSettings(Settings):
+    """How a response is held."""
+
+    response_loop: Literal["complex", "amplitude"] = "complex"
+    """Whether the response's loop holds amplitude and phase (``complex``) or the amplitude alone."""
+    response_integral_per_s: float = Field(0.0, ge=0, le=1e4)
+    """K: integral gain of the response's loop, 1/s; 0 where there is none."""
+    plant_pole_rad_s: tuple[float, float] | None = None
+    """p: real and imaginary part of the plant's pole (voltage to response) less i times the locked frequency, rad/s. It sets
+    the proportional gain K/(-p), which cancels it; without, the loop is integral alone."""
+    plant_gain_per_v: tuple[float, float] | None = None
+    """Real and imaginary part of the drive point's acceleration over the output, m/s^2 per V, at the lock at which
+    `plant_pole_rad_s` holds. With it the proportional gain follows the pole as this ratio changes with the level."""
+
+    def build_response(self, smallest_v: float, largest_v: float, dt_s: float, gain: float) -> np.ndarray:
+        """One record of `RESPONSE_LOOP` for an output from ``smallest_v`` to ``largest_v``; ``gain`` is the detector's.
+
+        Raises ValueError for a plant that is unstable.
+        """
+        out = np.zeros(1, RESPONSE_LOOP)
+        out["kp"] = self._proportional()
+        out["ki"] = self.response_integral_per_s
+        out["plant_gain"] = 0.0 if self.plant_gain_per_v is None else complex(*self.plant_gain_per_v)
+        out["turns"] = self.response_loop == "complex"
+        out["gain"] = gain
+        out["smallest_v"], out["largest_v"], out["dt_s"] = smallest_v, largest_v, dt_s
+        return out
+
+    def _proportional(self) -> complex:
+        if self.plant_pole_rad_s is None:
+            return 0.0
+        pole = complex(*self.plant_pole_rad_s)
+        if not pole.real < 0.0:
+            raise ValueError(f"plant_pole_rad_s = {list(self.plant_pole_rad_s)}: allowed is a real part below 0")
+        gain = self.response_integral_per_s / -pole
+        return gain if self.response_loop == "complex" else gain.real
+
+
+@kernel
+def begin_response(parameters: Record, state: Record, vibration: Record, output: Record) -> None:
+    """The loop takes over from the ``output`` of the moment: the response is held at the phase that it has."""
+    amplitude = output.amplitude_v
+    state.log_integral = complex(
+        math.log(min(max(amplitude, parameters.smallest_v), parameters.largest_v)), output.turn
+    )
+    state.reference_turn = math.atan2(vibration.drive.imag, vibration.drive.real)
+    state.error = 0.0
+    state.plant_ratio = 1.0
+
+
+@kernel
+def response_proportional(parameters: Record, state: Record, drive: complex, output: Record) -> complex:
+    """The loop's kp, following the plant: ``kp (A/U)/G``, G what A/U was where kp was right.
+
+    A softening structure moves the plant's pole p, while the residue of ``A/U = R/(i W - p)`` is the shaker's: -p goes
+    with U/A. Within a factor; without G the gain stays.
+    """
+    if parameters.plant_gain == 0.0:
+        return complex(parameters.kp)
+    amplitude, turn = output.amplitude_v, output.turn
+    if amplitude > 0.0:
+        now = drive * complex(math.cos(turn), -math.sin(turn)) / amplitude / parameters.plant_gain
+        state.plant_ratio += 0.25 * parameters.ki * parameters.dt_s * (now - state.plant_ratio)
+    ratio = size(state.plant_ratio)
+    bounded = min(max(ratio, 1.0 / PLANT_VARIES), PLANT_VARIES) / ratio if ratio > 0.0 else 0.0
+    return complex(parameters.kp * state.plant_ratio * bounded)
+
+
+@kernel
+def hold_response(
+    parameters: Record, state: Record, vibration: Record, output: Record, wanted_m: float
+) -> tuple[float, float]:
+    """One sample of the loop: amplitude (V) and angle (rad) of the output for a displacement that should be ``wanted_m``.
+
+    ``ln U = kp E + K int E``, ``E = ln(X_ref/X) + i (phi_0 - arg A_1)``; without ``turns`` the real part.
+    """
+    turned = 0.0
+    if parameters.turns == 1:
+        turned = wrap(state.reference_turn - math.atan2(vibration.drive.imag, vibration.drive.real))
+    error = complex(log_ratio(wanted_m, vibration.displacement_m), turned)
+    state.error += parameters.gain * (error - state.error)
+    before = state.log_integral.imag
+    demanded_v, angle, integral = log_proportional_integral(
+        state.error,
+        state.log_integral,
+        response_proportional(parameters, state, vibration.drive, output),
+        parameters.ki,
+        parameters.dt_s,
+        parameters.smallest_v,
+        parameters.largest_v,
+        output.behind,
+    )
+    if (integral.imag - before) * output.turn_behind > 0.0:  # no further the way that the output cannot turn
+        angle -= integral.imag - before
+        integral = complex(integral.real, before)
+    state.log_integral = integral
+    return demanded_v, angle

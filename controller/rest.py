@@ -1,0 +1,79 @@
+"""The force at rest: what the vibration of the moment will need once it keeps still."""
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from controller.detector import phase_lag
+from controller.primitives import size, wrap
+from controller.settings import Settings
+from vibrolock.compiled import Record, inner_kernel
+
+__all__ = ["REST", "REST_STATE", "RestSettings"]
+
+REST = np.dtype([("gain", "f8"), ("share", "f8"), ("mode_shape_squared", "f8"), ("dt_s", "f8")])
+"""Parameters of the estimate (one record): step of the low-pass behind the response's rate of change, 0 where force and lag are
+taken as they are; part of the force behind that rate which is taken out; the drive point's mode shape squared (1/kg)."""
+
+REST_STATE = np.dtype([("late_force", "c16"), ("late_drive", "c16")])
+"""State of the estimate (one record): fundamentals that have passed one more low-pass."""
+
+
+class RestSettings(Settings):
+    """Whether the laws go by the force that is left at rest."""
+
+    rest_low_pass_rad_s: float = Field(0.0, ge=0, le=1e4)
+    """Where above 0, frequency error and force through response go by the force that is left once the response keeps still:
+    the part that changes it is taken out, with this corner for its rate of change, rad/s; w_LP is a good value. Neither then
+    waits for the structure."""
+    rest_share: float = Field(0.8, ge=0, le=1)
+    """Part of that force which is taken out; what is left is room for a mode shape that is too small, with which the level
+    runs away. Too large a mode shape only slows the loops down."""
+
+    def build_rest(self, sample_rate_hz: float, drive_mode_shape: float | None) -> np.ndarray:
+        """One record of `REST`; ValueError where the mode shape (kg^-1/2) is needed and missing."""
+        if drive_mode_shape is None and self.rest_low_pass_rad_s > 0.0:
+            raise ValueError(
+                "drive_mode_shape: rest_low_pass_rad_s needs it, here or as specimen.drive_mode_shape of the bench"
+            )
+        out = np.zeros(1, REST)
+        out["gain"] = -math.expm1(-self.rest_low_pass_rad_s / sample_rate_hz)
+        out["share"] = self.rest_share
+        out["mode_shape_squared"] = (drive_mode_shape or 0.0) ** 2
+        out["dt_s"] = 1.0 / sample_rate_hz
+        return out
+
+
+@inner_kernel
+def take_as_measured(state: Record, vibration: Record) -> None:
+    """No estimate: force, motion and phase error at rest are those measured."""
+    state.late_force, state.late_drive = vibration.force, vibration.drive
+    vibration.rest_force_n, vibration.rest_drive_m_s2 = vibration.force_n, vibration.drive_m_s2
+    vibration.rest_error_rad = vibration.error_rad
+
+
+@inner_kernel
+def see_rest(
+    parameters: Record, state: Record, vibration: Record, omega: float, wanted_lag: float, lag_of_skew: float
+) -> None:
+    """One sample of the estimate, for an oscillator at ``omega`` (rad/s) under a loop that wants ``wanted_lag`` (rad).
+
+    A mode whose displacement X grows and turns slowly takes ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``; its last
+    term, by the acceleration's amplitude ``2 i/(W phi_d^2) dA/dt``, is zero at rest. Force and motion pass one more low-pass
+    for the derivative. With ``gain`` 0 force and lag are those measured.
+    """
+    if parameters.gain == 0.0:
+        take_as_measured(state, vibration)
+        return
+    drive = vibration.drive
+    if lag_of_skew != 0.0:
+        drive *= complex(math.cos(lag_of_skew), math.sin(lag_of_skew))
+    state.late_force += parameters.gain * (vibration.force - state.late_force)
+    step = parameters.gain * (drive - state.late_drive)
+    state.late_drive += step
+    rest = state.late_force + step * complex(
+        0.0, 2.0 * parameters.share / (omega * parameters.mode_shape_squared * parameters.dt_s)
+    )
+    vibration.rest_force_n, vibration.rest_drive_m_s2 = size(rest), size(state.late_drive)
+    vibration.rest_error_rad = wrap(wanted_lag - phase_lag(rest, state.late_drive))

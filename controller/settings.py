@@ -1,0 +1,11 @@
+"""The base of every group of settings of `[controller]`."""
+
+from pydantic import BaseModel, ConfigDict
+
+__all__ = ["Settings"]
+
+
+class Settings(BaseModel):
+    """Settings in SI units: validated, frozen, without unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

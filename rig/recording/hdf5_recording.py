@@ -1,0 +1,145 @@
+"""The HDF5 layout of a recording, written and read (described for other programs in ``docs/file-format.md``)."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import RecordingError
+from rig.recording.header import Column, Header
+from rig.recording.integrity import VERIFIED
+from rig.recording.layout import file_integrity, identify, kind_in, reading
+from rig.recording.parts import Part, rows_at_once
+from rig.recording.tables import StoredTexts, write_object, write_table
+
+__all__ = ["StoredPart", "read_recording", "recording_integrity", "taken_over", "write_recording"]
+
+_TAKEN_OVER = "taken over from an unverified file"
+
+
+class StoredPart(Part):
+    """A part in an open HDF5 file, its group ``/parts/N``."""
+
+    def __init__(self, group: Any, texts: StoredTexts, path: Path) -> None:
+        self._group, self._path = group, path
+        self.information = texts.object(group, "information")
+        self.points, self.events = texts.table(group, "points"), texts.table(group, "events")
+        self.end = texts.object(group, "end") if "end" in group else None
+        columns = texts.table(group, "columns")
+        self.columns = tuple(Column(c["name"], c["unit"], c["description"]) for c in columns)
+        self.row_dtype = np.dtype([(c["name"], c["dtype"], tuple(c["shape"])) for c in columns])
+        self.n_rows = int(group.attrs["n_rows"])
+        self.dropped_bytes = int(group.attrs["dropped_bytes"])
+        self.dropped_reason = str(group.attrs["dropped_reason"])
+        for name in self.row_dtype.names or ():
+            values, wanted = group["rows"][name], self.row_dtype[name]
+            if values.shape != (self.n_rows, *wanted.shape) or values.dtype != wanted.base:
+                raise RecordingError(f"{path}: damaged: {values.name} is {values.dtype} of shape {values.shape}")
+
+    def read(self, start: int, stop: int) -> NDArray[Any]:
+        """Read rows from the datasets of all fields; see ``Part.read``."""
+        rows = np.empty(stop - start, self.row_dtype)
+        for name in self.row_dtype.names or ():
+            rows[name] = self._read_field(name, start, stop)
+        return rows
+
+    def _read_field(self, field: str, start: int, stop: int) -> NDArray[Any]:
+        if not self._group:
+            raise RecordingError(f"{self._path}: is closed")
+        with reading(self._path):
+            values: NDArray[Any] = self._group["rows"][field][start:stop]
+            return values
+
+
+def recording_integrity(file: Any, path: Path) -> str:
+    """Integrity of an open recording; one that took parts over from an unverified file is unverified for good."""
+    found = file_integrity(path)
+    return f"unverified: {file.attrs['unverified']}" if found == VERIFIED and "unverified" in file.attrs else found
+
+
+def taken_over(integrity: str, n_parts: int) -> str:
+    """Why a new file that takes over ``n_parts`` of a file with this ``integrity`` is unverified; empty if it is verified."""
+    if integrity == VERIFIED or n_parts == 0:
+        return ""
+    told = integrity.removeprefix("unverified: ")
+    return told if told.startswith(_TAKEN_OVER) else f"{_TAKEN_OVER}: parts 0 to {n_parts - 1}: {told}"
+
+
+def write_recording(
+    file: Any, header: Header, parts: Iterable[Part], check: Callable[[], None], unverified: str = ""
+) -> None:
+    """Write a whole recording into an open new file; ``check`` raises once the disk is full."""
+    identify(file, header.kind)
+    if unverified:
+        file.attrs["unverified"] = unverified
+    for name in ("software_version", "started", "identity"):
+        file.attrs[name] = getattr(header, name)
+    if header.seed is not None:
+        file.attrs["seed"] = np.uint64(header.seed)
+    write_object(file, "configuration", header.configuration)
+    write_table(file, "channels", header.channels)
+    group = file.create_group("parts")
+    for number, part in enumerate(parts):
+        _write_part(group.create_group(str(number)), part, check)
+
+
+def _write_part(group: Any, part: Part, check: Callable[[], None]) -> None:
+    group.attrs["n_rows"], group.attrs["dropped_bytes"] = part.n_rows, part.dropped_bytes
+    group.attrs["dropped_reason"] = part.dropped_reason
+    write_object(group, "information", part.information)
+    write_table(group, "points", part.points)
+    write_table(group, "events", part.events)
+    if part.end is not None:
+        write_object(group, "end", part.end)
+    columns = [(column, part.row_dtype[column.name]) for column in part.columns]
+    described = [{**vars(column), "dtype": field.base.str, "shape": list(field.shape)} for column, field in columns]
+    write_table(group, "columns", described)
+    step = rows_at_once(part.row_dtype)
+    datasets = {column.name: _row_dataset(group, column, field, part.n_rows, step) for column, field in columns}
+    for start in range(0, part.n_rows, step):
+        stop = min(start + step, part.n_rows)
+        rows = part.read(start, stop)
+        for name, dataset in datasets.items():
+            dataset[start:stop] = rows[name]
+        check()
+
+
+def _row_dataset(group: Any, column: Column, field: np.dtype[Any], n_rows: int, step: int) -> Any:
+    storage: dict[str, Any] = {}
+    if n_rows:
+        chunk = (min(step, n_rows), *field.shape)
+        storage = {"chunks": chunk, "compression": "lzf", "shuffle": True, "fletcher32": True}
+    dataset = group.create_dataset(f"rows/{column.name}", (n_rows, *field.shape), field.base, **storage)
+    dataset.attrs["unit"], dataset.attrs["description"] = column.unit, column.description
+    return dataset
+
+
+def read_recording(file: Any, path: Path) -> tuple[Header, list[StoredPart]]:
+    """Read an open recording; its rows stay in the file.
+
+    Returns:
+        Header, with rows as in the last part and ``first_part`` the number of parts; and the parts.
+
+    Raises:
+        RecordingError: it is a file of another kind, or damaged.
+    """
+    with reading(path):
+        if "parts" not in file:
+            raise RecordingError(f"{path}: is no recording but a file of kind {kind_in(file)!r}")
+        texts = StoredTexts(path.stat().st_size)
+        parts = [StoredPart(file["parts"][str(number)], texts, path) for number in range(len(file["parts"]))]
+        header = Header(
+            kind=kind_in(file),
+            configuration=texts.object(file, "configuration"),
+            channels=texts.table(file, "channels"),
+            row_dtype=parts[-1].row_dtype,
+            columns=parts[-1].columns,
+            software_version=str(file.attrs["software_version"]),
+            started=str(file.attrs["started"]),
+            seed=int(file.attrs["seed"]) if "seed" in file.attrs else None,
+            first_part=len(parts),
+            identity=str(file.attrs["identity"]),
+        )
+    return header, parts

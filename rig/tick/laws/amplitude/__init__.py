@@ -1,1 +1,0 @@
-"""The amplitude laws within the tick."""

@@ -1,1 +1,0 @@
-"""The frequency law within the tick."""

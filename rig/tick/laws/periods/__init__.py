@@ -1,1 +1,0 @@
-"""The periods of the oscillator within the tick."""

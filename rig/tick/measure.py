@@ -1,0 +1,96 @@
+"""Compiled reading of the inputs: checks, scaling, means, and what stands for a sample that was lost."""
+
+import math
+
+import numpy as np
+
+from controller.primitives import track
+from rig.tick.layout import SENSOR_AT_RANGE, TickArrays
+from rig.tick.safety.kernels import SENSOR_OVERLOAD, carry_motion, watch_gap, watch_input, watch_motion
+from rig.tick.safety.layout import ARMED
+from rig.tick.sequencer.layout import WAVEFORM
+from vibrolock.compiled import kernel
+
+STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
+
+
+@kernel
+def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tuple[bool, bool]:
+    """A reading that is not plainly in order: watch it; returns whether it may be used, and whether it is a motion.
+
+    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel. So would the
+    gap that is left without it: from then on the channel tells nothing of a motion any more.
+    """
+    guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
+    channel, watch = t.inputs[index], t.watches[index]
+    usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
+    within = usable and abs(volts * channel.unit_per_volt) <= channel.limit
+    if not within or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD):
+        watch.distrusted = 1
+    return usable, watch.distrusted == 0 and watch.same_samples < STUCK_SAMPLES
+
+
+@kernel
+def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
+    """Check and convert every input channel; returns the telemetry flags of the inputs."""
+    loop, guard, limits = t.loop[0], t.guard[0], t.limits[0]
+    armed = guard.mode == ARMED
+    driven = armed and (loop.held == 1 or t.progress[0].start_level > 0.0)  # in a ramp from a level, too
+    # At first the mean of all samples seen so far: noise or ambient vibration in a single one would be integrated as travel.
+    mean_gain = max(t.law[0].detector.mean_gain, 1.0 / (loop.seen + 1.0))
+    loop.seen += 1
+    flags = 0
+    force = 0.0
+    drive = 0.0
+    for index in range(t.inputs.size):
+        channel, watch = t.inputs[index], t.watches[index]
+        volt = volts[index]
+        value = volt * channel.unit_per_volt
+        readings[index] = value
+        moves = True
+        in_order = armed and abs(volt) < channel.alarm_v and volt != watch.last_v and watch.alert == 0
+        if in_order:
+            watch.last_v = volt
+        else:
+            usable, moves = examine_input(t, index, volt, driven)
+            if not usable:
+                continue
+            if watch.overload_samples > 0:
+                flags |= SENSOR_AT_RANGE
+        mean = track(watch.mean, value, mean_gain)
+        watch.mean = mean
+        value -= mean
+        if index == loop.force_channel:
+            force = value
+        if index == loop.drive_channel:
+            drive = value
+        if channel.watch_displacement == 1 and moves:
+            watch_motion(guard, limits, watch, value, index, loop.sample)
+    loop.force, loop.drive_motion = force, drive
+    return flags
+
+
+@kernel
+def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
+    """A sample that was lost on its way: nothing is read, the motion goes on as it was, a long gap trips.
+
+    For force and drive stand the fundamentals as they are known: so a detector's ripple goes on as well, and does not turn
+    into an error of the phase by stopping anywhere.
+    """
+    loop, limits, vibration = t.loop[0], t.limits[0], t.control[0].vibration
+    dt, mean_gain = loop.dt_s, t.law[0].detector.mean_gain
+    readings[:] = math.nan
+    loop.lost += 1
+    omega = limits.resonance_rad_s if loop.drive == WAVEFORM else t.control[0].frequency.omega
+    cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
+    for index in range(t.inputs.size):
+        if t.inputs[index].watch_displacement == 1:
+            watch = t.watches[index]
+            # The mean swings a little with the vibration: held anywhere, it would be integrated as travel for seconds.
+            watch.mean += mean_gain * carry_motion(limits, watch, cos_step, sin_step, omega)
+    force, drive = vibration.force, vibration.drive
+    loop.force = force.real * cos_theta - force.imag * sin_theta
+    t.watches[loop.force_channel].mean += mean_gain * loop.force
+    loop.drive_motion = drive.real * cos_theta - drive.imag * sin_theta
+    watch_gap(t.guard[0], limits, loop.lost, loop.sample, dt)
+    return 0

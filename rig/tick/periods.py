@@ -1,0 +1,63 @@
+"""Compiled end of a period: lock state, settle rule and the watch on the rig take its means."""
+
+import math
+
+from controller.amplitude import RESPONSE, VOLTAGE
+from controller.lock import LOCKED, next_lock_state
+from controller.period import end_period
+from rig.tick.layout import TickArrays
+from rig.tick.safety.following import follow_level, see_frequency, silent_side
+from rig.tick.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
+from rig.tick.safety.layout import ARMED
+from rig.tick.sequencer.judgement import judge_period
+from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
+from vibrolock.compiled import kernel
+
+
+@kernel
+def judge_following(t: TickArrays) -> None:
+    """Trip where a law that holds a level raises the output and what it holds stays away."""
+    loop, control, guard, following = t.loop[0], t.control[0], t.guard[0], t.following[0]
+    law, lock = control.amplitude.law, control.lock
+    force, response = control.period.force_n, control.period.drive_m_s2
+    see_frequency(t.expected[0], following, control.frequency.omega)
+    if guard.mode != ARMED:
+        return
+    if loop.drive == LOOP_DRIVE and t.progress[0].unlocked == 1:
+        side = silent_side(t.expected[0], following, force, response)
+        if side > 0:
+            channel = loop.force_channel if side == 1 else loop.drive_channel
+            shut_down(guard, SENSOR_STUCK, channel, force if side == 1 else response, loop.sample, False)
+    if law == VOLTAGE:
+        return
+    slipping, tone = lock.state == LOCKED and lock.far_periods > 0, loop.drive == TONE
+    if follow_level(t.expected[0], following, control.period, t.progress[0].level, law, slipping, tone):
+        channel = loop.drive_channel if law == RESPONSE else loop.force_channel
+        value = response if law == RESPONSE else control.period.held
+        shut_down(guard, LEVEL_NOT_FOLLOWED, channel, value, loop.sample, False)
+
+
+@kernel
+def close_period(t: TickArrays) -> None:
+    """An oscillator period has ended at the inputs."""
+    loop, control = t.loop[0], t.control[0]
+    period, amplitude, lock = control.period, control.amplitude, control.lock
+    if not end_period(period):
+        return
+    control.frequency.mean_error_rad = period.error_rad
+    if loop.drive == WAVEFORM:
+        return
+    present = control.vibration.present == 1
+    if not present:
+        period.error_rad = math.nan
+    open_loop = loop.drive == TONE
+    if not open_loop:
+        next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad)
+    # Where a loop holds the level, its own error says whether the output may; its ripple may be cut all the time.
+    behind = amplitude.output.behind != 0 and amplitude.law == VOLTAGE
+    locked = (open_loop or lock.state == LOCKED) and not behind
+    period.output_v = t.guard[0].amplitude_v
+    period.saturated, period.clamped = amplitude.saturated, control.frequency.clamped
+    wanted = t.progress[0].level if amplitude.law != VOLTAGE else 0.0
+    judge_period(t.settling[0], t.rule[0], period, wanted, locked, open_loop or amplitude.law == RESPONSE)
+    judge_following(t)

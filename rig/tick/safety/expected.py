@@ -1,0 +1,58 @@
+"""What is known before a run of the output that force and motion need: the record that the watch reads."""
+
+import math
+
+import numpy as np
+
+from controller.tuning import PlantModel
+from rig.bench import Bench
+from rig.tick.safety.following import EXPECTED, VISIBLE
+
+__all__ = ["expected_record"]
+
+JUDGED = 16.0  # times that smallest amplitude, and
+NOISES = 8.0  # times the noise that the bench states for a channel (RMS), from which on the exciter is judged
+TOLD_APART = 3.0
+FLOOR_PART = 0.025  # of the largest voltage: where the output may always be
+
+
+def expected_record(
+    bench: Bench, smallest_n: float, smallest_m_s2: float, exciter: PlantModel | None = None
+) -> np.ndarray:
+    """One record of `rig.tick.safety.following.EXPECTED`.
+
+    ``smallest_n`` and ``smallest_m_s2`` are the smallest amplitudes of which a phase can be read. Of the plant only the
+    ``exciter`` counts: it is the part that a nonlinear structure leaves as it is.
+    """
+    force, drive = (bench.channels[bench.index_of(role)] for role in ("force", "drive"))
+    out = np.zeros(1, EXPECTED)
+    out["visible_n"], out["visible_m_s2"] = VISIBLE * smallest_n, VISIBLE * smallest_m_s2
+    out["noise_n"] = JUDGED * smallest_n + NOISES * force.noise_rms
+    out["noise_m_s2"] = JUDGED * smallest_m_s2 + NOISES * drive.noise_rms
+    out["floor_v"] = FLOOR_PART * bench.limits.voltage_v
+    out["force_skew_s"] = force.skew_samples / bench.sample_rate_hz
+    out["drive_skew_s"] = drive.skew_samples / bench.sample_rate_hz
+    if exciter is not None:
+        out["known"] = 1
+        out["force_v_n"], out["acceleration_v_s2_m"] = exciter.force_v_n, exciter.acceleration_v_s2_m
+        out["centre_rad_s"] = exciter.centre_rad_s
+        out["lowest_rad_s"], out["highest_rad_s"] = known_band_rad_s(exciter)
+    return out
+
+
+def known_band_rad_s(plant: PlantModel) -> tuple[float, float]:
+    """Lowest and highest frequency (rad/s) at which a linear test has told alpha from beta.
+
+    Of ``u = (alpha + beta Y) F`` it has seen the sum. Beta stands out where the structure resonates, and is extrapolated
+    elsewhere: on the magnet beam, 3 % above the resonance, it is off by a factor of three. So the band is that in which
+    ``|beta Y|`` is `TOLD_APART` times ``|alpha|``, and half a bandwidth on each side of the resonance at the least.
+    """
+    lock, half = plant.lock_frequency_rad_s(), plant.damping_ratio * plant.frequency_rad_s
+    omega = lock + half * np.linspace(-50.0, 50.0, 2001)
+    omega = omega[(omega > 2.0 * math.pi * plant.band_hz[0]) & (omega < 2.0 * math.pi * plant.band_hz[1])]
+    alpha, beta = plant.exciter(1j * omega)
+    told = np.abs(beta * plant.accelerance(1j * omega)) >= TOLD_APART * np.abs(alpha)
+    apart = omega[~told]
+    lowest = max(apart[apart < lock], default=omega[0])
+    highest = min(apart[apart > lock], default=omega[-1])
+    return float(min(lowest, lock - half)), float(max(highest, lock + half))

@@ -1,0 +1,163 @@
+"""Compiled judgement of every period: the settle rule, and whether a segment has failed."""
+
+import math
+
+import numpy as np
+
+from controller.lock import LOCKED, LOST, SEARCHING
+from rig.tick.sequencer.layout import RECORD, SETTLE, Outcome
+from vibrolock.compiled import Record, kernel
+
+__all__ = ["LONGEST_AVERAGE", "SETTLE_RULE", "SETTLING"]
+
+RUNNING = int(Outcome.RUNNING)
+DONE = int(Outcome.DONE)
+NOT_SETTLED = int(Outcome.NOT_SETTLED)
+DISTURBED = int(Outcome.DISTURBED)
+LOST_LOCK = int(Outcome.LOST_LOCK)
+UNREACHABLE = int(Outcome.UNREACHABLE)
+OUTSIDE_WINDOW = int(Outcome.OUTSIDE_WINDOW)
+NOT_LOCKED = int(Outcome.NOT_LOCKED)
+
+SATURATED_PERIODS = 20
+CLAMPED_PERIODS = 20
+FAR_PERIODS = 100  # a lock that swings at plain voltage comes near within the memory of a lightly damped mode
+LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
+
+SETTLE_RULE = np.dtype([("phase_rad", "f8"), ("amplitude", "f8"), ("average_periods", "i8"), ("settled_periods", "i8")])
+"""The settle rule (one record); see `judge_period`."""
+
+LONGEST_AVERAGE = 64
+
+SETTLING = np.dtype(
+    [
+        ("errors", "f8", (2 * LONGEST_AVERAGE,)),
+        ("responses", "f8", (2 * LONGEST_AVERAGE,)),
+        ("forces", "f8", (2 * LONGEST_AVERAGE,)),
+        ("controlled", "f8", (2 * LONGEST_AVERAGE,)),
+        ("count", "i8"),
+        ("good_periods", "i8"),
+        ("bad_periods", "i8"),
+        ("saturated_periods", "i8"),
+        ("clamped_periods", "i8"),
+        ("clamped_in_row", "i8"),
+        ("mean_error_rad", "f8"),
+        ("drift", "f8"),
+    ]
+)
+"""Period means of the last periods, as a ring, and what the settle rule made of them (one record).
+``clamped_in_row`` counts at any time, ``clamped_periods`` since the present settling."""
+
+
+@kernel
+def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
+    """Mean of the ``periods`` entries of a ring that end with entry number ``last`` (counted from 0 since the start)."""
+    total = 0.0
+    for back in range(periods):
+        total += ring[(last - back) % (2 * LONGEST_AVERAGE)]
+    return total / periods
+
+
+@kernel
+def judge_period(
+    settling: Record, rule: Record, period: Record, wanted: float, locked: bool, watch_force: bool
+) -> None:
+    """Take in the means of a ``period`` (of `controller.period.PERIOD`) and apply the settle rule.
+
+    Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the
+    averaged response amplitude within ``amplitude`` (relative) of what it was that many periods before, for
+    ``settled_periods`` in a row. Where a loop holds the level, what it holds must on average be within ``amplitude`` of
+    what is ``wanted`` (0: there is no loop). With ``watch_force`` (open loop, held response) the force must keep still too.
+    """
+    n = rule.average_periods
+    slot = settling.count % (2 * LONGEST_AVERAGE)
+    settling.errors[slot] = period.error_rad
+    settling.responses[slot] = period.drive_m_s2
+    settling.forces[slot] = period.force_n
+    settling.controlled[slot] = period.held
+    settling.clamped_in_row = settling.clamped_in_row + 1 if period.clamped == 1 else 0
+    last = settling.count
+    settling.count += 1
+    if settling.count < 2 * n:
+        return
+    settling.mean_error_rad = mean_of(settling.errors, last, n)
+    new, old = mean_of(settling.responses, last, n), mean_of(settling.responses, last - n, n)
+    drift = (new - old) / new if new > 0.0 else math.inf
+    if wanted > 0.0:
+        miss = mean_of(settling.controlled, last, n) / wanted - 1.0
+        drift = miss if abs(miss) > abs(drift) else drift
+    if watch_force:
+        new = mean_of(settling.forces, last, n)
+        moved = (new - mean_of(settling.forces, last - n, n)) / new if new > 0.0 else math.inf
+        drift = moved if abs(moved) > abs(drift) else drift
+    settling.drift = drift
+    off = math.inf  # where a phase could not be read, too
+    if math.isfinite(settling.mean_error_rad):
+        off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
+    settling.good_periods = settling.good_periods + 1 if locked and off <= 1.0 else 0
+    settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
+    unreached = period.saturated == 1 and abs(drift) > 2.0 * rule.amplitude
+    settling.saturated_periods = settling.saturated_periods + 1 if unreached else 0
+    settling.clamped_periods = settling.clamped_periods + 1 if period.clamped == 1 else 0
+
+
+@kernel
+def forget_periods(settling: Record) -> None:
+    """Begin a new settling: periods before the level was reached do not count."""
+    settling.count = 0
+    settling.good_periods = 0
+    settling.bad_periods = 0
+    settling.saturated_periods = 0
+    settling.clamped_periods = 0
+    settling.mean_error_rad = math.nan
+    settling.drift = math.nan
+
+
+@kernel
+def is_slipping(lock: Record) -> bool:
+    """Whether a lock is about to be lost: far off, but not for long enough. What fails meanwhile fails for that."""
+    return bool(lock.state == LOCKED and lock.far_periods > 0)
+
+
+@kernel
+def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed: float, periods: float) -> int:
+    """Outcome code of a held segment that has failed, or RUNNING."""
+    if lock.state == LOST:
+        return LOST_LOCK
+    if settling.saturated_periods >= SATURATED_PERIODS:
+        return UNREACHABLE
+    if settling.clamped_periods >= CLAMPED_PERIODS:
+        return OUTSIDE_WINDOW
+    if is_slipping(lock):
+        return RUNNING
+    if kind == RECORD and settling.bad_periods >= rule.average_periods:
+        return DISTURBED
+    if kind == SETTLE and elapsed >= periods:
+        return NOT_SETTLED
+    return RUNNING
+
+
+@kernel
+def was_always_far(lock: Record, elapsed: float) -> bool:
+    """Whether the phase was that of a lost lock in every period of a segment, and in 100 at the least."""
+    return bool(lock.far_periods >= max(FAR_PERIODS, math.floor(elapsed) - 1))
+
+
+@kernel
+def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
+    """Whether the time at the start voltage, over by its length, ends: DONE, a failure's code, or RUNNING while in doubt.
+
+    No lock is needed, for one may swing in and out at plain voltage. Refused is a force or motion too small to be read, a
+    frequency that stands at an end of its window for 20 periods, or a phase error that was that of a lost lock in every
+    period so far, for 100 at the least.
+    """
+    if lock.state == LOCKED:
+        return DONE
+    if lock.state == SEARCHING:
+        return NOT_SETTLED
+    if settling.clamped_in_row >= CLAMPED_PERIODS:
+        return OUTSIDE_WINDOW
+    if was_always_far(lock, elapsed):
+        return NOT_LOCKED
+    always_far = lock.far_periods > 0 and lock.far_periods >= math.floor(elapsed) - 1
+    return RUNNING if always_far or settling.clamped_in_row > 0 else DONE

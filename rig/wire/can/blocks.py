@@ -1,0 +1,210 @@
+"""How blocks of samples or outputs are spread over frames, and put together again from frames that may be lost."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.errors import DaqMismatch, DaqRefused
+from rig.wire.can.frames import Frame, padded_length
+from rig.wire.can.protocol import FrameKind, Protocol, Shape
+from rig.wire.messages import Stream
+
+__all__ = ["COUNT", "OPEN_BLOCKS", "Blocks", "Piece", "StreamFrames", "check_stream"]
+
+COUNT = np.dtype("<i2")
+
+
+def check_stream(shape: Shape, stream: Stream) -> None:
+    """Raise `DaqRefused` for a block or a resolution that frames cannot carry, `DaqMismatch` for other channels."""
+    if stream.n_channels != shape.n_channels:
+        raise DaqMismatch(f"{stream.n_channels} channels, but the bus is defined for {shape.n_channels}")
+    if stream.bits != 16:
+        raise DaqRefused(f"counts of {stream.bits} bits: allowed over CAN is 16")
+    if not 1 <= stream.block <= shape.largest_block:
+        raise DaqRefused(
+            f"block = {stream.block}: allowed over {'CAN FD' if shape.fd else 'classical CAN'} with "
+            f"{shape.n_channels} channels is 1 to {shape.largest_block} samples"
+        )
+
+
+class Piece(NamedTuple):
+    """The part of a block that one frame carries."""
+
+    rows: slice
+    columns: slice
+    shape: tuple[int, int]
+    size: int
+    """Counts."""
+    n_bytes: int
+    """Of the frame's data, with header and padding."""
+    padding: bytes
+
+
+class StreamFrames:
+    """The frames of one direction, for blocks of one size: `rig.wire.can.protocol.Shape` worked out.
+
+    The sequence numbers wrap after whole blocks, so that after a loss frames of two blocks are never combined to one.
+    """
+
+    def __init__(self, protocol: Protocol, kind: FrameKind, block: int) -> None:
+        shape, outputs = protocol.shape, kind is FrameKind.OUTPUT
+        self.fd, self.header = shape.fd, shape.header
+        self.block = block
+        self.n_channels = 1 if outputs else shape.n_channels
+        self.rows = shape.output_rows if outputs else shape.rows
+        """Rows of a group; the last one of a block may have fewer."""
+        self.parts = 1 if outputs else shape.parts
+        """Frames of a group."""
+        self.groups = -(-block // self.rows)
+        """Groups of a block."""
+        wrap = shape.output_wrap if outputs else shape.wrap
+        self.wrap = wrap - wrap % self.groups
+        """Sequence numbers."""
+        columns = (slice(0, 1),) if outputs else tuple(shape.columns(part) for part in range(self.parts))
+        self.pieces = tuple(
+            tuple(self._piece(group * self.rows, part) for part in columns) for group in range(self.groups)
+        )
+        """By group within the block, and part."""
+        numbers = self.parts if self.fd else self.wrap * self.parts
+        self._identifiers = tuple(protocol.identifiers[kind, number] for number in range(numbers))
+
+    def _piece(self, first: int, columns: slice) -> Piece:
+        rows = min(self.rows, self.block - first)
+        size = rows * (columns.stop - columns.start)
+        used = self.header + 2 * size
+        n_bytes = padded_length(used) if self.fd else used
+        shape = rows, columns.stop - columns.start
+        return Piece(slice(first, first + rows), columns, shape, size, n_bytes, bytes(n_bytes - used))
+
+    def sequence_of(self, first: int) -> int:
+        """The sequence number with which the block from sample ``first`` on begins."""
+        return first // self.block * self.groups % self.wrap
+
+    def frames(self, first: int, counts: np.ndarray, flags: int) -> list[Frame]:
+        """The frames of a block: counts int16 [n, n_channels], or [n] for outputs."""
+        counts = counts.astype(COUNT, copy=False)
+        sequence, out, parts = self.sequence_of(first), [], self.parts
+        for pieces in self.pieces:
+            for part, piece in enumerate(pieces):
+                data = (counts[piece.rows] if parts == 1 else counts[piece.rows, piece.columns]).tobytes()
+                if self.fd:
+                    data = b"%c%c%b%b" % (sequence, flags & 0xFF, data, piece.padding)
+                    out.append(Frame(self._identifiers[part], data, True))
+                else:
+                    out.append(Frame(self._identifiers[sequence * parts + part], data))
+            sequence += 1  # within a block it never comes to the wrap
+        return out
+
+
+OPEN_BLOCKS = 4
+"""Blocks that may be incomplete at the same time; the oldest is dropped for a further one."""
+
+
+_NEVER = 1 << 30
+INDICES = 1 << 32  # a frame has 32 bits for the index of a sample
+
+
+class _Open:
+    """An incomplete block."""
+
+    def __init__(self, shape: tuple[int, int], n_frames: int) -> None:
+        self.counts = np.zeros(shape, np.int16)
+        self.missing = n_frames
+        self.seen = bytearray(n_frames)
+        self.flags = 0
+
+
+class Blocks:
+    """Puts blocks together from frames that may be lost, doubled or swapped.
+
+    A frame carries its sequence number, modulo ``wrap``, and its part. The number is taken as the nearest group ahead of the
+    last one if that is less than half a wrap away, else as one behind. A complete block ends all older ones. After a loss of
+    half a wrap or more, an index from another message (`mark`) corrects the numbering once a frame agrees with it.
+    """
+
+    def __init__(self, counters: dict[str, int], stream: StreamFrames) -> None:
+        self._counters = counters
+        self._wrap, self._parts = stream.wrap, stream.parts
+        self._shape = (stream.block, stream.n_channels)
+        self._per_block = stream.groups
+        self._open: dict[int, _Open] = {}
+        self._oldest = 0
+        """The first block that may still come."""
+        self._next = 0
+        """The group after the newest one."""
+        self._mark: int | None = None
+
+    def begin(self, block: int) -> None:
+        """Set the first block to come, if it is not block 0."""
+        self._oldest, self._next = block, block * self._per_block
+
+    def mark(self, sample: int) -> None:
+        """Note that ``sample``, modulo 2^32, is next; used only if it is half a wrap or more ahead of the sequence numbers."""
+        n = self._shape[0]
+        here = self._next // self._per_block * n
+        sample += INDICES * round((here - sample) / INDICES)
+        group = sample // n * self._per_block
+        far = sample % n == 0 and group - self._next >= self._wrap // 2
+        self._mark = group if far else None
+
+    def group(self, sequence: int) -> int:
+        """The group that a sequence number stands for; negative for one from before the start."""
+        base = self._next if self._mark is None or sequence != self._mark % self._wrap else self._mark
+        ahead = (sequence - base) % self._wrap
+        return base + ahead - self._wrap * (ahead >= self._wrap // 2)
+
+    def put(
+        self, group: int, part: int, piece: Piece, counts: np.ndarray, flags: int
+    ) -> tuple[int, np.ndarray, int] | None:
+        """Add the counts (int16, rows by columns) of a frame; return number, counts and flags of a block it completes."""
+        if self._mark is not None and group == self._mark:
+            self._count("resynchronised")
+            self._drop(group // self._per_block)
+        self._mark = None
+        self._next = max(self._next, group + 1)
+        block, place = divmod(group, self._per_block)
+        if block < self._oldest:
+            self._count("repeated_frames")
+            return None
+        if self._per_block * self._parts == 1:
+            self._drop(block + 1)
+            return block, counts, flags
+        return self._add(block, place * self._parts + part, piece, counts, flags)
+
+    def _add(
+        self, block: int, frame: int, piece: Piece, counts: np.ndarray, flags: int
+    ) -> tuple[int, np.ndarray, int] | None:
+        held = self._open.get(block)
+        if held is None:
+            held = self._open[block] = _Open(self._shape, self._per_block * self._parts)
+            if len(self._open) > OPEN_BLOCKS:
+                self._drop(sorted(self._open)[1])
+                if block < self._oldest:
+                    return None
+        into = held.counts[piece.rows, piece.columns]
+        if held.seen[frame]:
+            self._count("repeated_frames")
+            if not np.array_equal(into, counts):
+                held.missing = _NEVER  # the two differ and either may be wrong: the block is given up
+            return None
+        held.seen[frame] = 1
+        held.missing -= 1
+        held.flags |= flags
+        into[...] = counts
+        if held.missing:
+            return None
+        del self._open[block]
+        self._drop(block + 1)
+        return block, held.counts, held.flags
+
+    def _drop(self, oldest: int) -> None:
+        """Drop incomplete blocks before ``oldest``."""
+        self._oldest = oldest
+        if not self._open:
+            return
+        for block in [block for block in self._open if block < oldest]:
+            del self._open[block]
+            self._count("incomplete_blocks")
+
+    def _count(self, name: str) -> None:
+        self._counters[name] += 1
