@@ -1,4 +1,4 @@
-"""What of a force is neither a harmonic nor noise: another mode that the loop has woken, or a loop that swings."""
+"""The part of a force that is neither a harmonic nor noise: another mode that the loop excites, or a loop that oscillates."""
 
 import math
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ def alien_force(bench: Bench, pieces: Sequence[np.ndarray]) -> float:
     """Part of the force's RMS, in rows of whole records or pieces of one, that is no harmonic and stands out of noise.
 
     Counted are the lines of the spectrum between the harmonics of the output's frequency that are 15 times the noise there;
-    noise is the median of all that is there. So force sensors may be as noisy as they like, and harmonics beyond those that
-    are evaluated are no strangers. Within ``MAIN_LOBE`` bins of a harmonic nothing is seen. NaN where every piece is shorter
+    noise is the median of all lines there. So neither a noisy force sensor nor harmonics beyond those that are evaluated
+    raise the result. Lines within ``MAIN_LOBE`` bins of a harmonic are not counted. NaN where every piece is shorter
     than `FEWEST_PERIODS`.
     """
     spectra = [found for rows in pieces if (found := _spectrum(bench, rows)) is not None]

@@ -1,4 +1,4 @@
-"""Samples that were lost on their way: which rows of a recording, and what stands in for them where none may be missing."""
+"""Samples that were lost on their way: which rows they are, and values in their place for windows and spectra."""
 
 import math
 
@@ -15,7 +15,7 @@ def lost_rows(rows: np.ndarray) -> np.ndarray:
 
 
 def lost_warnings(rows: np.ndarray) -> list[str]:
-    """One line on how many samples are missing; none where all are there."""
+    """One line with the number of lost samples; nothing where none was lost."""
     lost = int(np.count_nonzero(lost_rows(rows)))
     return [f"{lost} of {rows.size} samples were lost on their way"] if lost else []
 
@@ -35,9 +35,9 @@ def _turns(theta_rad: np.ndarray) -> np.ndarray:
 def bridged(rows: np.ndarray) -> np.ndarray:
     """float64[n, n_channels]: the inputs, gaps filled with the mean of the readings one period before and after.
 
-    These are read at the same phase, straight between samples, so that a vibration that grows or drifts steadily is met to
-    second order. For windows and spectra that stand no hole; results within reach of a gap are left out by whoever asks.
-    Without any loss the inputs are as recorded.
+    The mean is taken at the same phase, with linear interpolation between samples, so that a vibration that grows or drifts
+    steadily is reproduced to second order. Windows and spectra need signals without holes; the caller leaves out results near
+    a gap. Without any loss the inputs are as recorded.
     """
     inputs = np.asarray(rows["inputs"].astype(float))
     lost = lost_rows(rows)

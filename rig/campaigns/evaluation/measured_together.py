@@ -1,4 +1,4 @@
-"""Segments that are evaluated together: when they are over, and as whoever evaluates them sees them."""
+"""Segments that are evaluated together: when they are over, and which rows they have."""
 
 from collections.abc import Set
 from typing import NamedTuple

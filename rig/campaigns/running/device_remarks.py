@@ -1,4 +1,4 @@
-"""What the device says of the samples of a point: its flags, samples that were lost, and outputs that came too late."""
+"""Warnings of the device about the samples of a point: its flags, lost samples, and outputs that came too late."""
 
 from collections.abc import Iterable
 from dataclasses import replace

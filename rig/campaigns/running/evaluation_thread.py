@@ -1,4 +1,4 @@
-"""Points are worked out beside the loop, so that no length of record keeps its rows waiting."""
+"""Points are evaluated in a thread beside the loop, so that a long evaluation does not keep rows waiting."""
 
 from collections import deque
 from collections.abc import Callable
@@ -20,11 +20,11 @@ class EvaluationThread:
         self._asked: deque[Future[Points]] = deque()
 
     def ask(self, step: Callable[..., Points], *arguments: Any) -> None:
-        """Have points worked out from ``arguments``, which nobody may change any more."""
+        """Request an evaluation of ``arguments``, which must not be changed any more."""
         self._asked.append(self._thread.submit(step, *arguments))
 
     def known(self, point: Point[Any]) -> None:
-        """Put in a point that needs no evaluation, behind those asked for before."""
+        """Queue a point that needs no evaluation, behind those requested before."""
         self.ask(lambda: [point])
 
     def __bool__(self) -> bool:
@@ -32,13 +32,13 @@ class EvaluationThread:
         return bool(self._asked)
 
     def ready(self) -> bool:
-        """Whether the next points are worked out."""
+        """Whether the next points are evaluated."""
         return bool(self._asked) and self._asked[0].done()
 
     def take(self) -> Points:
-        """The next points, waited for; raises what their evaluation raised."""
+        """Wait for the next points and return them; raises what their evaluation raised."""
         return self._asked.popleft().result()
 
     def close(self) -> None:
-        """End the thread once it has done what it is at."""
+        """End the thread after its present evaluation."""
         self._thread.shutdown(cancel_futures=True)

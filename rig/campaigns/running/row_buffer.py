@@ -1,4 +1,4 @@
-"""The rows of the points under way: kept until their point is over, and no longer."""
+"""Buffer of the rows of the points under way."""
 
 from collections import deque
 
@@ -8,18 +8,18 @@ __all__ = ["RowBuffer"]
 
 
 class RowBuffer:
-    """Chunks of rows in their order, by the number of their first sample."""
+    """Keeps chunks of rows, by the number of their first sample, until their point is over."""
 
     def __init__(self, dtype: np.dtype) -> None:
         self._dtype = dtype
         self._chunks: deque[tuple[int, np.ndarray]] = deque()
 
     def add(self, first: int, rows: np.ndarray) -> None:
-        """Keep a chunk that begins with sample ``first``."""
+        """Add a chunk that begins with sample ``first``."""
         self._chunks.append((first, rows))
 
     def take(self, first: int, end: int) -> np.ndarray:
-        """The rows of a point; those up to its end are kept no longer."""
+        """Return the rows of a point and forget all rows before its end."""
         out = np.empty(end - first, self._dtype)
         while self._chunks and self._chunks[0][0] < end:
             start, rows = self._chunks.popleft()
@@ -33,6 +33,6 @@ class RowBuffer:
         return out
 
     def drop_before(self, sample: int) -> None:
-        """Keep no chunk that ends before a sample."""
+        """Forget the chunks that end before a sample."""
         while self._chunks and self._chunks[0][0] + self._chunks[0][1].size <= sample:
             self._chunks.popleft()
