@@ -12,6 +12,7 @@ from rig.check.report import say
 from rig.models.files.files import KINDS
 from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
+from rig.show.progress import value_text
 from rig.text.console import number, print_table
 from rig.text.printable import printable, printable_strings
 
@@ -135,7 +136,7 @@ def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
             str(point.number + 1),
             f"{point.level:.4g}",
             point.level_unit,
-            *(number(value_of(point, column.key), column.pattern, column.scale) for column in columns),
+            *(value_text(column, point) for column in columns),
             {True: "yes", False: "no", None: "-"}[point.settled],
             str(point.quality),
         )

@@ -49,20 +49,26 @@ def with_first_repeated(targets: tuple[Target, ...]) -> tuple[Target, ...]:
 
 
 class Column(NamedTuple):
-    """A quantity of a point as it is shown: key in the point, heading, unit, format, and what it is multiplied with.
-
-    ``plain``: in a line of its own unit's company it needs no name. ``in_line``: whether it is shown while the test runs, too,
-    and not in tables alone. ``optional``: shown only where there is a value.
-    """
+    """A quantity of a point as it is shown in tables and progress lines."""
 
     key: str
+    """Name of the field of the point or of one of its parts."""
     heading: str
+    """Heading of the column."""
     unit: str
+    """Unit as it is shown."""
     pattern: str
+    """Format of the number."""
     scale: float = 1.0
+    """Factor from the stored unit to the shown one."""
     plain: bool = False
+    """Whether its heading is left out of progress lines, where the unit already identifies it."""
     in_line: bool = True
+    """Whether progress lines show it, too."""
     optional: bool = False
+    """Whether it is shown only where there is a value."""
+    counts_from: int = 0
+    """What the stored 0 is shown as: 1 for numbers that people count from 1."""
 
 
 class Plan(Configured):
