@@ -1,4 +1,7 @@
-"""The kinds of campaigns: one line for each, which stands in its own folder."""
+"""The kinds of campaigns: one line for each, which is declared in its own folder.
+
+The contract "Campaigns" in ``pyproject.toml`` names the folders, too.
+"""
 
 from rig.campaigns.backbone.points import BACKBONE
 from rig.campaigns.continuous_backbone.points import CONTINUOUS_BACKBONE

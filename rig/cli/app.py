@@ -3,28 +3,25 @@
 import io
 import os
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from rig.cli.analyse import app as analyse_app
 from rig.cli.check import check_
 from rig.cli.conformance import conformance
+from rig.cli.doctor import doctor
 from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
 from rig.cli.flags import with_flags
-from rig.cli.identify import identify, predict
+from rig.cli.identify import identify
 from rig.cli.list import list_
-from rig.cli.options import Json, Output, say_what_is_imported, show_file
+from rig.cli.options import say_what_is_imported
+from rig.cli.predict import predict
 from rig.cli.reproduce import reproduce_
-from rig.cli.run_options import of_a_further_part, of_a_recording, shown, with_run_options
+from rig.cli.run import resume, run
+from rig.cli.show import plot_, show
 from rig.cli.tune import tune_
-
-if TYPE_CHECKING:
-    from rig.arming.run_options import RunOptions
-    from rig.recording.reader import Recording
 
 __all__ = ["app", "main"]
 
@@ -56,135 +53,11 @@ app.command()(emulate)
 app.command()(conformance)
 app.command("check")(check_)
 app.command("reproduce")(reproduce_)
-
-
-@app.command()
-@with_run_options(of_a_recording)
-def run(
-    *,
-    plan: Annotated[str, typer.Argument(help="Shipped plan (magnet-beam/backbone) or TOML file.")],
-    output: Output,
-    bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
-    daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
-    options: "RunOptions",
-    json: Json = False,
-) -> None:
-    """Carry out a plan and record it."""
-    from rig.bench import load_bench
-    from rig.campaigns.plans import bench_of, load_plan
-    from rig.campaigns.running.runner import carry_out
-
-    loaded = load_plan(plan)
-    chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
-    if daq is not None:
-        chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
-    _carry(loaded.kind, options, lambda watched: carry_out(loaded, chosen, output, watched), json)
-
-
-@app.command()
-@with_run_options(of_a_further_part)
-def resume(
-    *,
-    output: Annotated[Path, typer.Argument(help="Recording of the interrupted run.")],
-    plan: Annotated[str | None, typer.Option(help="Changed plan to go on with: a name or TOML file.")] = None,
-    retry_tripped: Annotated[
-        bool, typer.Option("--retry-tripped", help="Try a level at which the run tripped again.")
-    ] = False,
-    trust_code: Annotated[
-        bool, typer.Option("--trust-code", help="Import the functions that the recording's bench names.")
-    ] = False,
-    options: "RunOptions",
-    json: Json = False,
-) -> None:
-    """Finish a run that was interrupted, by its plan or a changed one; points that were accepted stay."""
-    from rig.campaigns.plans import load_plan
-    from rig.campaigns.running.runner import take_up
-    from rig.recording.reader import Recording
-
-    with Recording(output) as recording:
-        kind = recording.kind
-    change = None if plan is None else load_plan(plan)
-    _carry(
-        kind,
-        options,
-        lambda watched: take_up(
-            output, watched, change=change, source=plan or "", retry_tripped=retry_tripped, trust_code=trust_code
-        ),
-        json,
-    )
-
-
-def _carry(kind: str, options: "RunOptions", start: "Callable[[RunOptions], Recording]", json: bool) -> None:
-    """Run, show the points as they come and how it ended; exit status 1 where the plan was not completed."""
-    from rig.campaigns.kinds import KINDS
-    from rig.recording.reader import Recording
-    from rig.show.summary import summarise_recording
-    from rig.show.tables import say_how_it_ended
-    from rig.system.stop_signals import Interrupted, Terminated, ignore_from_now_on
-    from rig.text.console import print_json
-
-    with shown(options, KINDS[kind].columns) as watched:
-        try:
-            result = start(watched)
-        except (Interrupted, Terminated) as signal:
-            if signal.recorded is None:
-                raise
-            result = Recording(signal.recorded)  # the signal came when the recording was already complete
-    ignore_from_now_on()
-    with result:
-        summary = summarise_recording(result)
-        complete, path = result.complete, result.path
-    if json:
-        print_json(summary)
-    else:
-        say_how_it_ended(summary, path)
-    if not complete:
-        raise typer.Exit(1)
-
-
-@app.command()
-def show(
-    file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")], json: Json = False
-) -> None:
-    """What is in a file: points, quality, statistics of the loop."""
-    show_file(file, json)
-
-
-@app.command("plot")
-def plot_(
-    file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
-    lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
-) -> None:
-    """Draw what is in a file."""
-    from rig.show.figure import plot
-
-    plot(file, output, lateness=lateness)
-
-
-@app.command()
-def doctor(
-    daq: Annotated[
-        str | None, typer.Option(help="Bench whose device to look at: a name or TOML file. It is given 0 V only.")
-    ] = None,
-    json: Json = False,
-) -> None:
-    """What this machine can promise: clock, privileges, disk, drivers; with --daq, what a bench's device answers."""
-    from rig.bench import load_bench
-    from rig.loop.doctor import examine, examine_bench
-    from rig.text.console import print_json
-    from rig.text.printable import printable_strings
-
-    facts = examine(Path.cwd()) if daq is None else examine_bench(load_bench(daq))
-    if json:
-        print_json(facts)
-    else:
-        for name, value in printable_strings(facts).items():
-            text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
-            text = "; ".join(value) or "none" if isinstance(value, list) else text
-            print(f"{name.replace('_', ' '):22} {text}")
-    if facts.get("failure"):
-        raise typer.Exit(1)
+app.command()(run)
+app.command()(resume)
+app.command()(show)
+app.command("plot")(plot_)
+app.command()(doctor)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""``rig identify`` and ``rig predict``: from recordings to models, from models to predictions."""
+"""``rig identify``: from recordings to models."""
 
 import sys
 from pathlib import Path
@@ -8,7 +8,7 @@ import typer
 
 from rig.cli.options import Json, Output, Overwrite, keep_existing, show_file
 
-__all__ = ["identify", "predict"]
+__all__ = ["identify"]
 
 
 def identify(
@@ -145,105 +145,3 @@ def identify(
     if isinstance(found, IdentifiedPnlss) and found.fit is not None and found.fit.interrupted:
         print(f"rig: interrupted; the best so far is in {output}, and --resume goes on", file=sys.stderr)
         raise typer.Exit(1)
-
-
-def predict(
-    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model or force surface.")],
-    output: Output,
-    forces_n: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--frequency-response",
-            metavar="FORCE_N",
-            help="Predict the frequency response at this constant force; may be repeated.",
-        ),
-    ] = None,
-    voltages_v: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--voltage-response",
-            metavar="VOLT",
-            help="Predict a PNLSS model's frequency response at this constant voltage (peak), of its input or of the "
-            "exciter; may be repeated.",
-        ),
-    ] = None,
-    held: Annotated[
-        str | None,
-        typer.Option(
-            "--force",
-            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; of a PNLSS model "
-            "driven by a force, and without an exciter, pure-sine.",
-        ),
-    ] = None,
-    sweeps: Annotated[
-        list[Path] | None, typer.Option("--sweep", help="Predict the sweeps of this recording; may be repeated.")
-    ] = None,
-    multisines: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--multisine", help="Simulate the realisations of this recording with a PNLSS model; may be repeated."
-        ),
-    ] = None,
-    planned: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--planned-sweep", metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."
-        ),
-    ] = None,
-    exciter: Annotated[
-        Path | None,
-        typer.Option(
-            help="Exciter model: sweeps are predicted from the voltage, recorded ones and planned ones. With a PNLSS model "
-            "driven by a force also responses and references at constant fundamental, RMS or voltage, with the harmonics that "
-            "the exciter makes; one driven by the voltage has its own."
-        ),
-    ] = None,
-    zero_crossings: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHICH",
-            help="Read an imposed force between its zero crossings, as the paper did: half-periods (between all of them) or "
-            "periods (those in the same direction).",
-        ),
-    ] = None,
-    modes: Annotated[Path | None, typer.Option(help="Linear model: other modes and other sensors.")] = None,
-    references: Annotated[
-        list[Path] | None,
-        typer.Option("--reference", help="Stepped sines to compare with (recorded or imported); may be repeated."),
-    ] = None,
-    over: Annotated[
-        str | None,
-        typer.Option(
-            help="Compare over frequency or phase, which tells all branches apart. "
-            "If left out: phase where the measured frequency turns back."
-        ),
-    ] = None,
-    allow_extrapolation: Annotated[
-        bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
-    ] = False,
-    overwrite: Overwrite = False,
-    json: Json = False,
-) -> None:
-    """Predict vibrations with a model, and compare them with recordings."""
-    from rig.models.files.files import save
-    from rig.models.predict.predict import predict_vibrations
-    from rig.models.predict.request import PredictionRequest
-
-    given = (model, exciter, modes, *(sweeps or ()), *(multisines or ()), *(references or ()))
-    keep_existing([path for path in given if path is not None], output, overwrite)
-    request = PredictionRequest(
-        forces_n=tuple(forces_n or ()),
-        voltages_v=tuple(voltages_v or ()),
-        held=held,
-        sweeps=tuple(sweeps or ()),
-        multisines=tuple(multisines or ()),
-        planned=tuple(planned or ()),
-        exciter=exciter,
-        zero_crossings=zero_crossings,
-        modes=modes,
-        references=tuple(references or ()),
-        over=over,
-        allow_extrapolation=allow_extrapolation,
-    )
-    save(predict_vibrations(model, request), output)
-    show_file(output, json)

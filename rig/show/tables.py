@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rig.arming.run_facts import user_name
+from rig.arming.run_facts import About, user_name
 from rig.campaigns.evaluation.point import point_name
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
@@ -105,10 +105,11 @@ def _print_drift(drift: dict[str, Any] | None) -> None:
 def _print_about(about: dict[str, Any]) -> None:
     """Who ran a part on what, where anything was said of it or something physical has moved."""
     armed = about.get("armed", {})
-    told = any(about.get(key) for key in ("specimen_serial", "notes", "remarks"))
+    said = [name for name in (*About.single(), "notes", "remarks") if name != "operator"]
+    told = any(about.get(name) for name in said)
     if not told and armed.get("how", "virtual") == "virtual" and about.get("operator") == user_name():
         return
-    for name in ("operator", "specimen_serial"):
+    for name in About.single():
         if about.get(name):
             print(f"  {name.replace('_', ' ')}: {about[name]}")
     if armed.get("how", "virtual") != "virtual":

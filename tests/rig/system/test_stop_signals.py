@@ -10,7 +10,7 @@ import rig
 from rig.arming.run_options import RunOptions, Silent
 from rig.bench import load_bench
 from rig.campaigns.running.runner import carry_out
-from rig.cli.app import _carry
+from rig.cli.run import _carry
 from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording

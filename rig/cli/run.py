@@ -1,0 +1,98 @@
+"""``rig run`` and ``rig resume``: carry out a plan, and finish a run that was interrupted."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.options import Json, Output
+from rig.cli.run_options import of_a_further_part, of_a_recording, shown, with_run_options
+
+if TYPE_CHECKING:
+    from rig.arming.run_options import RunOptions
+    from rig.recording.reader import Recording
+
+__all__ = ["resume", "run"]
+
+
+@with_run_options(of_a_recording)
+def run(
+    *,
+    plan: Annotated[str, typer.Argument(help="Shipped plan (magnet-beam/backbone) or TOML file.")],
+    output: Output,
+    bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
+    daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
+    options: "RunOptions",
+    json: Json = False,
+) -> None:
+    """Carry out a plan and record it."""
+    from rig.bench import load_bench
+    from rig.campaigns.plans import bench_of, load_plan
+    from rig.campaigns.running.runner import carry_out
+
+    loaded = load_plan(plan)
+    chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
+    if daq is not None:
+        chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
+    _carry(loaded.kind, options, lambda watched: carry_out(loaded, chosen, output, watched), json)
+
+
+@with_run_options(of_a_further_part)
+def resume(
+    *,
+    output: Annotated[Path, typer.Argument(help="Recording of the interrupted run.")],
+    plan: Annotated[str | None, typer.Option(help="Changed plan to go on with: a name or TOML file.")] = None,
+    retry_tripped: Annotated[
+        bool, typer.Option("--retry-tripped", help="Try a level at which the run tripped again.")
+    ] = False,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Import the functions that the recording's bench names.")
+    ] = False,
+    options: "RunOptions",
+    json: Json = False,
+) -> None:
+    """Finish a run that was interrupted, by its plan or a changed one; points that were accepted stay."""
+    from rig.campaigns.plans import load_plan
+    from rig.campaigns.running.runner import take_up
+    from rig.recording.reader import Recording
+
+    with Recording(output) as recording:
+        kind = recording.kind
+    change = None if plan is None else load_plan(plan)
+    _carry(
+        kind,
+        options,
+        lambda watched: take_up(
+            output, watched, change=change, source=plan or "", retry_tripped=retry_tripped, trust_code=trust_code
+        ),
+        json,
+    )
+
+
+def _carry(kind: str, options: "RunOptions", start: "Callable[[RunOptions], Recording]", json: bool) -> None:
+    """Run, show the points as they come and how it ended; exit status 1 where the plan was not completed."""
+    from rig.campaigns.kinds import KINDS
+    from rig.recording.reader import Recording
+    from rig.show.summary import summarise_recording
+    from rig.show.tables import say_how_it_ended
+    from rig.system.stop_signals import Interrupted, Terminated, ignore_from_now_on
+    from rig.text.console import print_json
+
+    with shown(options, KINDS[kind].columns) as watched:
+        try:
+            result = start(watched)
+        except (Interrupted, Terminated) as signal:
+            if signal.recorded is None:
+                raise
+            result = Recording(signal.recorded)  # the signal came when the recording was already complete
+    ignore_from_now_on()
+    with result:
+        summary = summarise_recording(result)
+        complete, path = result.complete, result.path
+    if json:
+        print_json(summary)
+    else:
+        say_how_it_ended(summary, path)
+    if not complete:
+        raise typer.Exit(1)
