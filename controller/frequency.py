@@ -11,7 +11,7 @@ from controller.primitives import proportional_integral
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-__all__ = ["FREQUENCY", "FREQUENCY_STATE", "FrequencyLaw", "FrequencySettings"]
+__all__ = ["FREQUENCY", "FREQUENCY_STATE", "GAINS", "FrequencyLaw", "FrequencySettings"]
 
 LARGEST_FREQUENCY_ERROR = 0.05  # of the frequency
 
@@ -27,6 +27,8 @@ class FrequencyLaw(IntEnum):
 
 PHASE, FREQUENCY_ERROR = int(FrequencyLaw.PHASE), int(FrequencyLaw.FREQUENCY_ERROR)
 LAWS = {"phase": FrequencyLaw.PHASE, "frequency-error": FrequencyLaw.FREQUENCY_ERROR}
+GAINS = {"phase": ("k1", "k2"), "frequency-error": ("frequency_proportional", "frequency_integral_per_s")}
+"""Settings that are kp and ki of each law."""
 
 FREQUENCY = np.dtype(
     [

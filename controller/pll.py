@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from controller.amplitude import AmplitudeLaw, AmplitudeSettings
 from controller.detector import DetectorSettings
-from controller.frequency import FrequencySettings
+from controller.frequency import GAINS, FrequencySettings
 from controller.law import LAW
 from controller.lock import LockRule
 from controller.rest import RestSettings
@@ -36,12 +36,11 @@ class PhaseLockedLoop(FrequencySettings, RestSettings, DetectorSettings, Amplitu
 
     def proportional_and_integral(self) -> tuple[float, float]:
         """``(kp, ki)`` of the PI law: in 1/s and 1/s^2 for a phase error in rad, 1 and 1/s for a frequency error in rad/s."""
-        if self.frequency_law == "frequency-error":
-            return self.frequency_proportional, self.frequency_integral_per_s
-        if self.detector != "sign":
-            return self.k1, self.k2
-        kp = 2.0 / math.pi * self.k2 / self.low_pass_rad_s
-        return kp, self.k1 * kp
+        if self.detector == "sign":  # the phase law alone works with it, in the paper's own parameters
+            kp = 2.0 / math.pi * self.k2 / self.low_pass_rad_s
+            return kp, self.k1 * kp
+        kp, ki = (float(getattr(self, name)) for name in GAINS[self.frequency_law])
+        return kp, ki
 
     def build(
         self,

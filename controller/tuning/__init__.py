@@ -15,7 +15,7 @@ from controller.tuning.laws import (
     LogResponseLaw,
     PhaseLaw,
 )
-from controller.tuning.loop import ControlLoop, lag_per_frequency
+from controller.tuning.loop import ControlLoop, control_loop, lag_per_frequency
 from controller.tuning.noise import LowPassChoice, low_pass_from_densities, low_pass_from_noise
 from controller.tuning.plant import PlantModel
 from controller.tuning.stability import (
@@ -47,6 +47,7 @@ __all__ = [
     "assess",
     "closed_loop_poles",
     "complex_response_law",
+    "control_loop",
     "design_phase_law",
     "exact_phase_law",
     "exact_scheduled_law",

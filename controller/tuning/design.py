@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from controller.tuning.exact import exact_phase_law, frequencies_for
 from controller.tuning.hippold import hippold_gains
-from controller.tuning.laws import ComplexResponseLaw, FrequencyLaw
+from controller.tuning.laws import ComplexResponseLaw, LinearFrequencyLaw
 from controller.tuning.loop import ControlLoop
 from controller.tuning.plant import PlantModel
 from controller.tuning.stability import Margins, closed_loop_poles, margins, unstable_poles
@@ -152,7 +152,7 @@ def design_phase_law(plants: Sequence[PlantModel], low_pass_rad_s: float, *, sen
         design = worst(loop, plants)
         if design.stable and design.frequency_margins.sensitivity_peak <= sensitivity_peak:
             return replace(design, notes=("gains in closed form (Hippold et al.)",))
-    law: FrequencyLaw = exact_phase_law(plants, low_pass_rad_s, sensitivity_peak=sensitivity_peak)
+    law: LinearFrequencyLaw = exact_phase_law(plants, low_pass_rad_s, sensitivity_peak=sensitivity_peak)
     note = f"largest ki with max |S| <= {sensitivity_peak:g} on the exact map"
     return replace(worst(ControlLoop(plants[0], low_pass_rad_s, law), plants), failed=closed.failed, notes=(note,))
 

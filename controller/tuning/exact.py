@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.tuning.laws import AmplitudeLaw, ComplexResponseLaw, FrequencyErrorLaw, PhaseLaw
+from controller.tuning.laws import ComplexResponseLaw, FrequencyErrorLaw, LinearAmplitudeLaw, PhaseLaw
 from controller.tuning.loop import ControlLoop
 from controller.tuning.plant import PlantModel
 
@@ -23,7 +23,7 @@ def exact_phase_law(
     *,
     sensitivity_peak: float = 1.6,
     lag_deg: float = -90.0,
-    amplitude_law: AmplitudeLaw | None = None,
+    amplitude_law: LinearAmplitudeLaw | None = None,
 ) -> PhaseLaw:
     """Phase PI of the largest ki with ``max |S| <= sensitivity_peak`` on every one of the plants.
 
@@ -40,7 +40,7 @@ def exact_scheduled_law(
     *,
     sensitivity_peak: float = 1.6,
     lag_deg: float = -90.0,
-    amplitude_law: AmplitudeLaw | None = None,
+    amplitude_law: LinearAmplitudeLaw | None = None,
 ) -> FrequencyErrorLaw:
     """The same with gains that scale with the measured damping: a PI on the frequency error."""
     return _best(
@@ -85,7 +85,7 @@ def _best(
     law_of: Callable[[float, float], Law],
     sensitivity_peak: float,
     lag_deg: float,
-    amplitude_law: AmplitudeLaw | None,
+    amplitude_law: LinearAmplitudeLaw | None,
 ) -> Law:
     """Largest ki over the ratio kp/ki, by a grid and golden section."""
     from scipy.optimize import minimize_scalar

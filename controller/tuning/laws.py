@@ -6,22 +6,26 @@ to ``v = (ln|U|, arg U, Omega)``, all of them small deviations; arguments are ta
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.amplitude import AmplitudeLaw
+from controller.pll import PhaseLockedLoop
 from controller.tuning.plant import PlantModel
 
 __all__ = [
-    "AmplitudeLaw",
     "ComplexResponseLaw",
     "ForceLaw",
     "FrequencyErrorLaw",
-    "FrequencyLaw",
+    "LinearAmplitudeLaw",
+    "LinearFrequencyLaw",
     "LogForceLaw",
     "LogResponseLaw",
     "PhaseLaw",
+    "linear_amplitude_law",
+    "linear_frequency_law",
 ]
 
 Complex = NDArray[np.complex128]
@@ -63,7 +67,23 @@ class FrequencyErrorLaw:
         return (self.proportional + self.integral_per_s / s) * slope
 
 
-FrequencyLaw = PhaseLaw | FrequencyErrorLaw
+LinearFrequencyLaw = PhaseLaw | FrequencyErrorLaw
+
+
+def linear_frequency_law(law: PhaseLockedLoop, plant: PlantModel, bench_shape: float | None) -> LinearFrequencyLaw:
+    """Linearise the frequency law of ``law`` with its gains as they are.
+
+    The frequency-error law takes the mode shape (kg^-1/2) of ``law``, or else that of the bench, whatever the plant's own is.
+    """
+    kp, ki = law.proportional_and_integral()
+    match law.frequency_law:
+        case "phase":
+            return PhaseLaw(kp, ki)
+        case "frequency-error":
+            shape = law.drive_mode_shape or bench_shape or plant.drive_shape
+            return FrequencyErrorLaw(ki, kp, (shape / plant.drive_shape) ** 2)
+        case other:
+            assert_never(other)
 
 
 def frequency_per_lag(plant: PlantModel, lag_deg: float) -> float:
@@ -172,7 +192,39 @@ class ComplexResponseLaw:
         return np.stack([real * error[:, 0] - imag * error[:, 1], imag * error[:, 0] + real * error[:, 1]], axis=1)
 
 
-AmplitudeLaw = ForceLaw | LogForceLaw | LogResponseLaw | ComplexResponseLaw
+LinearAmplitudeLaw = ForceLaw | LogForceLaw | LogResponseLaw | ComplexResponseLaw
+
+
+def linear_amplitude_law(law: PhaseLockedLoop, amplitude_law: AmplitudeLaw) -> LinearAmplitudeLaw | None:
+    """Linearise the loop of ``law`` that holds levels of an `AmplitudeLaw`; None where the level is a voltage."""
+    through = False
+    match amplitude_law:
+        case AmplitudeLaw.VOLTAGE:
+            return None
+        case AmplitudeLaw.FORCE | AmplitudeLaw.FORCE_RMS:
+            match law.force_loop:
+                case "linear":
+                    return ForceLaw(law.k3, law.k4)
+                case "logarithmic":
+                    return LogForceLaw(law.force_proportional, law.force_integral_per_s)
+                case "through-response":
+                    through = True
+                case other:
+                    assert_never(other)
+        case AmplitudeLaw.RESPONSE:
+            pass
+        case unknown:
+            assert_never(unknown)
+    gain = law.response_integral_per_s
+    proportional = gain / -complex(*law.plant_pole_rad_s) if law.plant_pole_rad_s else 0.0 + 0.0j
+    match law.response_loop:
+        case "amplitude":
+            return LogResponseLaw(proportional.real, gain)
+        case "complex":
+            force = law.reference_integral_per_s if through else 0.0
+            return ComplexResponseLaw(proportional, gain, force, law.low_pass_rad_s)
+        case loop:
+            assert_never(loop)
 
 
 def _amplitude_row(s: Complex, measured: int, gain: Complex) -> Complex:

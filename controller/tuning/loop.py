@@ -17,10 +17,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from controller.tuning.laws import AmplitudeLaw, ComplexResponseLaw, FrequencyLaw
+from controller.amplitude import AmplitudeLaw
+from controller.pll import PhaseLockedLoop
+from controller.tuning.laws import (
+    ComplexResponseLaw,
+    LinearAmplitudeLaw,
+    LinearFrequencyLaw,
+    linear_amplitude_law,
+    linear_frequency_law,
+)
 from controller.tuning.plant import PlantModel
 
-__all__ = ["ControlLoop", "lag_per_frequency"]
+__all__ = ["ControlLoop", "control_loop", "lag_per_frequency"]
 
 Complex = NDArray[np.complex128]
 
@@ -47,8 +55,8 @@ class ControlLoop:
     plant: PlantModel
     low_pass_rad_s: float
     """w_LP of the demodulators: first-order low-pass, or adaptive filter, which averages to the same."""
-    frequency_law: FrequencyLaw
-    amplitude_law: AmplitudeLaw | None = None
+    frequency_law: LinearFrequencyLaw
+    amplitude_law: LinearAmplitudeLaw | None = None
     """None: the level is the output's amplitude in volts."""
     lag_deg: float = -90.0
 
@@ -139,3 +147,15 @@ class ControlLoop:
     @staticmethod
     def _lag(outputs: Complex) -> Complex:
         return np.asarray(outputs[:, 1] - outputs[:, 3])
+
+
+def control_loop(
+    plant: PlantModel, law: PhaseLockedLoop, amplitude_law: AmplitudeLaw, bench_shape: float | None
+) -> ControlLoop:
+    """Linearise the loop that a configured law makes with a plant, with its lag and its gains as they are.
+
+    ``bench_shape`` is the mode shape (kg^-1/2) that the frequency-error law takes where ``law`` names none.
+    """
+    frequency = linear_frequency_law(law, plant, bench_shape)
+    amplitude = linear_amplitude_law(law, amplitude_law)
+    return ControlLoop(plant, law.low_pass_rad_s, frequency, amplitude, law.phase_lag_deg)

@@ -2,7 +2,7 @@
 
 import getpass
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import date
 from typing import Any
 
@@ -29,19 +29,19 @@ class About:
     """Purpose of the run: ``check`` or ``tuning``; empty for a separate campaign."""
 
     def __post_init__(self) -> None:
-        texts = [("operator", self.operator or ""), ("specimen_serial", self.specimen_serial)]
+        texts = [(name, value) for name, value in vars(self).items() if isinstance(value, str)]
         for name, text in [*texts, *(("note", note) for note in self.notes)]:
             if text and not text.isprintable():
                 raise ConfigurationError(f"{name} = {text!r}: allowed is printable text in one line")
 
     def facts(self) -> dict[str, Any]:
         """Return the facts as they are recorded."""
-        return {
-            "operator": self.operator or user_name(),
-            "specimen_serial": self.specimen_serial,
-            "notes": list(self.notes),
-            "purpose": self.purpose,
-        }
+        return {**vars(self), "operator": self.operator or user_name(), "notes": list(self.notes)}
+
+    @classmethod
+    def single(cls) -> tuple[str, ...]:
+        """Names of the facts that are one value, in the order in which they are shown."""
+        return tuple(one.name for one in fields(cls) if one.name not in ("notes", "purpose"))
 
 
 def user_name() -> str:

@@ -1,4 +1,7 @@
-"""Registry of the kinds of campaigns: one line for each kind. Each kind has its own folder."""
+"""Registry of the kinds of campaigns: one line for each kind. Each kind is declared in its own folder.
+
+The contract "Campaigns" in ``pyproject.toml`` also names the folders.
+"""
 
 from rig.campaigns.backbone.points import BACKBONE
 from rig.campaigns.continuous_backbone.points import CONTINUOUS_BACKBONE

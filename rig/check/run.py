@@ -6,6 +6,7 @@ from pathlib import Path
 from rig.arming.bench_memory import RememberedCheck, fingerprint, now, remember
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench, load_bench
+from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, Seen, share_of_limits
 from rig.check.assessment import PURPOSE, Assessment, assess, responses_in
@@ -110,8 +111,8 @@ def seen_in(bench: Bench, recorded: Recording) -> Seen:
     counted = [i for i, channel in enumerate(bench.channels) if channel.role != "monitor"]
     coherence = found.coherence[counted]
     hopeless = (coherence < DEAD) & (coherence.max() > CLEAR)
-    point = [point for point in recorded.latest.values() if "end_sample" in point][-1]
-    rows = recorded.parts[-1].read(point["first_sample"], point["end_sample"])
+    at = [point.rows for point in points_of(recorded) if point.rows is not None][-1]
+    rows = recorded.parts[-1].read(at.first_sample, at.end_sample)
     lowest_hz = max(BAND[0] * bench.specimen.linear_frequency_hz, bench.limits.frequency_hz[0])
 
     def farthest_m(_: str, acceleration_m_s2: float) -> float:

@@ -17,14 +17,20 @@ if TYPE_CHECKING:
     from rig.campaigns.planning.plan import Column
     from rig.tick.tick import Tick
 
-__all__ = ["FitLines", "RunProgress"]
+__all__ = ["FitLines", "RunProgress", "value_text"]
 
 LOCK_WORDS = ("searching", "acquiring", "locked", "lost")
 
 
+def value_text(column: "Column", point: Point[Any]) -> str:
+    """Format a quantity of a point without its unit; return a dash if there is no value."""
+    value = value_of(point, column.key)
+    return number(None if value is None else value + column.counts_from, column.pattern, column.scale)
+
+
 def _in_a_line(column: "Column", point: Point[Any]) -> str:
     """Format a quantity of a point with its unit. The heading is left out where the unit already identifies the quantity."""
-    text = f"{number(value_of(point, column.key), column.pattern, column.scale):>8} {column.unit}".rstrip()
+    text = f"{value_text(column, point):>8} {column.unit}".rstrip()
     return text if column.plain else f"{column.heading} {text}"
 
 

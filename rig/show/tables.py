@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rig.arming.run_facts import user_name
+from rig.arming.run_facts import About, user_name
 from rig.campaigns.evaluation.point import point_name
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
@@ -12,6 +12,7 @@ from rig.check.report import say
 from rig.models.files.files import KINDS
 from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
+from rig.show.progress import value_text
 from rig.text.console import number, print_table
 from rig.text.printable import printable, printable_strings
 
@@ -104,10 +105,11 @@ def _print_drift(drift: dict[str, Any] | None) -> None:
 def _print_about(about: dict[str, Any]) -> None:
     """Print operator, specimen and device of a part if anything was noted or a physical rig has moved."""
     armed = about.get("armed", {})
-    told = any(about.get(key) for key in ("specimen_serial", "notes", "remarks"))
+    said = [name for name in (*About.single(), "notes", "remarks") if name != "operator"]
+    told = any(about.get(name) for name in said)
     if not told and armed.get("how", "virtual") == "virtual" and about.get("operator") == user_name():
         return
-    for name in ("operator", "specimen_serial"):
+    for name in About.single():
         if about.get(name):
             print(f"  {name.replace('_', ' ')}: {about[name]}")
     if armed.get("how", "virtual") != "virtual":
@@ -134,7 +136,7 @@ def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
             str(point.number + 1),
             f"{point.level:.4g}",
             point.level_unit,
-            *(number(value_of(point, column.key), column.pattern, column.scale) for column in columns),
+            *(value_text(column, point) for column in columns),
             {True: "yes", False: "no", None: "-"}[point.settled],
             str(point.quality),
         )

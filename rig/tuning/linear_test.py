@@ -11,6 +11,7 @@ import numpy as np
 
 from identification import FrequencyResponseMatrix, PeriodicSpectra
 from rig.bench import Bench
+from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, Seen, share_of_limits
 from rig.errors import ConfigurationError
@@ -129,7 +130,7 @@ class _Runs:
             _ended_well(recording, level_rms_v)
             self.lead_samples = float(recording.parts[-1].information["about"]["lead_samples"])
             self.measured = spectra(recording)[level_rms_v]
-            number = next(number for number, point in recording.latest.items() if point["accepted"])
+            number = next(point.number for point in points_of(recording) if point.accepted)
             self.rows = point_rows(recording, number)
         return self.measured
 
@@ -154,9 +155,9 @@ def _ended_well(recording: Recording, level: float) -> None:
     text = "" if end is None else end["text"]
     if end is None or end["reason"] != "completed":
         raise TuningError(f"multisine at {level:.4g} V RMS: {text}; recorded in {recording.path}")
-    failed = [point for point in recording.latest.values() if not point["accepted"]]
+    failed = [point for point in points_of(recording) if not point.accepted]
     if failed:
-        raise TuningError(f"multisine at {level:.4g} V RMS: {failed[0]['reason']}; recorded in {recording.path}")
+        raise TuningError(f"multisine at {level:.4g} V RMS: {failed[0].reason}; recorded in {recording.path}")
 
 
 def _silent(bench: Bench, level: float, seen: tuple[float, float], when: str) -> str:

@@ -48,7 +48,7 @@ def test_the_frequency_window_keeps_another_mode_out_and_says_so():
     assert "another mode" in points[0]["reason"]
     assert frequency.max() <= 133.1 * (1 + 1e-6)
     assert np.count_nonzero(flags & FREQUENCY_CLAMPED) > 500
-    assert end["skipped"] == "2 of 2 points skipped: outside window (0.2 V, 0.4 V)"
+    assert end["skipped"] == "2 of 2 points skipped: outside-window (0.2 V, 0.4 V)"
     assert end["reason"] == "no_lock_in_window"
     assert highest_v < 0.201  # no level after the first was tried
 
@@ -142,4 +142,4 @@ def test_a_lock_that_a_knock_throws_off_is_noticed_within_twenty_periods(monkeyp
     assert end["tripped"] is (reason == "lost_lock")
     assert [point["quality"] for point in points] == qualities
     assert 20 <= (states["lost"] / 5000 - 2.6) * 149 < 32  # twenty far periods, and some until it was far
-    assert end["skipped"].startswith(f"{3 - len(qualities)} of 2 points skipped: lost lock (0.05 V)")
+    assert end["skipped"].startswith(f"{3 - len(qualities)} of 2 points skipped: lost-lock (0.05 V)")

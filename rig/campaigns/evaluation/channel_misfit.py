@@ -1,10 +1,10 @@
-"""Describe in a sentence which channel of a point does not fit, against which expectation, and where to look for the cause."""
+"""A channel that does not fit the others, and the sentence about it: what was seen, what was expected, where to look."""
 
 from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-__all__ = ["Misfit", "Seen", "told"]
+__all__ = ["Misfit", "Seen", "misfit_sentence"]
 
 ALIKE = 1.5  # ratios within this factor, up or down, count as equal: the channels share one cause
 
@@ -40,7 +40,7 @@ class Misfit(NamedTuple):
         return self.seen / self.expected
 
 
-def told(misfits: Sequence[Misfit], drive: str, warned: float, refused: float) -> str:
+def misfit_sentence(misfits: Sequence[Misfit], drive: str, warned: float, refused: float) -> str:
     """Describe the worst misfit in one sentence. If all channels are off by the same factor, name channel ``drive`` instead."""
     worst = max(misfits, key=lambda misfit: misfit.factor)
     bound = f"refused from a factor {refused:g}" if worst.factor >= refused else f"trusted up to a factor {warned:g}"
@@ -53,10 +53,10 @@ def told(misfits: Sequence[Misfit], drive: str, warned: float, refused: float) -
                 f"channel {drive}: all others ({names}) are {worst.times:.3g} times as large against it as expected "
                 f"{worst.by.value}, {bound}: look at its sensor, cable and sensitivity_v_per_unit"
             )
-    return f"{_one(worst)} {worst.by.value}, {bound}: {_where(worst)}"
+    return f"{_what_was_seen(worst)} {worst.by.value}, {bound}: {_where_to_look(worst)}"
 
 
-def _one(misfit: Misfit) -> str:
+def _what_was_seen(misfit: Misfit) -> str:
     if misfit.by is Seen.NOT_TRUSTED:
         return f"channel {misfit.channel}: force over velocity at the drive point is like that at {misfit.at},"
     if misfit.at:
@@ -71,7 +71,7 @@ def _one(misfit: Misfit) -> str:
     )
 
 
-def _where(misfit: Misfit) -> str:
+def _where_to_look(misfit: Misfit) -> str:
     polarity = ", polarity" if misfit.seen < 0.0 else ""
     other = " and of the drive channel" if misfit.at else ""
     return f"look at sensor, cable{polarity} and sensitivity_v_per_unit of {misfit.channel}{other}"

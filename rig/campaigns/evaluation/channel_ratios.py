@@ -1,4 +1,4 @@
-"""Ratios between the channels of a point: of fundamentals and of RMS values, with their standard errors."""
+"""Ratios between the channels of a point, of fundamentals and of RMS values, and their standard errors."""
 
 import math
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ def motions_of(bench: Bench) -> list[int]:
 
 
 def softened(bench: Bench, point: Point[Any], drive: int) -> float:
-    """Factor, 1 or more, by which the allowance grows away from resonance."""
+    """Factor by which the allowance grows away from resonance, 1 or more."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     force, velocity = fundamentals[bench.index_of("force")], -1j * fundamentals[drive]
     active = abs((force * velocity.conjugate()).real)

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_history", "heading", "said"]
+__all__ = ["describe", "draw_history", "heading"]
 
 
-def said(recording: Recording, test: str) -> str:
+def describe(recording: Recording, test: str) -> str:
     """Return specimen, kind of test, number of points and number of points not accepted, as one line."""
     points = points_of(recording)
     left_out = sum(not point.accepted for point in points)
@@ -27,7 +27,7 @@ def said(recording: Recording, test: str) -> str:
 
 def heading(page: "Figure", recording: Recording) -> None:
     """Write a heading that describes the recording above a page."""
-    title(page, said(recording, f"{recording.kind} test"))
+    title(page, describe(recording, f"{recording.kind} test"))
 
 
 def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None:

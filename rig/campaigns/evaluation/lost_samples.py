@@ -15,7 +15,7 @@ def lost_rows(rows: np.ndarray) -> np.ndarray:
 
 
 def lost_warnings(rows: np.ndarray) -> list[str]:
-    """Return one line on the number of missing samples; an empty list if none is missing."""
+    """Return one line on the number of lost samples; an empty list if none was lost."""
     lost = int(np.count_nonzero(lost_rows(rows)))
     return [f"{lost} of {rows.size} samples were lost on their way"] if lost else []
 

@@ -1,8 +1,8 @@
 """Check whether the channels of a point fit each other, by the mode shapes of the bench and by earlier points.
 
-Some sensor failures trip nothing: a sensor that reads only noise, or whose sensitivity has fallen to a tenth. At phase
-resonance of one mode, the fundamental of response k over that of the drive is the real number ``phi_k / phi_d``; higher
-harmonics and other modes change it by some per cent. The deviation is expressed as a factor
+A sensor may fail in a way that trips no limit: it reads only noise, or its sensitivity falls to a tenth. At phase resonance of
+one mode, the fundamental of response k over that of the drive is the real number ``phi_k / phi_d``; higher harmonics and other
+modes change it by some per cent. The deviation is expressed as a factor
 
     (max(|q|, |phi|) + a) / (min(|q|, |phi|) + a),    q = Y_k / Y_d phi_d
 
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.evaluation.channel_misfit import Misfit, Seen, told
+from rig.campaigns.evaluation.channel_misfit import Misfit, Seen, misfit_sentence
 from rig.campaigns.evaluation.channel_ratios import (
     motions_of,
     ratios_of,
@@ -78,7 +78,7 @@ def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point
         return point
     names = {misfit.channel for misfit in misfits if misfit.factor >= WARNED}
     point = replace(point, misfit_channels=tuple(sorted(names)))
-    text = told(misfits, bench.channels[bench.index_of("drive")].name, WARNED, REFUSED)
+    text = misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name, WARNED, REFUSED)
     if worst < REFUSED or not point.accepted:
         return point.warned(text)
     return point.refused(text, Quality.IMPLAUSIBLE)

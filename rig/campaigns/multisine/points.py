@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 MULTISINE_COLUMNS = (
-    Column("realisation", "realisation", "", ".0f"),
+    Column("realisation", "realisation", "", ".0f", counts_from=1),
     Column("force_rms_n", "force", "N RMS", ".4f", plain=True),
     Column("drive_rms_m_s2", "drive", "m/s^2 RMS", ".4f", plain=True),
     Column("voltage_peak_v", "peak", "V", ".3f"),

@@ -9,26 +9,20 @@ from pydantic import Field, PositiveFloat
 from controller import AmplitudeLaw, PhaseLockedLoop
 from controller.tuning import (
     LARGEST_AT_HALF,
-    ComplexResponseLaw,
     ControlLoop,
-    ForceLaw,
-    FrequencyErrorLaw,
-    LogForceLaw,
-    LogResponseLaw,
-    PhaseLaw,
     PlantModel,
     closed_loop_poles,
+    control_loop,
     gains_at_half,
     unstable_poles,
 )
-from controller.tuning.laws import AmplitudeLaw as AmplitudeGains
 from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.levels_on_plant import MORE_DAMPING, check_motion, check_voltage, lags_text
 from rig.errors import ConfigurationError
 
-__all__ = ["KnownPlant", "PlantFacts", "control_loop"]
+__all__ = ["KnownPlant", "PlantFacts"]
 
 CLOSEST_DEG = 0.5  # spacing of the lags that are checked on the plant: at most a few hundred, each takes milliseconds
 
@@ -183,35 +177,3 @@ def _steady(loops: Sequence[ControlLoop], part: float) -> bool:
         return not any(map(unstable_poles, damped))
     except ValueError:
         return False
-
-
-def control_loop(
-    plant: PlantModel, law: PhaseLockedLoop, amplitude_law: AmplitudeLaw, bench_shape: float | None
-) -> ControlLoop:
-    """Return the linearised loop of a configured law and a plant, with the lag and the gains as configured.
-
-    The frequency-error law uses the mode shape of ``law``, or else that of the bench, even if the plant's own shape differs.
-    """
-    kp, ki = law.proportional_and_integral()
-    if law.frequency_law == "frequency-error":
-        shape = law.drive_mode_shape or bench_shape or plant.drive_shape
-        frequency: PhaseLaw | FrequencyErrorLaw = FrequencyErrorLaw(ki, kp, (shape / plant.drive_shape) ** 2)
-    else:
-        frequency = PhaseLaw(kp, ki)
-    gains = _amplitude_gains(law, amplitude_law)
-    return ControlLoop(plant, law.low_pass_rad_s, frequency, gains, law.phase_lag_deg)
-
-
-def _amplitude_gains(law: PhaseLockedLoop, amplitude_law: AmplitudeLaw) -> AmplitudeGains | None:
-    if amplitude_law is AmplitudeLaw.VOLTAGE:
-        return None
-    if amplitude_law is not AmplitudeLaw.RESPONSE and law.force_loop == "linear":
-        return ForceLaw(law.k3, law.k4)
-    if amplitude_law is not AmplitudeLaw.RESPONSE and law.force_loop == "logarithmic":
-        return LogForceLaw(law.force_proportional, law.force_integral_per_s)
-    gain = law.response_integral_per_s
-    proportional = gain / -complex(*law.plant_pole_rad_s) if law.plant_pole_rad_s else 0.0 + 0.0j
-    if law.response_loop == "amplitude":
-        return LogResponseLaw(proportional.real, gain)
-    force = 0.0 if amplitude_law is AmplitudeLaw.RESPONSE else law.reference_integral_per_s
-    return ComplexResponseLaw(proportional, gain, force, law.low_pass_rad_s)

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from identification import ForceSurface, IdentificationError, force_surface
-from rig.campaigns.evaluation.figure import said
+from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.figures.force_surface import draw_force_surface
 from rig.recording.reader import Recording
@@ -22,4 +22,4 @@ def draw(page: "Figure", recording: Recording) -> None:
         surface: ForceSurface | None = force_surface(responses)
     except IdentificationError:
         surface = None
-    draw_force_surface(page, responses, surface, text=said(recording, "response-controlled test"))
+    draw_force_surface(page, responses, surface, text=describe(recording, "response-controlled test"))

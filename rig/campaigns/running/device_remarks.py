@@ -1,4 +1,4 @@
-"""Remarks of the device on the samples of a point: its flags, lost samples, and outputs that came too late."""
+"""Warnings of the device about the samples of a point: its flags, lost samples, and outputs that came too late."""
 
 from collections.abc import Iterable
 from dataclasses import replace

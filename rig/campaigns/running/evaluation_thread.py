@@ -1,4 +1,4 @@
-"""Evaluation of points in a separate thread, so that a long record does not delay the rows of the control loop."""
+"""Points are evaluated in a thread beside the loop, so that a long evaluation does not keep rows waiting."""
 
 from collections import deque
 from collections.abc import Callable
@@ -20,11 +20,11 @@ class EvaluationThread:
         self._asked: deque[Future[Points]] = deque()
 
     def ask(self, step: Callable[..., Points], *arguments: Any) -> None:
-        """Request the evaluation of points from ``arguments``, which must not be changed afterwards."""
+        """Request an evaluation of ``arguments``, which must not be changed any more."""
         self._asked.append(self._thread.submit(step, *arguments))
 
     def known(self, point: Point[Any]) -> None:
-        """Queue a point that needs no evaluation, after those requested before."""
+        """Queue a point that needs no evaluation, behind those requested before."""
         self.ask(lambda: [point])
 
     def __bool__(self) -> bool:
@@ -36,9 +36,9 @@ class EvaluationThread:
         return bool(self._asked) and self._asked[0].done()
 
     def take(self) -> Points:
-        """Wait for the next points and return them; raise the error that their evaluation raised."""
+        """Wait for the next points and return them; raises what their evaluation raised."""
         return self._asked.popleft().result()
 
     def close(self) -> None:
-        """End the thread after the current evaluation; queued requests are cancelled."""
+        """End the thread after its present evaluation."""
         self._thread.shutdown(cancel_futures=True)

@@ -15,7 +15,7 @@ class RowBuffer:
         self._chunks: deque[tuple[int, np.ndarray]] = deque()
 
     def add(self, first: int, rows: np.ndarray) -> None:
-        """Keep a chunk that begins with sample ``first``."""
+        """Add a chunk that begins with sample ``first``."""
         self._chunks.append((first, rows))
 
     def take(self, first: int, end: int) -> np.ndarray:

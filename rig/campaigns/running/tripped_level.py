@@ -65,7 +65,7 @@ def refuse_tripped(recording: Recording, plan: Plan, left: Sequence[Target]) -> 
     for number, part in enumerate(recording.parts):
         if part.end is None or not part.end["tripped"]:
             continue
-        at = _said(part)
+        at = _tripped_in(part)
         if at is not None and (_reached_since(recording.parts[number + 1 :], at) or not _asks_for(plan, left, at)):
             continue
         head = f"{recording.path.name}: the run tripped{'' if at is None else f' at {at.text}'} ({part.end['text']})"
@@ -75,7 +75,7 @@ def refuse_tripped(recording: Recording, plan: Plan, left: Sequence[Target]) -> 
         raise ConfigurationError(f"{head}; to go on: {lower}`retry_tripped` to try it again")
 
 
-def _said(part: Part) -> TrippedAt | None:
+def _tripped_in(part: Part) -> TrippedAt | None:
     """Return where a part tripped; for files of earlier versions, where its last point failed."""
     end = part.end or {}
     if "tripped_at" in end:

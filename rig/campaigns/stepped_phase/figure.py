@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import FrequencyResponse
-from rig.campaigns.evaluation.figure import said
+from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.recorded import points_of
 from rig.figures.style import REJECTED
@@ -29,7 +29,7 @@ def draw(page: "Figure", recording: Recording) -> None:
         page,
         recorded_frequency_responses(recording),
         held="RMS of the force" if recording.configuration["plan"].get("levels_rms_n") else "",
-        title=said(recording, "stepped phase"),
+        title=describe(recording, "stepped phase"),
         lags_deg=sorted({(point.asked_phase_lag_deg or 0.0) + 180.0 for point in points_of(recording)}),
     )
 

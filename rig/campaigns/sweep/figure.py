@@ -9,6 +9,7 @@ from identification import ForceDropOut, Transient, force_drop_out, zero_crossin
 from rig.campaigns.evaluation.point import result_of
 from rig.campaigns.evaluation.recorded import point_rows, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
 from rig.figures.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
 from rig.figures.style import title as heading
@@ -48,7 +49,6 @@ def draw_sweep(
     sample_rate_hz: float,
     *,
     drop_out: ForceDropOut | None = None,
-    voltage: str = "voltage",
     response: str = "drive",
     title: str = "",
 ) -> None:
@@ -66,14 +66,14 @@ def draw_sweep(
         Samples per second.
     drop_out
         Drop-out of the force, whose characteristic points are marked; None: no marks.
-    voltage, response
-        Channels drawn beside the force.
+    response
+        Name of the channel that is drawn below force and voltage.
     title
         Heading.
     """
     force = next(channel.name for channel in sweep.channels if channel.role == "force")
     axes = page.subplots(4, 1, sharex=True, height_ratios=(1.0, 1.5, 1.5, 1.2))
-    names = {voltage: "voltage", force: "force", response: f"response ({response})"}
+    names = {VOLTAGE.name: "voltage", force: "force", response: f"response ({response})"}
     longest = int(np.ceil(sample_rate_hz / sweep.frequency_hz.min()))
     for axis, (name, text) in zip(axes, names.items(), strict=False):
         row = sweep.index(name)

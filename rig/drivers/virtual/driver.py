@@ -64,6 +64,7 @@ class VirtualDAQ(DAQ):
             raise ConfigurationError(f"driver.options.converter = {given!r}: allowed is a table")
         options["converter"] = {**converter, **given}
         self.rig = validated(VirtualRig, options, "driver.options")
+        self._wears = self.rig.wear.wears
         self._compare_channels()
         self._check_arrays(seed)
         self._seed = seed
@@ -187,7 +188,7 @@ class VirtualDAQ(DAQ):
         self._first = 0
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        if self.rig.wear.wears:
+        if self._wears:
             for arrays, part in self._pieces(voltages.size):
                 self._arrays = arrays
                 self._swap(voltages[part], inputs[part], self.flags[part])

@@ -122,7 +122,7 @@ def experiments(
                 point,
                 point_rows(recording, point.number),
                 wanted,
-                f"{_called(recording.path.stem, point)}, realisation {point.realisation}",
+                f"{_called(recording.path.stem, point)}, realisation {(point.realisation or 0) + 1}",
             )
             for point in _accepted(recording, MultisineResult)
         )

@@ -100,10 +100,12 @@ def poles_of(model: PnlssModel) -> list[dict[str, float]]:
 
 def _features(features: Features) -> dict[str, Any]:
     """Count the features of each kind."""
+    functions = Counter(features.functions or ("tanh",) * len(features.weights))
     degrees = Counter(int(degree) for degree in features.exponents.sum(axis=1))
     return {
         "monomials": {str(degree): degrees[degree] for degree in sorted(degrees)},
-        "saturating": len(features.weights),
+        "saturating": functions["tanh"],
+        "functions": dict(functions),
         "bounded": bool(np.isfinite(features.limits).any()),
     }
 
@@ -144,7 +146,7 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
 def _said(features: dict[str, Any]) -> str:
     """Describe features in words."""
     parts = [f"{count} of degree {degree}" for degree, count in features["monomials"].items()]
-    parts += [f"{features['saturating']} saturating"] if features["saturating"] else []
+    parts += [f"{count} {name}" for name, count in features["functions"].items()]
     return (", ".join(parts) or "none") + (", bounded" if features["bounded"] else "")
 
 

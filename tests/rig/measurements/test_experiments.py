@@ -52,7 +52,7 @@ def backbone():
 def test_a_period_of_a_multisine_has_the_lines_that_its_spectra_have(multisine):
     measured = spectra(multisine.recording)[0.2]
     made = multisine.experiments()
-    assert [one.name[-13:] for one in made] == ["realisation 0", "realisation 1"]
+    assert [one.name[-13:] for one in made] == ["realisation 1", "realisation 2"]
     for one, lines in zip(made, measured.mean, strict=True):
         assert one.sample_rate_hz == 800.0
         assert (one.counted, one.counted_from, one.period_samples) == (1600, 3200, 1600)  # two periods of transient

@@ -150,7 +150,7 @@ def test_sweeps_references_and_multisines_are_compared(there, force_model):
     line = "predict F.h5 --sweep sweep.h5 --reference stepped.h5 --multisine lines.h5 -o P.h5 --overwrite --json"
     told = json.loads(there(line).out)
     stepped, small, _ = told["errors"]
-    assert (stepped["name"], small["name"]) == ("0.15 V", "sweep [0]")
+    assert (stepped["name"], small["name"]) == ("0.15 V", "sweep [1]")
     assert stepped["envelope_error"] < 0.05
     assert abs(small["peak_error"]) < 0.05
     assert small["range_use"] < 1.0

@@ -53,7 +53,7 @@ def test_peaks_at_constant_force_are_those_of_the_rig(summary):
 
 def test_stepped_sines_and_both_sweeps_are_predicted_within_one_percent(summary):
     stepped, *swept = summary["errors"]
-    assert [error["name"] for error in summary["errors"]] == ["0.6 V", "sweep [0]", "sweep [1]"]
+    assert [error["name"] for error in summary["errors"]] == ["0.6 V", "sweep [1]", "sweep [2]"]
     assert stepped["envelope_error"] < 0.01
     for error in swept:
         assert abs(error["peak_error"]) < 0.01
@@ -80,7 +80,7 @@ def test_a_file_of_predictions_is_shown_and_drawn(at_shelf, command, tmp_path):
     made = at_shelf(f"predict {ALL}")
     shown = command(f"show {tmp_path}/P.h5")
     assert shown.out == made.out
-    for text in ("0.15 N", "recorded voltage", "sweep [1]", "holds for the exciter of magnet-beam"):
+    for text in ("0.15 N", "recorded voltage", "sweep [2]", "holds for the exciter of magnet-beam"):
         assert text in shown.out
     assert command(f"plot {tmp_path}/P.h5 -o {tmp_path}/P.png").status == 0
     assert (tmp_path / "P.png").stat().st_size > 50_000
