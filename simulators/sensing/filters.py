@@ -58,7 +58,7 @@ def output_sections(converter: Converter) -> Matrix:
 
 
 def dc_delay(sections: Matrix) -> NDArray[np.float64]:
-    """Return the group delay at low frequency [n_channel] of sections [n_section, 5, n_channel], in samples at the filters' rate.
+    """Return the low-frequency group delay [n_channel] of sections [n_section, 5, n_channel], in samples at the filters' rate.
 
     For ``H = B/A`` it is ``sum k b_k / sum b_k - sum k a_k / sum a_k``, summed over the sections.
     """
@@ -91,7 +91,7 @@ def lagrange_taps(delay: float) -> tuple[int, Matrix]:
     """Return the whole delay of the first tap, and the weights [TAPS] that interpolate ``delay`` (at least 0) samples back.
 
     Lagrange's polynomial passes through six values, three on either side of the wanted instant where there are so many. The
-    relative error of a sine of ``w`` rad per sample is up to ``0.024 w^6``, and ``0.005 w^6`` for delays of two samples or more.
+    relative error of a sine of ``w`` rad per sample is up to ``0.024 w^6``, or ``0.005 w^6`` from a delay of two samples on.
     """
     first = max(0, int(delay) - (TAPS // 2 - 1))
     nodes = np.arange(first, first + TAPS)
