@@ -1,6 +1,7 @@
-"""Compiled adaptive filter: several harmonics and the mean of a signal at once (least mean squares; Hippold et al. 2024).
+"""Compiled adaptive filter: estimates the mean and several harmonics of a signal at once.
 
-Arrays are complex128 with a number for the mean and each harmonic up to H = ``harmonics``; they may be longer.
+It is a least-mean-squares filter (Hippold et al. 2024).
+Arrays are complex128. Entry 0 is the mean, entry h is harmonic h, up to H = ``harmonics``; an array may be longer.
 """
 
 import math
@@ -24,11 +25,11 @@ def turn_phasors(phasors: np.ndarray, harmonics: int, cos_theta: float, sin_thet
 
 @kernel
 def adapt(coefficients: np.ndarray, phasors: np.ndarray, harmonics: int, value: float, gain: float) -> None:
-    """One step of the filter towards all harmonics and the mean of a signal.
+    """Update the estimates of the mean and all harmonics with one sample of the signal.
 
-    ``y_hat = Re sum C_h exp(i h theta)``, ``C_h <- C_h + 2 gain exp(-i h theta) (y - y_hat)``, the mean with half the step.
-    On average every C_h follows its Y_h through the first-order low-pass of ``gain = 1 - exp(-w_LP dt)``; what the model
-    holds makes no ripple, only harmonics beyond H do.
+    ``y_hat = Re sum C_h exp(i h theta)``, ``C_h <- C_h + 2 gain exp(-i h theta) (y - y_hat)``; the mean takes half the step.
+    On average every C_h follows the signal's Y_h through a first-order low-pass with ``gain = 1 - exp(-w_LP dt)``. Only
+    harmonics above H cause ripple.
     """
     error = value - coefficients[0].real
     for order in range(1, harmonics + 1):
@@ -43,7 +44,7 @@ def adapt(coefficients: np.ndarray, phasors: np.ndarray, harmonics: int, value: 
 
 @kernel
 def root_mean_square(coefficients: np.ndarray, harmonics: int) -> float:
-    """Root mean square of all harmonics of an adaptive filter, without the mean."""
+    """Return the root mean square of all harmonics of an adaptive filter, without the mean."""
     total = 0.0
     for order in range(1, harmonics + 1):
         c = coefficients[order]

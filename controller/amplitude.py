@@ -1,4 +1,4 @@
-"""The amplitude law: which loop makes the output's amplitude, and how one takes over from another without a bump."""
+"""The amplitude law: selects the loop that sets the output's amplitude, and switches between loops without a bump."""
 
 import math
 from enum import IntEnum
@@ -26,7 +26,7 @@ HELD_BACK = 1e-3  # an output further than this part from what the law demands i
 
 
 class AmplitudeLaw(IntEnum):
-    """What a level is, and so which loop makes the output's amplitude."""
+    """Quantity that a level prescribes; it decides which loop sets the output's amplitude."""
 
     VOLTAGE = 0
     """Amplitude of the output voltage (V, peak): no loop."""
@@ -46,8 +46,10 @@ AMPLITUDE = np.dtype(
 """Parameters of the amplitude law (one record), with one record for each of its loops."""
 
 OUTPUT = np.dtype([("amplitude_v", "f8"), ("turn", "f8"), ("behind", "i8"), ("turn_behind", "i8")])
-"""The output that was put out last (one record): amplitude and angle of ``u = Re(U exp(i theta))``, and whether they are held
-back from what the law demands: 1 while they cannot rise there as fast as they should, -1 while they cannot fall."""
+"""The last output (one record): amplitude and angle of ``u = Re(U exp(i theta))``.
+
+``behind``, ``turn_behind``: whether a limit holds amplitude and angle back from the demanded value: 1 while the value cannot
+rise as fast as demanded, -1 while it cannot fall as fast, else 0."""
 
 AMPLITUDE_STATE = np.dtype(
     [
@@ -61,19 +63,20 @@ AMPLITUDE_STATE = np.dtype(
         ("reference", REFERENCE_STATE),
     ]
 )
-"""State of the amplitude law (one record): the `AmplitudeLaw` of the moment, amplitude and angle that it demands, whether they
-stand at the largest voltage, the output that there was, and one record for each loop."""
+"""State of the amplitude law (one record): the present `AmplitudeLaw`, the demanded amplitude and angle, whether the demanded
+amplitude is at the largest voltage, the last output, and one record for each loop."""
 
 
 class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings):
-    """The loops behind levels in newtons and metres."""
+    """Settings of the loops that hold levels in newtons and metres."""
 
     def build_amplitude(
         self, amplitude_law: AmplitudeLaw, largest_v: float, dt_s: float, gain: float, sees_rest: bool
     ) -> np.ndarray:
-        """One record of `AMPLITUDE`; ``gain`` is the detector's, ``sees_rest`` whether the force at rest is estimated.
+        """Return one record of `AMPLITUDE`.
 
-        Raises ValueError for levels that no loop would hold.
+        ``gain`` is the detector's low-pass step; ``sees_rest`` says whether the force at rest is estimated. Raises ValueError
+        if the loop that should hold the levels has no integral gain.
         """
         through = self.force_loop == "through-response"
         if amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
@@ -95,7 +98,7 @@ class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings
 
 @inner_kernel
 def held_size(state: Record, vibration: Record) -> float:
-    """What the loop of the moment holds: a force (N), its RMS (N) or a displacement (m); 0 without a loop."""
+    """Return the measured value of the held quantity: force (N), its RMS (N) or displacement (m); 0 without a loop."""
     if state.law == FORCE:
         return float(vibration.force_n)
     if state.law == FORCE_RMS:
@@ -105,9 +108,9 @@ def held_size(state: Record, vibration: Record) -> float:
 
 @kernel
 def take_over(parameters: Record, state: Record, vibration: Record, law: int) -> float:
-    """Another `AmplitudeLaw` takes over; returns the level of the moment (V, N or m), where its levels begin.
+    """Switch to another `AmplitudeLaw` and return the present level (V, N or m), at which the new law starts.
 
-    All integrals begin where the rig is, so that the output does not jump.
+    All integrals start from the present output, so that the output does not jump.
     """
     state.law = law
     state.demanded_turn = state.output.turn
@@ -122,10 +125,11 @@ def take_over(parameters: Record, state: Record, vibration: Record, law: int) ->
 def demand(
     parameters: Record, state: Record, vibration: Record, level: float, wanted_lag: float, omega: float, by_loop: bool
 ) -> float:
-    """One sample of the amplitude law: the output amplitude (V) for ``level`` (V, N or m); its angle is ``demanded_turn``.
+    """Evaluate the amplitude law for one sample: return the output amplitude (V) for ``level`` (V, N or m).
 
-    Loops on the response keep what they demand while force and motion are not ``present``. ``by_loop``: the frequency law
-    gives the frequency ``omega`` (rad/s) for ``wanted_lag`` (rad); a tone of the plan has no wanted lag.
+    The output's angle is written to ``state.demanded_turn``. Loops that control the response keep their last demand while
+    force and motion are not ``present``. ``by_loop``: the frequency law sets the frequency ``omega`` (rad/s) so as to reach
+    ``wanted_lag`` (rad). If the plan gives the frequency there is no wanted lag.
     """
     output, behind = state.output, state.output.behind
     held = held_size(state, vibration)
@@ -152,7 +156,7 @@ def demand(
 
 @inner_kernel
 def see_output(state: Record, demanded_v: float, amplitude_v: float, turn: float) -> None:
-    """The output that was put out for ``demanded_v`` and the state's ``demanded_turn``, after all limits (V, rad)."""
+    """Store the actual output after all limits (V, rad), and which way it is held back from the demanded output."""
     output = state.output
     output.amplitude_v, output.turn = amplitude_v, turn
     output.behind = output.turn_behind = 0
@@ -163,7 +167,7 @@ def see_output(state: Record, demanded_v: float, amplitude_v: float, turn: float
 
 
 def amplitude_state(parameters: np.ndarray) -> np.ndarray:
-    """State of an amplitude law that begins at rest."""
+    """Return the state of an amplitude law that starts at rest."""
     out = np.zeros(1, AMPLITUDE_STATE)
     log_smallest_v = math.log(float(parameters["force"]["smallest_v"][0]))
     out["force"]["log_integral"] = out["response"]["log_integral"] = log_smallest_v

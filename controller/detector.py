@@ -1,4 +1,4 @@
-"""The detector: from samples of force and acceleration to their complex amplitudes, and from these to a phase error."""
+"""The detector: estimates the complex amplitudes of force and acceleration from samples, and from them the phase error."""
 
 import math
 from enum import IntEnum
@@ -16,22 +16,22 @@ __all__ = ["DETECTOR", "DETECTOR_STATE", "VIBRATION", "Detector", "DetectorSetti
 
 
 class Detector(IntEnum):
-    """How force and response become complex amplitudes, and these a phase error."""
+    """Method that estimates the complex amplitudes of force and response, and the phase error."""
 
     TWO_PHASE = 0
     """Synchronous demodulation through a first-order low-pass."""
     SIGN = 1
-    """Product of the signs of force and response; amplitudes as with two phases."""
+    """Product of the signs of force and response; amplitudes as with `TWO_PHASE`."""
     ADAPTIVE = 2
-    """Adaptive filter: several harmonics and the mean at once."""
+    """Adaptive filter: estimates the mean and several harmonics at once."""
 
 
 SIGN, ADAPTIVE = int(Detector.SIGN), int(Detector.ADAPTIVE)
 KINDS = {"two-phase": Detector.TWO_PHASE, "sign": Detector.SIGN, "adaptive": Detector.ADAPTIVE}
 
 DETECTOR = np.dtype([("kind", "i8"), ("harmonics", "i8"), ("gain", "f8"), ("mean_gain", "f8")])
-"""Parameters of the detector (one record): its `Detector`, harmonics of the adaptive filter, steps of the low-pass behind the
-demodulation and of the one that follows the mean of an input."""
+"""Parameters of the detector (one record): its `Detector`, and the number of harmonics of the adaptive filter. ``gain`` is the
+step of the low-pass after the demodulation, ``mean_gain`` the step of the low-pass that follows the mean of an input."""
 
 DETECTOR_STATE = np.dtype(
     [
@@ -42,7 +42,7 @@ DETECTOR_STATE = np.dtype(
         ("drive_filter", "c16", (MOST_HARMONICS + 1,)),
     ]
 )
-"""State of the detector (one record); of the last three the first H+1 entries count."""
+"""State of the detector (one record). Only the first H+1 entries of the three complex arrays are used."""
 
 VIBRATION = np.dtype(
     [
@@ -59,12 +59,13 @@ VIBRATION = np.dtype(
         ("rest_error_rad", "f8"),
     ]
 )
-"""What is measured of the vibration at a sample (one record): the laws read it, detector and rest estimate write it.
+"""Measured vibration at one sample (one record). Detector and rest estimate write it; the laws read it.
 
-``force``, ``drive``: fundamentals of the force (N) and the drive point's acceleration (m/s^2), with their sizes and that of the
-displacement. ``force_rms_n``: all harmonics together, where a law holds it. ``present``: whether both stand above the smallest
-amplitudes that a phase can be read from. ``error_rad``: phase error. ``rest_``: sizes and phase error as they will be once the
-vibration keeps still (`controller.rest`)."""
+``force``, ``drive``: complex fundamentals of the force (N) and of the drive point's acceleration (m/s^2). ``force_n``,
+``drive_m_s2``, ``displacement_m``: amplitudes of the fundamentals. ``force_rms_n``: RMS of all harmonics of the force, where
+a law holds it. ``present``: whether force and acceleration exceed the smallest amplitudes whose phase can be read.
+``error_rad``: phase error. ``rest_``: amplitudes and phase error expected once the vibration is steady
+(`controller.rest`)."""
 
 
 class DetectorSettings(Settings):
@@ -100,9 +101,9 @@ class DetectorSettings(Settings):
 
 @kernel
 def demodulate(estimate: complex, value: float, cos_theta: float, sin_theta: float, gain: float) -> complex:
-    """Two-phase (synchronous) demodulation: low-passed ``2 y exp(-i theta)``, which settles on Y_1.
+    """Return the two-phase (synchronous) demodulation: low-passed ``2 y exp(-i theta)``, which settles on Y_1.
 
-    Passes a ripple at 2 Omega of relative size a/(2 Omega), and harmonics h of y likewise at (h +- 1) Omega.
+    The estimate keeps a ripple at 2 Omega of relative size a/(2 Omega). A harmonic h of y causes ripple at (h +- 1) Omega.
     """
     return complex(
         estimate.real + gain * (2.0 * value * cos_theta - estimate.real),
@@ -112,10 +113,10 @@ def demodulate(estimate: complex, value: float, cos_theta: float, sin_theta: flo
 
 @kernel
 def sign_product(force: float, acceleration: float) -> float:
-    """Sign detector: sign(force) sign(displacement-like signal), the acceleration's sign reversed standing for displacement.
+    """Return sign(force) times sign(displacement); the reversed sign of the acceleration stands for that of the displacement.
 
-    For two sines its mean is ``(2/pi) e`` with the phase error e to phase resonance. Harmonics of either signal move
-    the zero crossings and bias it.
+    For two sines the mean of the product is ``(2/pi) e`` with the phase error e from phase resonance. Harmonics of either
+    signal move the zero crossings and bias the mean.
     """
     if force == 0.0 or acceleration == 0.0:
         return 0.0
@@ -124,7 +125,7 @@ def sign_product(force: float, acceleration: float) -> float:
 
 @kernel
 def phase_lag(force: complex, response: complex) -> float:
-    """Phase lag ``arg F_1 - arg Y_1`` in rad, in [-pi, pi)."""
+    """Return the phase lag ``arg F_1 - arg Y_1`` in rad, in [-pi, pi)."""
     product = force * complex(response.real, -response.imag)
     return math.atan2(product.imag, product.real)
 
@@ -133,10 +134,10 @@ def phase_lag(force: complex, response: complex) -> float:
 def detect(
     parameters: Record, state: Record, vibration: Record, force: float, drive: float, phasor: complex, omega: float
 ) -> None:
-    """One sample of force (N) and acceleration (m/s^2), without their means, into the fundamentals of ``vibration``.
+    """Update the fundamentals in ``vibration`` with one sample of force (N) and acceleration (m/s^2), both without mean.
 
-    ``phasor`` is ``exp(i theta)`` with the phase that was on the output when the sample was taken, ``omega`` the oscillator's
-    frequency (rad/s).
+    ``phasor`` is ``exp(i theta)`` with the oscillator's phase at the output when the sample was taken. ``omega`` is the
+    oscillator's frequency (rad/s).
     """
     gain = parameters.gain
     if parameters.kind == ADAPTIVE:
@@ -157,7 +158,7 @@ def detect(
 
 @kernel
 def force_rms(parameters: Record, state: Record) -> float:
-    """Root mean square of the force without its mean, all harmonics together (N)."""
+    """Return the root mean square of the force without its mean, all harmonics together (N)."""
     if parameters.kind == ADAPTIVE:
         return root_mean_square(state.force_filter, parameters.harmonics)
     return math.sqrt(state.force_square)
@@ -165,7 +166,10 @@ def force_rms(parameters: Record, state: Record) -> float:
 
 @inner_kernel
 def phase_error(parameters: Record, state: Record, vibration: Record, wanted_lag: float, lag_of_skew: float) -> float:
-    """Wanted minus measured phase lag in rad; ``lag_of_skew`` is the lag (rad) by which the force's channel is later."""
+    """Return wanted minus measured phase lag (rad), corrected for ``lag_of_skew``.
+
+    ``lag_of_skew`` is the phase (rad) by which the force channel is sampled later than the acceleration channel.
+    """
     if parameters.kind == SIGN:
         return float(0.5 * math.pi * state.sign_mean - lag_of_skew)
     return wrap(wanted_lag - phase_lag(vibration.force, vibration.drive) - lag_of_skew)

@@ -1,4 +1,4 @@
-"""The loops that hold a force by the voltage: linear as in the paper, or on logarithms."""
+"""The loops that hold a force by setting the voltage: linear as in the paper, or on logarithms."""
 
 import math
 from enum import IntEnum
@@ -20,7 +20,7 @@ class ForceLoop(IntEnum):
     LINEAR = 0
     """PI law from the force error to the voltage: K3, K4 of the paper."""
     LOGARITHMIC = 1
-    """PI law from the logarithm of the force ratio to that of the voltage: alike at every level."""
+    """PI law from the logarithm of the force ratio to the logarithm of the voltage: it acts alike at every level."""
     THROUGH_RESPONSE = 2
     """The active force sets the level of the response, which is held by its own loop (`controller.through_response`)."""
 
@@ -44,10 +44,10 @@ FORCE_LOOP = np.dtype(
         ("dt_s", "f8"),
     ]
 )
-"""Parameters of the force loops (one record): K3, K4 of the linear one, kp and ki of the logarithmic one."""
+"""Parameters of the force loops (one record): K3 and K4 of the linear loop, kp and ki of the logarithmic loop."""
 
 FORCE_LOOP_STATE = np.dtype([("integral", "f8"), ("log_integral", "c16")])
-"""State of the force loops (one record): integral of the linear one (V), and of the logarithmic one."""
+"""State of the force loops (one record): integral of the linear loop (V) and of the logarithmic loop."""
 
 
 class ForceSettings(Settings):
@@ -66,7 +66,7 @@ class ForceSettings(Settings):
     """Integral gain of the logarithmic force loop, 1/s."""
 
     def build_force(self, smallest_v: float, largest_v: float, dt_s: float) -> np.ndarray:
-        """One record of `FORCE_LOOP` for an output from ``smallest_v`` to ``largest_v``."""
+        """Return one record of `FORCE_LOOP` for an output from ``smallest_v`` to ``largest_v``."""
         out = np.zeros(1, FORCE_LOOP)
         out["loop"] = LOOPS[self.force_loop]
         out["k3"], out["k4"] = self.k3, self.k4
@@ -77,16 +77,17 @@ class ForceSettings(Settings):
 
 @kernel
 def begin_force(parameters: Record, state: Record, amplitude_v: float) -> None:
-    """A loop takes over from an output of ``amplitude_v``."""
+    """Start the integrals of both loops at the present output amplitude ``amplitude_v``."""
     state.integral = amplitude_v
     state.log_integral = complex(math.log(min(max(amplitude_v, parameters.smallest_v), parameters.largest_v)), 0.0)
 
 
 @kernel
 def hold_force(parameters: Record, state: Record, wanted_n: float, held_n: float, behind: int) -> float:
-    """One sample of the linear or the logarithmic loop: the output amplitude (V) for a force that should be ``wanted_n``.
+    """Evaluate the linear or the logarithmic loop for one sample: return the output amplitude (V) for the force ``wanted_n``.
 
-    ``behind``: 1 while the output cannot rise as fast as it should, -1 while it cannot fall; no integral goes further that way.
+    ``behind``: 1 while the output cannot rise as fast as demanded, -1 while it cannot fall as fast; the integral does not move
+    further in that direction.
     """
     if parameters.loop == LINEAR:
         demanded_v, integral = proportional_integral(

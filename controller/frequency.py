@@ -1,4 +1,4 @@
-"""The frequency law: what the oscillator's frequency follows while the loop is closed."""
+"""The frequency law: sets the oscillator's frequency while the loop is closed."""
 
 import math
 from enum import IntEnum
@@ -17,12 +17,12 @@ LARGEST_FREQUENCY_ERROR = 0.05  # of the frequency
 
 
 class FrequencyLaw(IntEnum):
-    """What the PI law of the frequency is fed with."""
+    """Error that the PI law of the frequency acts on."""
 
     PHASE = 0
     """The phase error, rad."""
     FREQUENCY_ERROR = 1
-    """The distance of the oscillator from where the structure has the wanted phase, rad/s."""
+    """Frequency at which the structure has the wanted phase, minus the oscillator's frequency, rad/s."""
 
 
 PHASE, FREQUENCY_ERROR = int(FrequencyLaw.PHASE), int(FrequencyLaw.FREQUENCY_ERROR)
@@ -44,22 +44,23 @@ FREQUENCY = np.dtype(
         ("dt_s", "f8"),
     ]
 )
-"""Parameters of the frequency law (one record). ``target_lag_rad``: the lag that is wanted where a plan names none."""
+"""Parameters of the frequency law (one record). ``target_lag_rad``: wanted lag where the plan names none."""
 
 FREQUENCY_STATE = np.dtype(
     [("omega", "f8"), ("integral", "f8"), ("mean_error_rad", "f8"), ("clamped", "i8"), ("taking_over", "i8")]
 )
-"""State of the frequency law (one record): the oscillator's frequency (rad/s), mean phase error of the last whole period,
-whether the frequency stands at an end of its window, and whether the law takes over at the next sample."""
+"""State of the frequency law (one record): the oscillator's frequency (rad/s), the PI law's integral (rad/s), the mean phase
+error of the last whole period, whether the frequency is at an end of its window, and whether the law takes over at the next
+sample."""
 
 
 class FrequencySettings(Settings):
-    """What the frequency follows, and where it may go.
+    """Error that the frequency follows, its gains and the frequency window.
 
-    The frequency follows ``Omega = omega_m + kp e + ki int e``. With ``frequency_law = "phase"`` e is the phase error in rad
-    and the gains are ``k1``, ``k2``. With ``"frequency-error"`` it is the distance to the wanted phase in rad/s,
-    ``eps = (phi_d^2 Omega / 2)(|F_1|/|A_1|) sin(phi* - lag)/|sin phi*|``, exact for one mode near resonance: the slope of the
-    phase, which goes with the damping, is divided out, and the gains are ``frequency_proportional`` and
+    The frequency law is ``Omega = omega_m + kp e + ki int e``. With ``frequency_law = "phase"`` e is the phase error in rad
+    and the gains are ``k1``, ``k2``. With ``"frequency-error"`` e is the frequency distance to the wanted phase in rad/s,
+    ``eps = (phi_d^2 Omega / 2)(|F_1|/|A_1|) sin(phi* - lag)/|sin phi*|``, exact for one mode near resonance. It divides out the
+    slope of the phase, which depends on the damping. Its gains are ``frequency_proportional`` and
     ``frequency_integral_per_s``.
     """
 
@@ -112,9 +113,10 @@ class FrequencySettings(Settings):
     def build_frequency(
         self, sample_rate_hz: float, drive_mode_shape: float | None, gains: tuple[float, float]
     ) -> np.ndarray:
-        """One record of `FREQUENCY` for the PI law's ``gains`` (kp, ki) and the drive point's mode shape (kg^-1/2).
+        """Return one record of `FREQUENCY` for the PI law's ``gains`` (kp, ki) and the drive point's mode shape (kg^-1/2).
 
-        Raises ValueError where the window reaches beyond a quarter of the sample rate or the mode shape is missing.
+        Raises ValueError if the window reaches beyond a quarter of the sample rate, or if the frequency-error law lacks the
+        mode shape.
         """
         if self.frequency_window_hz[1] > sample_rate_hz / 4.0:
             raise ValueError(
@@ -139,11 +141,13 @@ class FrequencySettings(Settings):
 
 @kernel
 def frequency_error(phase_error: float, compliance: float, omega: float, wanted_lag: float) -> float:
-    """Distance (rad/s) of the oscillator from where a mode has the wanted lag: ``(Omega/2)(phi_d^2 |F|/|A|) sin e/|sin phi*|``.
+    """Return the frequency error (rad/s): ``(Omega/2)(phi_d^2 |F|/|A|) sin e/|sin phi*|``.
 
-    ``compliance`` is ``phi_d^2 |F_1|/|A_1|``, ``phase_error`` e the wanted lag phi* less the measured one. With
-    ``phi_d^2 F/A = 1 - (w/Omega)^2 - 2 i zeta w/Omega`` and phi* = -90 deg it is ``w - Omega`` to first order: the slope of the
-    phase over the frequency, which goes with the damping, is divided out. Bounded by a part of Omega.
+    The frequency error is the frequency at which the mode has the wanted lag, minus the oscillator's. ``compliance`` is
+    ``phi_d^2 |F_1|/|A_1|``; ``phase_error`` e is the wanted lag phi* minus the measured lag. With
+    ``phi_d^2 F/A = 1 - (w/Omega)^2 - 2 i zeta w/Omega`` and phi* = -90 deg the error is ``w - Omega`` to first order: the slope
+    of the phase over frequency, which depends on the damping, is divided out. The error is limited to
+    `LARGEST_FREQUENCY_ERROR` times Omega.
     """
     bound = LARGEST_FREQUENCY_ERROR * omega
     error = 0.5 * omega * compliance * math.sin(phase_error) / abs(math.sin(wanted_lag))
@@ -152,7 +156,7 @@ def frequency_error(phase_error: float, compliance: float, omega: float, wanted_
 
 @inner_kernel
 def followed_error(parameters: Record, state: Record, vibration: Record, wanted_lag: float) -> float:
-    """What the PI law is fed with: one line for each `FrequencyLaw`, in rad or rad/s."""
+    """Return the error that the PI law acts on: a phase (rad) or a frequency error (rad/s), according to `FrequencyLaw`."""
     if parameters.law == FREQUENCY_ERROR:
         ratio = parameters.mode_shape_squared * vibration.rest_force_n / vibration.rest_drive_m_s2
         return frequency_error(vibration.rest_error_rad, ratio, state.omega, wanted_lag)
@@ -161,9 +165,9 @@ def followed_error(parameters: Record, state: Record, vibration: Record, wanted_
 
 @inner_kernel
 def follow(parameters: Record, state: Record, vibration: Record, wanted_lag: float) -> None:
-    """One sample of the frequency law: from the vibration and the wanted lag (rad) to ``state.omega`` (rad/s).
+    """Evaluate the frequency law for one sample: update ``state.omega`` (rad/s) from the vibration and the wanted lag (rad).
 
-    Where the law takes over from a frequency that the plan gave, its integral begins so that the frequency goes on from there.
+    When the law takes over from a frequency given by the plan, its integral is set so that the frequency does not jump.
     """
     error = followed_error(parameters, state, vibration, wanted_lag)
     if state.taking_over == 1:

@@ -1,4 +1,4 @@
-"""A control law as a whole: its parameters, its state, and the law of a tone whose frequency the plan gives."""
+"""A complete control law: its parameters, its state, and the open-loop law for a frequency given by the plan."""
 
 from typing import Protocol
 
@@ -17,7 +17,7 @@ __all__ = ["CONTROL", "LAW", "Law", "OpenLoop", "control_state"]
 LAW = np.dtype(
     [("detector", DETECTOR), ("rest", REST), ("frequency", FREQUENCY), ("amplitude", AMPLITUDE), ("lock", THRESHOLDS)]
 )
-"""Frozen parameters of a law (one record), made by `Law.build`: one record for each of its parts."""
+"""Frozen parameters of a law (one record), built by `Law.build`: one record for each part of the law."""
 
 CONTROL = np.dtype(
     [
@@ -30,11 +30,11 @@ CONTROL = np.dtype(
         ("period", PERIOD),
     ]
 )
-"""State of a law (one record): what is measured of the vibration, and one record for each part."""
+"""State of a law (one record): the measured vibration, and one record for each part of the law."""
 
 
 class Law(Protocol):
-    """A configured law: rules of the lock, and parameters for a sample rate."""
+    """A configured law: gives the rules of the lock, and builds the parameters for a sample rate."""
 
     @property
     def lock(self) -> LockRule:
@@ -47,15 +47,16 @@ class Law(Protocol):
         largest_v: float,
         drive_mode_shape: float | None = None,
     ) -> np.ndarray:
-        """One record of `LAW`; ValueError where the law does not fit.
+        """Return one record of `LAW`; raise ValueError if the settings do not suit these arguments.
 
-        ``amplitude_law`` is what the plan's levels are, ``largest_v`` the largest output amplitude (V), beyond which no loop
-        integrates, ``drive_mode_shape`` the tested mode's mass-normalised shape at the drive point (kg^-1/2), where known.
+        ``amplitude_law``: the quantity that the plan's levels prescribe. ``largest_v``: largest output amplitude (V), beyond
+        which no loop integrates. ``drive_mode_shape``: the tested mode's mass-normalised shape at the drive point (kg^-1/2),
+        where known.
         """
 
 
 def control_state(law: np.ndarray) -> np.ndarray:
-    """State of a law (one record of `CONTROL`) that begins at rest, at its centre frequency."""
+    """Return the state of a law (one record of `CONTROL`) that starts at rest, at its centre frequency."""
     out = np.zeros(1, CONTROL)
     out["frequency"]["omega"] = law["frequency"]["centre_rad_s"]
     out["amplitude"] = amplitude_state(law["amplitude"])
@@ -63,11 +64,11 @@ def control_state(law: np.ndarray) -> np.ndarray:
 
 
 class OpenLoop(DetectorSettings, AmplitudeSettings):
-    """No feedback of the phase: the plan gives the frequency, and the level is volts or is held by one of the loops."""
+    """Law without phase feedback: the plan gives the frequency. The level is a voltage or is held by an amplitude loop."""
 
     @property
     def lock(self) -> LockRule:
-        """Rules of a lock that is never sought; they name the smallest amplitudes a phase can be read from."""
+        """Rules of the lock. An open loop never seeks a lock, but needs the smallest amplitudes that they carry."""
         return LockRule()
 
     def build(
@@ -77,7 +78,7 @@ class OpenLoop(DetectorSettings, AmplitudeSettings):
         largest_v: float,
         drive_mode_shape: float | None = None,
     ) -> np.ndarray:
-        """Parameters for a sample rate: one record of `LAW`."""
+        """Return the parameters for a sample rate: one record of `LAW`."""
         out = np.zeros(1, LAW)
         out["detector"] = self.build_detector(sample_rate_hz)
         gain = float(out["detector"]["gain"][0])
@@ -88,10 +89,11 @@ class OpenLoop(DetectorSettings, AmplitudeSettings):
 
 @inner_kernel
 def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_skew: float, by_loop: bool) -> bool:
-    """Behind the detector, once a sample: whether there is a phase to be read, its error, and the force at rest.
+    """Update presence, phase error and force at rest in ``control.vibration``; called after the detector, once a sample.
 
-    ``wanted_lag`` and ``lag_of_skew`` (by which the force's channel is later) in rad; ``by_loop``: the frequency law gives the
-    frequency. Returns whether the loop is closed: it gives the frequency, and force and motion are present.
+    ``wanted_lag`` and ``lag_of_skew`` are in rad; the latter is the phase by which the force channel is sampled later.
+    ``by_loop``: the frequency law gives the frequency. Return whether the loop is closed: the frequency law gives the
+    frequency, and force and motion are present.
     """
     vibration = control.vibration
     present = vibration.force_n >= law.lock.smallest_force_n and vibration.drive_m_s2 >= law.lock.smallest_response

@@ -1,4 +1,4 @@
-"""The phase lock: when it counts as gained and as lost."""
+"""The phase lock: decides when a lock counts as gained and as lost."""
 
 import math
 from enum import IntEnum
@@ -23,7 +23,7 @@ class LockState(IntEnum):
     LOCKED = 2
     """The phase error has stayed small for several periods."""
     LOST = 3
-    """Was locked; the error has been large for several periods while the level was held. A fault."""
+    """A lock was lost: the error has been large for several periods while the level was held. This is a fault."""
 
 
 SEARCHING, ACQUIRING, LOCKED, LOST = (int(state) for state in LockState)
@@ -38,7 +38,7 @@ THRESHOLDS = np.dtype(
         ("smallest_response", "f8"),
     ]
 )
-"""When a lock is gained and lost (one record)."""
+"""Thresholds at which a lock is gained and lost (one record)."""
 
 LOCK = np.dtype([("state", "i8"), ("close_periods", "i8"), ("far_periods", "i8")])
 """State of the phase lock (one record)."""
@@ -63,7 +63,7 @@ class LockRule(Settings):
         return self
 
     def build(self, smallest_force_n: float = 0.0, smallest_response: float = 0.0) -> np.ndarray:
-        """One record of `THRESHOLDS`; the smallest amplitudes (N and the response's unit) come from the bench's sensors."""
+        """Return one record of `THRESHOLDS`; the bench's sensors give the smallest amplitudes (N and the response's unit)."""
         out = np.zeros(1, THRESHOLDS)
         out["locked_rad"] = math.radians(self.locked_deg)
         out["locked_periods"] = self.locked_periods
@@ -76,10 +76,10 @@ class LockRule(Settings):
 
 @kernel
 def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool, error: float) -> None:
-    """Advance the lock state by one oscillator period, from the period's mean phase error (rad).
+    """Advance the lock state by one oscillator period, given the period's mean phase error (rad).
 
-    ``present``: force and response stand above the smallest amplitudes that a phase can be read from.
-    ``held``: the level is not being ramped; only then is a large error counted towards a lost lock.
+    ``present``: force and response exceed the smallest amplitudes whose phase can be read.
+    ``held``: the level is not being ramped; only then does a large error count towards a lost lock.
     """
     size = abs(error)
     if not present:
@@ -109,7 +109,7 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
 
 @kernel
 def reacquire(lock: Record) -> None:
-    """A new level is being approached: a lost lock may be sought again."""
+    """Return to ACQUIRING because a new level is being approached; a lost lock may be sought again."""
     lock.far_periods = 0
     lock.close_periods = 0
     lock.state = ACQUIRING

@@ -1,4 +1,4 @@
-"""Means over a period of the oscillator: lock, settle rule and the watch on the rig go by them."""
+"""Means over one period of the oscillator; lock, settle rule and rig supervision use them."""
 
 import numpy as np
 
@@ -22,14 +22,15 @@ PERIOD = np.dtype(
         ("clamped", "i8"),
     ]
 )
-"""Sums over the period under way, and the means of the last one (one record). ``held``: what the amplitude law holds (N or m).
-``output_v``, ``saturated``, ``clamped``: amplitude of the output, and whether output and frequency stood at a bound, at its
-end."""
+"""Sums over the current period, and means over the last complete period (one record).
+
+``held``: quantity that the amplitude law holds (N or m). ``output_v``, ``saturated``, ``clamped``: at the end of the last
+period, the amplitude of the output, whether the output was at its bound and whether the frequency was."""
 
 
 @inner_kernel
 def add_sample(period: Record, vibration: Record, held: float) -> None:
-    """Take one sample of the vibration, and of the quantity that the amplitude law holds, into the period under way."""
+    """Add one sample of the vibration, and of the quantity that the amplitude law holds, to the current period's sums."""
     period.sum_error += vibration.error_rad
     period.sum_drive += vibration.drive_m_s2
     period.sum_force += vibration.force_n
@@ -39,7 +40,7 @@ def add_sample(period: Record, vibration: Record, held: float) -> None:
 
 @kernel
 def end_period(period: Record) -> bool:
-    """The period under way is over: its means, and sums that begin again; False for one without a sample."""
+    """Store the means of the period that has ended and reset the sums; return False if the period has no sample."""
     n = period.samples
     if n == 0:
         return False

@@ -1,4 +1,4 @@
-"""The phase-locked loop: all settings of a law that gives the frequency."""
+"""The phase-locked loop: all settings of a law that controls the frequency."""
 
 import math
 from typing import Self
@@ -35,7 +35,10 @@ class PhaseLockedLoop(FrequencySettings, RestSettings, DetectorSettings, Amplitu
         return self
 
     def proportional_and_integral(self) -> tuple[float, float]:
-        """``(kp, ki)`` of the PI law: in 1/s and 1/s^2 for a phase error in rad, 1 and 1/s for a frequency error in rad/s."""
+        """Return ``(kp, ki)`` of the PI law.
+
+        The units are 1/s and 1/s^2 for a phase error in rad, and 1 and 1/s for a frequency error in rad/s.
+        """
         if self.detector == "sign":  # the phase law alone works with it, in the paper's own parameters
             kp = 2.0 / math.pi * self.k2 / self.low_pass_rad_s
             return kp, self.k1 * kp
@@ -49,10 +52,10 @@ class PhaseLockedLoop(FrequencySettings, RestSettings, DetectorSettings, Amplitu
         largest_v: float,
         drive_mode_shape: float | None = None,
     ) -> np.ndarray:
-        """Parameters for a sample rate: one record of `controller.law.LAW`; see `controller.law.Law`.
+        """Return the parameters for a sample rate: one record of `controller.law.LAW`; see `controller.law.Law`.
 
-        Raises ValueError where the window reaches beyond a quarter of the sample rate, the loop that would hold the level has
-        no gain, or the frequency error lacks the mode shape.
+        Raises ValueError if the window reaches beyond a quarter of the sample rate, if the loop that should hold the level has
+        no gain, or if the mode shape is needed and missing.
         """
         shape = self.drive_mode_shape or drive_mode_shape
         out = np.zeros(1, LAW)

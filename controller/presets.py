@@ -1,13 +1,14 @@
 """The paper's controller, in both readings of its table of gains.
 
-The paper (Scheel et al., appendix) gives a table of gains for a controller whose diagram its text source lacks. Two
-readings fit the text and its sibling papers; both are presets and neither is claimed to be certain:
+The paper (Scheel et al., appendix) gives a table of gains, but its text source lacks the diagram of the controller. Two
+readings fit the text and its sibling papers. Both are presets, and neither is claimed to be certain:
 
-* reading B, ``two-phase``: force and response demodulated with the oscillator's phase through ``a/(s+a)``, the lag by
-  the arctangent, ``Omega = omega_m + K1 e + K2 int e``; the force loop is ``U = K3 e_F + K4 int e_F``;
-* reading A, ``sign``: the product of the signs of force and displacement through ``K2/(s+a)``, then ``(s+K1)/s``.
+* reading B, ``two-phase``: force and response are demodulated with the oscillator's phase and low-passed by ``a/(s+a)``;
+  the arctangent gives the lag. ``Omega = omega_m + K1 e + K2 int e``; the force loop is ``U = K3 e_F + K4 int e_F``;
+* reading A, ``sign``: the product of the signs of force and displacement passes ``K2/(s+a)``, then ``(s+K1)/s``.
 
-The sign product's mean is ``(2/pi) e``, so that reading A too is a PI law on e, with ``kp = (2/pi) K2/a`` and ``ki = K1 kp``.
+The mean of the sign product is ``(2/pi) e``, so that reading A is a PI law on e as well, with ``kp = (2/pi) K2/a`` and
+``ki = K1 kp``.
 """
 
 import math
@@ -31,9 +32,9 @@ def preset(
     test: Literal["backbone", "stepped-phase"] = "backbone",
     reading: Literal["A", "B"] = "B",
 ) -> PhaseLockedLoop:
-    """The paper's controller for a specimen and a test, in reading A (sign detector) or B (two-phase).
+    """Return the paper's controller for a specimen and a test, in reading A (sign detector) or B (two-phase).
 
-    The paper gives no frequency window; +-10 % of the specimen's linear frequency is ours (24.37 and 149.0 Hz).
+    The paper gives no frequency window. This preset uses +-10 % around the specimen's linear frequency (24.37 or 149.0 Hz).
     """
     k1, k2, k3, k4, centre = _PAPER[specimen, test]
     linear_hz = {"magnet-beam": 24.37, "friction-beam": 149.0}[specimen]

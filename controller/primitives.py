@@ -1,8 +1,8 @@
 """Compiled primitives of every law: oscillator, low-pass, PI laws with clamp.
 
-Conventions of the whole package: ``theta`` is the oscillator's phase in rad; a signal is ``y(t) = Re sum_h Y_h exp(i h theta)``
-with peak amplitudes; the phase lag of a response Y behind a force F is ``arg F_1 - arg Y_1``; the phase error is the wanted
-lag minus the measured one, wrapped, positive below resonance, so that a positive error asks for a higher frequency.
+Conventions of the whole package: ``theta`` is the oscillator's phase in rad. A signal is ``y(t) = Re sum_h Y_h exp(i h theta)``
+with peak amplitudes. The phase lag of a response Y behind a force F is ``arg F_1 - arg Y_1``. The phase error is the wanted
+lag minus the measured lag, wrapped; it is positive below resonance, so that a positive error asks for a higher frequency.
 """
 
 import math
@@ -15,13 +15,13 @@ LARGEST_ERROR = 1.0  # of a logarithm: a factor of e; a larger error counts as t
 
 @kernel
 def wrap(angle: float) -> float:
-    """Angle in rad brought into [-pi, pi)."""
+    """Return an angle in rad wrapped into [-pi, pi)."""
     return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 
 @kernel
 def advance_phase(theta: float, omega: float, dt: float) -> float:
-    """Oscillator: the phase one sample on, in [0, 2 pi)."""
+    """Return the oscillator's phase one sample later, in [0, 2 pi)."""
     theta = theta + omega * dt
     if theta >= TWO_PI:
         theta -= TWO_PI
@@ -30,13 +30,16 @@ def advance_phase(theta: float, omega: float, dt: float) -> float:
 
 @kernel
 def track(mean: float, value: float, gain: float) -> float:
-    """First-order low-pass a/(s + a), exact for a held input: ``gain = 1 - exp(-a dt)``."""
+    """Return the next output of a first-order low-pass a/(s + a), exact for a held input: ``gain = 1 - exp(-a dt)``."""
     return mean + gain * (value - mean)
 
 
 @kernel
 def size(value: complex) -> float:
-    """Modulus of a complex amplitude; a plain root: the library's overflow-proof one costs a tenth of the sample."""
+    """Return the modulus of a complex amplitude by a plain square root.
+
+    The library's overflow-proof modulus would cost a tenth of the computing time of a sample.
+    """
     return math.sqrt(value.real * value.real + value.imag * value.imag)
 
 
@@ -44,9 +47,9 @@ def size(value: complex) -> float:
 def proportional_integral(
     error: float, integral: float, kp: float, ki: float, dt: float, centre: float, lowest: float, highest: float
 ) -> tuple[float, float]:
-    """PI law with clamp: returns (output, integral).
+    """Evaluate a PI law with clamp; return (output, integral).
 
-    Anti-windup by conditional integration: while the output stands at a bound, the integral may only move away from it.
+    Anti-windup by conditional integration: while the output is at a bound, the integral may only move away from it.
     """
     step = ki * error * dt
     output = centre + kp * error + integral + step
@@ -59,7 +62,7 @@ def proportional_integral(
 
 @kernel
 def log_ratio(wanted: float, measured: float) -> float:
-    """``ln(wanted / measured)``, bounded; a level of zero, or nothing measured, gives the bound."""
+    """Return ``ln(wanted / measured)`` within +-`LARGEST_ERROR`; the bound itself if either value is not above zero."""
     if not measured > 0.0:
         return LARGEST_ERROR
     if not wanted > 0.0:
@@ -71,11 +74,12 @@ def log_ratio(wanted: float, measured: float) -> float:
 def log_proportional_integral(
     error: complex, integral: complex, kp: complex, ki: float, dt: float, lowest: float, highest: float, held: int
 ) -> tuple[float, float, complex]:
-    """``ln U = kp E + ki int E`` with complex E, U and kp: returns (|U|, arg U, integral).
+    """Evaluate ``ln U = kp E + ki int E`` with complex E, U and kp; return (|U|, arg U, integral).
 
-    On logarithms a gain means the same at every level, and U stays positive. |U| stays within ``lowest`` to ``highest``; while
-    it stands at one, the integral of the amplitude may only move away from there. ``held``: 1 while the output cannot rise to U
-    as fast as it should, -1 while it cannot fall: the integral goes no further that way. The angle is never held.
+    On logarithms a gain has the same effect at every level, and |U| stays positive. |U| stays within ``lowest`` to ``highest``;
+    while |U| is at a bound, the real part of the integral may only move away from that bound. ``held``: 1 while the output
+    cannot rise to U as fast as demanded, -1 while it cannot fall as fast; the real part of the integral does not move further
+    in that direction. The imaginary part, which gives the angle, is never held.
     """
     step = error * (ki * dt)
     proposed = integral + step

@@ -1,4 +1,4 @@
-"""The loop that holds the response: on the logarithm of the complex output, with a gain that follows the plant."""
+"""The loop that holds the response: it acts on the logarithm of the complex output, with a gain that follows the plant."""
 
 import math
 from typing import Literal
@@ -26,14 +26,14 @@ RESPONSE_LOOP = np.dtype(
         ("dt_s", "f8"),
     ]
 )
-"""Parameters of the response's loop (one record). ``turns``: whether it holds the response's phase too, by turning the
-output's; ``gain``: step of the low-pass that its error passes."""
+"""Parameters of the response loop (one record). ``turns``: whether the loop also holds the phase of the response, by turning
+the phase of the output; ``gain``: step of the low-pass that the loop's error passes."""
 
 RESPONSE_LOOP_STATE = np.dtype(
     [("log_integral", "c16"), ("reference_turn", "f8"), ("error", "c16"), ("plant_ratio", "c16")]
 )
-"""State of the response's loop (one record). ``reference_turn``: angle at which the acceleration is held (rad);
-``plant_ratio``: the plant's gain over the one for which kp is right."""
+"""State of the response loop (one record). ``reference_turn``: angle at which the acceleration is held (rad);
+``plant_ratio``: present gain of the plant, divided by the gain for which kp was designed."""
 
 
 class ResponseSettings(Settings):
@@ -51,9 +51,9 @@ class ResponseSettings(Settings):
     `plant_pole_rad_s` holds. With it the proportional gain follows the pole as this ratio changes with the level."""
 
     def build_response(self, smallest_v: float, largest_v: float, dt_s: float, gain: float) -> np.ndarray:
-        """One record of `RESPONSE_LOOP` for an output from ``smallest_v`` to ``largest_v``; ``gain`` is the detector's.
+        """Return one record of `RESPONSE_LOOP` for an output from ``smallest_v`` to ``largest_v``.
 
-        Raises ValueError for a plant that is unstable.
+        ``gain`` is the detector's low-pass step. Raises ValueError if the plant's pole is unstable.
         """
         out = np.zeros(1, RESPONSE_LOOP)
         out["kp"] = self._proportional()
@@ -76,7 +76,7 @@ class ResponseSettings(Settings):
 
 @kernel
 def begin_response(parameters: Record, state: Record, vibration: Record, output: Record) -> None:
-    """The loop takes over from the ``output`` of the moment: the response is held at the phase that it has."""
+    """Start the loop from the present ``output``; the response will be held at its present phase."""
     amplitude = output.amplitude_v
     state.log_integral = complex(
         math.log(min(max(amplitude, parameters.smallest_v), parameters.largest_v)), output.turn
@@ -88,10 +88,10 @@ def begin_response(parameters: Record, state: Record, vibration: Record, output:
 
 @kernel
 def response_proportional(parameters: Record, state: Record, drive: complex, output: Record) -> complex:
-    """The loop's kp, following the plant: ``kp (A/U)/G``, G what A/U was where kp was right.
+    """Return the proportional gain adapted to the plant: ``kp (A/U)/G``, where G is the A/U for which kp was designed.
 
-    A softening structure moves the plant's pole p, while the residue of ``A/U = R/(i W - p)`` is the shaker's: -p goes
-    with U/A. Within a factor; without G the gain stays.
+    A softening structure moves the plant's pole p. The shaker alone sets the residue R of ``A/U = R/(i W - p)``, so that -p
+    is proportional to U/A. The ratio is limited to a factor of `PLANT_VARIES` either way. Without G the gain is constant.
     """
     if parameters.plant_gain == 0.0:
         return complex(parameters.kp)
@@ -108,9 +108,9 @@ def response_proportional(parameters: Record, state: Record, drive: complex, out
 def hold_response(
     parameters: Record, state: Record, vibration: Record, output: Record, wanted_m: float
 ) -> tuple[float, float]:
-    """One sample of the loop: amplitude (V) and angle (rad) of the output for a displacement that should be ``wanted_m``.
+    """Evaluate the loop for one sample: return amplitude (V) and angle (rad) of the output for the displacement ``wanted_m``.
 
-    ``ln U = kp E + K int E``, ``E = ln(X_ref/X) + i (phi_0 - arg A_1)``; without ``turns`` the real part.
+    ``ln U = kp E + K int E``, ``E = ln(X_ref/X) + i (phi_0 - arg A_1)``; without ``turns`` E is its real part alone.
     """
     turned = 0.0
     if parameters.turns == 1:
@@ -128,7 +128,7 @@ def hold_response(
         parameters.largest_v,
         output.behind,
     )
-    if (integral.imag - before) * output.turn_behind > 0.0:  # no further the way that the output cannot turn
+    if (integral.imag - before) * output.turn_behind > 0.0:  # the output cannot turn this way
         angle -= integral.imag - before
         integral = complex(integral.real, before)
     state.log_integral = integral

@@ -1,4 +1,4 @@
-"""The force at rest: what the vibration of the moment will need once it keeps still."""
+"""The force at rest: estimates the force that the present vibration will need once its amplitude and phase are steady."""
 
 import math
 
@@ -13,15 +13,18 @@ from vibrolock.compiled import Record, inner_kernel
 __all__ = ["REST", "REST_STATE", "RestSettings"]
 
 REST = np.dtype([("gain", "f8"), ("share", "f8"), ("mode_shape_squared", "f8"), ("dt_s", "f8")])
-"""Parameters of the estimate (one record): step of the low-pass behind the response's rate of change, 0 where force and lag are
-taken as they are; part of the force behind that rate which is taken out; the drive point's mode shape squared (1/kg)."""
+"""Parameters of the estimate (one record).
+
+``gain``: step of the low-pass used for the response's rate of change; 0 takes force and lag as measured. ``share``: part of
+the force causing that rate of change which is subtracted. ``mode_shape_squared``: the drive point's mode shape squared
+(1/kg)."""
 
 REST_STATE = np.dtype([("late_force", "c16"), ("late_drive", "c16")])
-"""State of the estimate (one record): fundamentals that have passed one more low-pass."""
+"""State of the estimate (one record): fundamentals of force and drive after one more low-pass."""
 
 
 class RestSettings(Settings):
-    """Whether the laws go by the force that is left at rest."""
+    """Whether the laws use the force at rest instead of the measured force."""
 
     rest_low_pass_rad_s: float = Field(0.0, ge=0, le=1e4)
     """Where above 0, frequency error and force through response go by the force that is left once the response keeps still:
@@ -32,7 +35,7 @@ class RestSettings(Settings):
     runs away. Too large a mode shape only slows the loops down."""
 
     def build_rest(self, sample_rate_hz: float, drive_mode_shape: float | None) -> np.ndarray:
-        """One record of `REST`; ValueError where the mode shape (kg^-1/2) is needed and missing."""
+        """Return one record of `REST`; raise ValueError if the mode shape (kg^-1/2) is needed and missing."""
         if drive_mode_shape is None and self.rest_low_pass_rad_s > 0.0:
             raise ValueError(
                 "drive_mode_shape: rest_low_pass_rad_s needs it, here or as specimen.drive_mode_shape of the bench"
@@ -47,7 +50,7 @@ class RestSettings(Settings):
 
 @inner_kernel
 def take_as_measured(state: Record, vibration: Record) -> None:
-    """No estimate: force, motion and phase error at rest are those measured."""
+    """Without an estimate, set force, motion and phase error at rest to the measured values."""
     state.late_force, state.late_drive = vibration.force, vibration.drive
     vibration.rest_force_n, vibration.rest_drive_m_s2 = vibration.force_n, vibration.drive_m_s2
     vibration.rest_error_rad = vibration.error_rad
@@ -57,11 +60,11 @@ def take_as_measured(state: Record, vibration: Record) -> None:
 def see_rest(
     parameters: Record, state: Record, vibration: Record, omega: float, wanted_lag: float, lag_of_skew: float
 ) -> None:
-    """One sample of the estimate, for an oscillator at ``omega`` (rad/s) under a loop that wants ``wanted_lag`` (rad).
+    """Update the estimate with one sample, for the oscillator's frequency ``omega`` (rad/s) and ``wanted_lag`` (rad).
 
-    A mode whose displacement X grows and turns slowly takes ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``; its last
-    term, by the acceleration's amplitude ``2 i/(W phi_d^2) dA/dt``, is zero at rest. Force and motion pass one more low-pass
-    for the derivative. With ``gain`` 0 force and lag are those measured.
+    A mode whose complex displacement X changes slowly needs ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``. The last
+    term vanishes at rest; expressed by the acceleration it is ``F = -2 i/(W phi_d^2) dA/dt``, of which ``share`` is subtracted.
+    Force and motion pass one more low-pass, which gives the derivative. With ``gain`` 0 force and lag are those measured.
     """
     if parameters.gain == 0.0:
         take_as_measured(state, vibration)

@@ -1,4 +1,4 @@
-"""The base of every group of settings of `[controller]`."""
+"""The base class of every group of settings in `[controller]`."""
 
 from pydantic import BaseModel, ConfigDict
 

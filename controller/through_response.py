@@ -1,4 +1,7 @@
-"""The loop that holds a force through the response: the part of the force that feeds the vibration sets its level."""
+"""The loop that holds a force by controlling the response.
+
+It adjusts the reference of the response from the active force, the part of the force that feeds power into the vibration.
+"""
 
 import math
 
@@ -11,14 +14,14 @@ from vibrolock.compiled import Record, kernel
 
 __all__ = ["REFERENCE", "REFERENCE_STATE", "ThroughResponseSettings"]
 
-SLOPE_FORGETS = 0.5  # rate at which a slope is forgotten, over that of the loop it is for
+SLOPE_FORGETS = 0.5  # rate at which the slope estimate forgets, as a fraction of the loop's integral gain
 STEEPEST = 10.0
-UNMOVED = 1e-7  # square of a logarithm's change (0.03 %) below which a slope is not believed
-SMALLEST_M = 1e-15  # no displacement is smaller than an atom's nucleus: a floor for logarithms
+UNMOVED = 1e-7  # square of a logarithmic change (0.03 %) below which the slope estimate tends to 1
+SMALLEST_M = 1e-15  # about the size of an atomic nucleus: lower bound of displacements in logarithms
 
 REFERENCE = np.dtype([("ki", "f8"), ("follows_slope", "i8"), ("dt_s", "f8")])
-"""Parameters of the loop (one record). ``follows_slope``: whether its gain is divided by the slope of the force over the
-response."""
+"""Parameters of the loop (one record). ``follows_slope``: whether the loop's gain is divided by the slope of the force over
+the response."""
 
 REFERENCE_STATE = np.dtype(
     [
@@ -30,7 +33,7 @@ REFERENCE_STATE = np.dtype(
         ("product_xf", "f8"),
     ]
 )
-"""State of the loop (one record): logarithm of the displacement (m) that it wants; sums of the slope."""
+"""State of the loop (one record): logarithm of the wanted displacement (m), and sums for estimating the slope."""
 
 
 class ThroughResponseSettings(Settings):
@@ -40,7 +43,7 @@ class ThroughResponseSettings(Settings):
     """Gain from the logarithm of the active force ratio to that of the response's level, 1/s."""
 
     def build_reference(self, dt_s: float, follows_slope: bool) -> np.ndarray:
-        """One record of `REFERENCE`."""
+        """Return one record of `REFERENCE`."""
         out = np.zeros(1, REFERENCE)
         out["ki"], out["follows_slope"], out["dt_s"] = self.reference_integral_per_s, follows_slope, dt_s
         return out
@@ -48,19 +51,19 @@ class ThroughResponseSettings(Settings):
 
 @kernel
 def begin_reference(state: Record, displacement_m: float) -> None:
-    """The loop takes over at the displacement that there is."""
+    """Start the loop at the present displacement (m)."""
     state.log_displacement = math.log(max(displacement_m, SMALLEST_M))
     state.slope_known = 0
 
 
 @kernel
 def force_at_lag(vibration: Record, held_n: float, wanted_lag: float, is_rms: bool) -> float:
-    """The force ``held_n`` as it would be at the wanted lag (rad) and at rest, if the response stayed as it is.
+    """Return the force (N) that the present response would need at the wanted lag (rad) and at rest.
 
-    The part of the fundamental that feeds the vibration stays, ``F sin psi`` with the lag psi of the displacement,
-    and so do the harmonics of a root mean square. It may be negative where the force brakes.
+    The active part of the fundamental, ``F sin psi`` with the lag psi of the displacement, is kept. For an RMS (``is_rms``) the
+    harmonics contained in ``held_n`` are kept as well. The result is negative where the force brakes the vibration.
     """
-    # the lag is that of the acceleration, whose sine is minus that of the displacement's: the ratio is the same
+    # wanted_lag refers to the acceleration; its sine is minus that of the displacement's lag, so that the ratio is the same
     fundamental = vibration.rest_force_n * math.sin(wanted_lag - vibration.rest_error_rad) / math.sin(wanted_lag)
     if not is_rms:
         return float(fundamental)
@@ -70,9 +73,10 @@ def force_at_lag(vibration: Record, held_n: float, wanted_lag: float, is_rms: bo
 
 @kernel
 def force_slope(parameters: Record, state: Record, vibration: Record, wanted_lag: float, omega: float) -> float:
-    """``d ln(F sin psi)/d ln X`` as it was of late, by least squares with forgetting, within bounds; 1 where nothing moved.
+    """Return the recent slope ``d ln(F sin psi)/d ln X``, by least squares with forgetting, within 1 and `STEEPEST`.
 
-    Where friction begins to slide it is 5 and more: the loop through the response would have so many times its gain.
+    The slope is 1 if the response has not changed. Where friction begins to slide it is 5 or more; without dividing by it, the
+    gain of the loop would be that many times too high.
     """
     active = vibration.rest_force_n * abs(math.sin(wanted_lag - vibration.rest_error_rad))
     if parameters.follows_slope == 0 or not active > 0.0:
@@ -95,9 +99,9 @@ def force_slope(parameters: Record, state: Record, vibration: Record, wanted_lag
 def wanted_displacement(
     parameters: Record, state: Record, wanted_n: float, active_n: float, slope: float, saturated: bool, behind: int
 ) -> float:
-    """One sample of the loop: the displacement (m) at which the active force should become ``wanted_n``.
+    """Evaluate the loop for one sample: return the displacement (m) at which the active force should become ``wanted_n``.
 
-    ``d ln X_ref/dt = (k/s) ln(F* sin psi*/(F sin psi))`` with the slope s; it waits while the output cannot follow.
+    ``d ln X_ref/dt = (k/s) ln(F* sin psi*/(F sin psi))`` with the slope s. X_ref does not move while the output cannot follow.
     """
     error = log_ratio(wanted_n, active_n) / slope
     if behind >= 0 if error < 0.0 else (not saturated and behind <= 0):

@@ -1,9 +1,9 @@
-"""The DAQ contract: everything above it works with any driver that keeps it.
+"""The DAQ contract, which every driver must keep; all other code relies on it alone.
 
-A driver swaps blocks of samples with a device. With ``n`` samples a block and a queue of ``q`` blocks in the device,
-call j of `DAQ.exchange` returns the inputs of the instants ``j n ... j n + n - 1``, in volts, once all are measured; the
-outputs handed over in call j are on the converter at the instants ``(j + q) n ... (j + q) n + n - 1``. ``q = 0`` with
-``n = 1`` is sample-synchronous hardware.
+A driver exchanges blocks of samples with a device. With ``n`` samples a block and a queue of ``q`` blocks in the device,
+call j of `DAQ.exchange` returns the inputs of the instants ``j n ... j n + n - 1``, in volts, once all are measured. The
+outputs passed in call j are on the converter at the instants ``(j + q) n ... (j + q) n + n - 1``. ``q = 0`` with ``n = 1`` is
+sample-synchronous hardware.
 """
 
 from abc import ABC, abstractmethod
@@ -21,11 +21,11 @@ from rig.errors import DaqError, DaqRefused, RigError, as_daq_error
 __all__ = ["DAQ", "LOST", "Capabilities", "Channel", "Role", "State"]
 
 LOST = 1 << 15
-"""Bit of `DAQ.flags`: the sample was lost on its way, its inputs are NaN."""
+"""Bit of `DAQ.flags`: the sample was lost in transfer; its inputs are NaN."""
 
 
 class Capabilities(Configured):
-    """What a driver can do; the conformance suite and the loop ask here instead of for its type."""
+    """Capabilities of a driver; the conformance suite and the loop check these instead of the driver's type."""
 
     largest_block: int = Field(ge=1)
     """Largest number of samples a call may swap."""
@@ -49,10 +49,10 @@ class State(Enum):
 
 
 class _AsDaqError:
-    """Turns whatever a driver raises into a `DaqError`; so nobody above has to know the exceptions of a vendor."""
+    """Context that converts any exception of a driver into a `DaqError`; callers need not know a vendor's exceptions."""
 
     def __enter__(self) -> None:
-        """Nothing."""
+        """Do nothing on entry."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -67,24 +67,25 @@ _AS_DAQ_ERROR = _AsDaqError()
 class DAQ(ABC):
     """A data acquisition device with one output and several inputs.
 
-    ``open -> start -> exchange ... -> stop -> close``, or as a context manager, which opens and closes. Nothing is opened
-    by the constructor. `close` may be called at any time, any number of times, and leaves the output at 0 V; so does
-    `stop`. A driver implements the methods with a leading underscore and leaves the rest alone.
+    Call order: ``open -> start -> exchange ... -> stop -> close``. As a context manager the object opens and closes itself. The
+    constructor opens nothing. `close` may be called at any time, any number of times, and leaves the output at 0 V; `stop` also
+    leaves it at 0 V. A driver implements the methods with a leading underscore and overrides no other methods.
 
-    Whoever ends a run calls `exchange_zeros` and then `stop`: 0 V is handed over like any other output, and by the driver's
-    own means besides. Neither relies on the other.
+    To end a run, call `exchange_zeros` and then `stop`. The first sends 0 V like any other output; the second sets 0 V by the
+    driver's own means. Neither relies on the other.
 
-    ``flags`` (uint16[n]) are the device's own remarks on each sample of the last block, as bits: a driver that has any fills it
-    in `_exchange` and names the bits, lowest first, by its `counters`. Samples that were lost on their way are rows of NaN with
-    the bit `LOST`, in their place: the count of rows is the device's count of instants. `start` arms the device; whether it may
-    be started at all is decided above, by a person. What the device has `latched` it keeps until `clear`, which a run calls.
+    ``flags`` (uint16[n]) hold the device's status bits for each sample of the last block. A driver with such bits fills
+    ``flags`` in `_exchange` and names the bits, lowest first, by the keys of `counters`. Lost samples keep their place as rows
+    of NaN with the bit `LOST`, so that the number of rows is the device's number of instants. `start` arms the device; whether
+    it may be started is decided by a person at a higher level. A condition that the device has `latched` stays until `clear`,
+    which a run calls.
 
-    Errors: `DaqRefused` for what the device or the present state cannot do, `DaqTimeout`, `DaqDisconnected`,
-    `DaqOverrun` and the others of `rig.errors` for what happens on the way; a driver's other exceptions become `DaqError`.
+    Errors: `DaqRefused` for a request that the device or its present state does not allow; `DaqTimeout`, `DaqDisconnected`,
+    `DaqOverrun` and the others of `rig.errors` for faults during operation. Other exceptions of a driver become `DaqError`.
     """
 
     wall_clock: ClassVar[bool] = True
-    """Whether there is a device behind it that has a clock, so that its loop wants a process of its own."""
+    """Whether the device has its own clock, so that its loop should run in a separate process."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float, output_range_v: float) -> None:
         self.channels = channels
@@ -99,54 +100,57 @@ class DAQ(ABC):
     @property
     @abstractmethod
     def capabilities(self) -> Capabilities:
-        """What this driver can do."""
+        """Capabilities of this driver."""
 
     @property
     @abstractmethod
     def latency_samples(self) -> float:
-        """``u[i]`` shows at ``y[i + latency_samples]``: queue, hold, converter and filter delay; known once started."""
+        """Delay from an output to its effect: ``u[i]`` shows at ``y[i + latency_samples]``; known once started.
+
+        It includes queue, hold, converter and filter delay.
+        """
 
     @property
     def filter_delay_samples(self) -> float:
-        """The part of the latency that is the mean delay of filters: an output begins to show that much earlier."""
+        """Mean delay of the filters, as part of the latency; an output begins to show this much before the full latency."""
         return 0.0
 
     @property
     def queue_blocks(self) -> int:
-        """q: whole blocks between the handing over of an output and the converter; known once started."""
+        """q: whole blocks between `exchange` of an output and the converter; known once started."""
         return max(0, int((self.latency_samples - self.filter_delay_samples) // self.block))
 
     @property
     def counters(self) -> dict[str, int]:
-        """What went wrong so far, counted: lost samples, clipped outputs and inputs, and the like."""
+        """Counts of faults so far: lost samples, clipped outputs and inputs, and the like."""
         return {}
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What looks odd about the bench to the driver, one line each; a run prints and records them."""
+        """Warnings of the driver about the bench, one line each; a run prints and records them."""
         return ()
 
     @property
     def latched(self) -> str:
-        """What the device had latched when it was opened, in words: its watchdog, an emergency stop; empty for nothing."""
+        """Conditions that the device had latched when it was opened, in words (watchdog, emergency stop); empty if none."""
         return ""
 
     def clear(self) -> None:  # noqa: B027 (most devices latch nothing)
-        """Have the device forget what is `latched`, and nothing that latched later; only for a run that is armed."""
+        """Reset the conditions in `latched`, but none that latched later; only for an armed run."""
 
     @property
     def identity(self) -> dict[str, str]:
-        """What stands behind the driver, for the record: port, model, firmware, serial number; known once open."""
+        """Identity of the device for the recording: port, model, firmware, serial number; known once open."""
         return {}
 
     @property
     def statistics(self) -> dict[str, float]:
-        """What was measured of the wire so far, for the record: bus load, round trips and the like, unit in the name."""
+        """Transfer statistics so far, for the recording: bus load, round trips and the like, with the unit in the name."""
         return {}
 
     @abstractmethod
     def _open(self) -> None:
-        """Find and open the device, compare its channels with ours; output 0 V."""
+        """Find and open the device, compare its channels with ``self.channels``, and set the output to 0 V."""
 
     @abstractmethod
     def _start(self) -> None:
@@ -154,15 +158,15 @@ class DAQ(ABC):
 
     @abstractmethod
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        """Swap one block: ``voltages`` float64[n] out, ``inputs`` float64[n, n_channels] to be filled."""
+        """Exchange one block: send ``voltages`` float64[n] and fill ``inputs`` float64[n, n_channels] (V)."""
 
     @abstractmethod
     def _stop(self) -> None:
-        """Output to 0 V, end sampling."""
+        """Set the output to 0 V and end sampling."""
 
     @abstractmethod
     def _close(self) -> None:
-        """Output to 0 V, let go of the device. Must not fail because the device is gone."""
+        """Set the output to 0 V and release the device. Must not fail because the device is gone."""
 
     def open(self) -> None:
         """Open the device."""
@@ -187,9 +191,9 @@ class DAQ(ABC):
         self.state = State.RUNNING
 
     def exchange(self, voltages: np.ndarray) -> np.ndarray:
-        """Swap one block: float64[n] volts out for float64[n, n_channels] volts in.
+        """Exchange one block: send float64[n] (V) and return the inputs float64[n, n_channels] (V).
 
-        Voltages beyond the output range, or that are not numbers, are refused before anything is sent.
+        Voltages beyond the output range, or that are not finite, are refused before anything is sent.
         """
         if self.state is not State.RUNNING:
             raise DaqRefused(f"the device is {self.state.value}; samples are exchanged while it is running")
@@ -210,10 +214,10 @@ class DAQ(ABC):
         return inputs
 
     def exchange_zeros(self) -> None:
-        """Exchange 0 V until the last of what was driven is off the converter; for whoever ends a run, before `stop`.
+        """Exchange blocks of 0 V until the last nonzero output has left the converter; called before `stop` ends a run.
 
-        At most the blocks of the queue and one more; fewer after blocks of 0 V, and where a block fails, which is no error
-        here: a device that does not answer any more is left to `stop`.
+        At most the blocks of the queue and one more are exchanged, fewer if blocks of 0 V were sent before. A failing block
+        ends the exchange without an error, because `stop` handles a device that no longer answers.
         """
         if self.state is not State.RUNNING or not self._driven:
             return
@@ -224,7 +228,7 @@ class DAQ(ABC):
             return
 
     def stop(self) -> None:
-        """Output to 0 V and end sampling; no effect unless running."""
+        """Set the output to 0 V and end sampling; no effect unless running."""
         if self.state is not State.RUNNING:
             return
         self.state = State.OPEN
@@ -232,7 +236,7 @@ class DAQ(ABC):
             self._stop()
 
     def close(self) -> None:
-        """Output to 0 V and let go of the device; any time, any number of times."""
+        """Set the output to 0 V and release the device; may be called at any time, any number of times."""
         if self.state is State.CLOSED:
             return
         try:

@@ -23,9 +23,9 @@ __all__ = [
 
 
 class RigError(Exception):
-    """Anything that the bench reports to its user; the command line prints it as one line.
+    """Base class of the errors that are reported to the user; the command line prints each as one line.
 
-    Its text is that line: printable, and shortened in its middle where a file or a device has put much into it.
+    The error's text is this line. It is printable, and shortened in the middle if a file or a device contributed a long text.
     """
 
     def __init__(self, *parts: object) -> None:
@@ -41,7 +41,7 @@ class RecordingError(RigError):
 
 
 class DaqError(RigError):
-    """A driver cannot do what was asked of it; the message names the channel or port and what to do."""
+    """A driver cannot carry out a request; the message names the channel or port and what to do."""
 
 
 class DaqTimeout(DaqError):  # noqa: N818 (the names of the DAQ contract)
@@ -53,35 +53,35 @@ class DaqDisconnected(DaqError):  # noqa: N818
 
 
 class DaqOverrun(DaqError):  # noqa: N818
-    """Samples were lost, and the driver cannot go on: it does not know where, or the device has stopped over it."""
+    """Samples were lost and the driver cannot continue: their position is unknown, or the device has stopped."""
 
 
 class DaqRefused(DaqError):  # noqa: N818
-    """The device or bus cannot carry what was asked for: rate, block, voltage or channels."""
+    """The device or bus does not support the requested rate, block, voltage or channels."""
 
 
 class DaqBusy(DaqError):  # noqa: N818
-    """The port is there, but somebody else holds it."""
+    """The port exists, but another process uses it."""
 
 
 class DaqMismatch(DaqError):  # noqa: N818
-    """The device says of its channels, ranges or rates something else than the bench does."""
+    """The device's channels, ranges or rates differ from those of the bench."""
 
 
 class DaqProtocol(DaqError):  # noqa: N818
-    """What answers speaks another version, not this protocol, or two devices answer as one."""
+    """The answering device uses another version or another protocol, or two devices answer at once."""
 
 
 class DaqReset(DaqError):  # noqa: N818
-    """The device has started anew in the middle of a run."""
+    """The device has restarted during a run."""
 
 
 class DaqWatchdog(DaqError):  # noqa: N818
-    """The device's watchdog has brought the output to 0 V, because no output had come in time."""
+    """The device's watchdog has set the output to 0 V, because no output arrived in time."""
 
 
 class DaqEmergencyStop(DaqError):  # noqa: N818
-    """The emergency stop has brought the output to 0 V."""
+    """The emergency stop has set the output to 0 V."""
 
 
 class NotArmed(RigError):  # noqa: N818
@@ -89,5 +89,5 @@ class NotArmed(RigError):  # noqa: N818
 
 
 def as_daq_error(error: Exception) -> DaqError:
-    """An exception of a driver as a `DaqError`: itself where it is one, else one that names it."""
+    """Return a driver's exception as a `DaqError`: unchanged if it is one, else a new one that names the exception."""
     return error if isinstance(error, DaqError) else DaqError(f"the driver has failed: {type(error).__name__}: {error}")

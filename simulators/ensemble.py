@@ -7,8 +7,8 @@ The work goes through joblib, whose backend is the user's choice in one line::
         for name, damping in ensemble(rigs, damping_of):
             ...
 
-Rigs and functions are sent to the workers, results come back; nothing else is kept, so that memory does not grow with the
-number of rigs as long as results are small and used as they come.
+Rigs and functions are sent to the workers, and results come back. Nothing else is kept, so that memory does not grow with the
+number of rigs if results are small and consumed as they arrive.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 
 
 class VariantError(RuntimeError):
-    """The function failed for one variant; the message names it, and what went wrong."""
+    """The function failed for one variant; the message names the variant and the error."""
 
 
 def ensemble(
@@ -34,13 +34,13 @@ def ensemble(
 ) -> Iterator[tuple[str, Result]]:
     """Yield ``(name, function(variant))`` for every variant, in their order, as results arrive.
 
-    ``variants`` are rigs, seeds, benches, or whatever the function takes: a mapping from names, or any iterable, which
-    then is named by counting from "0" and taken from only as workers come free. ``n_jobs`` as in joblib: a number of
-    workers, -1 for all cores; None for what `joblib.parallel_config` says, else 1. The function runs in other processes
-    (with joblib's own backend); it should return what is wanted of a run, not the run.
+    ``variants`` are rigs, seeds, benches, or other arguments of the function: a mapping from names, or any iterable, whose
+    items are named by counting from "0" and are taken only as workers become free. ``n_jobs`` is as in joblib: a number of
+    workers, -1 for all cores, None for the setting of `joblib.parallel_config`, or else 1. With joblib's own backend the
+    function runs in other processes; it should return the wanted results of a run, not the run.
 
-    Raises `VariantError` where the function fails, naming the variant. Then, after Ctrl-C and when the iterator is closed
-    early, what has not begun is dropped.
+    Raises `VariantError`, naming the variant, if the function fails. After such an error, after Ctrl-C, or if the iterator is
+    closed early, variants that have not begun are dropped.
     """
     named = variants.items() if isinstance(variants, Mapping) else enumerate(variants)
     calls = (delayed(_outcome)(function, str(name), variant) for name, variant in named)

@@ -1,9 +1,9 @@
 """Compiled virtual rig: one sample of exciter, structure, sensors and converters, and runs of many.
 
-Within instant i the sensors are read first, then the state is advanced to instant i + 1 with the voltage held. A
-voltage therefore shows in the readings of the next instant: the one sample of latency that any hold has. Where the
-converter is oversampled, the way from i to i + 1 goes over internal instants: the output passes its reconstruction
-filter, the sensors pass theirs, and only the last of these instants is converted. That is the decimation.
+At instant i the sensors are read first; then the state is advanced to instant i + 1 with the voltage held. A voltage therefore
+shows in the readings of the next instant: any hold has this latency of one sample. If the converter is oversampled, internal
+instants lie between i and i + 1. At each of them the output passes the reconstruction filter and the sensors pass their
+filters; only the last one is converted, which decimates the signals.
 """
 
 import math
@@ -45,7 +45,7 @@ def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.fl
 
 @inner_kernel
 def read(rig: RigArrays, state: RigState, instant: int) -> int:
-    """From sensed values to conditioned and filtered volts, kept for skewed channels; returns SENSOR_CLIPPED or 0."""
+    """Convert sensed values to conditioned, filtered volts and store them for skewed channels; return SENSOR_CLIPPED or 0."""
     flags = 0
     condition(rig.channels, state.filters, state.outputs)
     if rig.sections.shape[0] > 0:
@@ -59,7 +59,7 @@ def read(rig: RigArrays, state: RigState, instant: int) -> int:
 
 @kernel
 def advance_internally(rig: RigArrays, state: RigState, instant: int, held_v: float) -> int:
-    """Advance by one sample over its internal instants, with filters on either side of the plant; returns flags."""
+    """Advance by one sample over its internal instants, with filters before and after the plant; return the flags."""
     flags = 0
     filtered_v = state.output_v
     for m in range(rig.converter[0].oversampling):
@@ -74,7 +74,7 @@ def advance_internally(rig: RigArrays, state: RigState, instant: int, held_v: fl
 
 @kernel
 def run_open_loop(rig: RigArrays, state: RigState, voltages: NDArray[np.float64], out_v: NDArray[np.float64]) -> int:
-    """One sample per voltage: ``voltages`` [n] (V) in, ``out_v`` [n, n_channel] (V) out; returns all flags, or-ed."""
+    """Run one sample per entry of ``voltages`` [n] (V); fill ``out_v`` [n, n_channel] (V) and return all flags, or-ed."""
     flags = 0
     for k in range(voltages.size):
         flags |= sample(rig, state, voltages[k], out_v[k])
@@ -91,9 +91,10 @@ def run_observed(
     truth: NDArray[np.float64],
     flags: NDArray[np.int64],
 ) -> None:
-    """As `run_open_loop`, and what no sensor shows: ``truth`` [n, padded] = ``observe`` applied to each instant's inputs.
+    """Run as `run_open_loop`, and also fill the true quantities ``truth`` [n, padded] and the ``flags`` [n] of each sample.
 
-    ``observe`` [n_input, padded] is laid out as ``RigArrays.sense``; ``flags`` [n] are those of each sample.
+    ``truth`` is ``observe`` applied to each instant's inputs. ``observe`` [n_input, padded] has the layout of
+    ``RigArrays.sense``.
     """
     for k in range(voltages.size):
         combine(observe, state.inputs, truth[k])

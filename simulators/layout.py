@@ -1,7 +1,7 @@
 """Flags, codes and bundles of arrays that the kernels of the virtual rig read and write.
 
-Plain numpy only, so that the shell and the kernels can share it. A bundle of state holds everything that a run depends
-on: a copy of it is a checkpoint.
+The module uses plain numpy only, so that Python code and kernels can share it. A bundle of state holds everything that a run
+depends on; a copy of it is a checkpoint.
 """
 
 from enum import IntEnum, IntFlag
@@ -14,26 +14,26 @@ __all__ = ["CHANNEL", "CONVERTER", "PLANT", "SITE", "Flag", "RigArrays", "RigSta
 
 
 class Flag(IntFlag):
-    """What went wrong in a sample; ``sample`` returns these, or-ed."""
+    """Faults of a sample; ``sample`` returns these bits, or-ed."""
 
     LAW_RANGE = 1
-    """A law was left behind: a magnet beyond 0.7 of its gap (next comes contact, which is not modelled), or an armature where
-    the force factor has drooped to a half."""
+    """The range of a law was left: a magnet beyond 0.7 of its gap (contact is not modelled), or an armature where the force
+    factor has drooped to a half."""
     SENSOR_CLIPPED = 2
     """A sensor left its own range, or the range of the analogue-to-digital converter."""
     DAC_CLIPPED = 4
-    """The voltage asked for is beyond the digital-to-analogue converter, or not a number (then 0 V is held)."""
+    """The demanded voltage is beyond the range of the digital-to-analogue converter, or not a number (then 0 V is held)."""
     DIVERGED = 8
     """The state is no longer finite. From then on it is held and every channel reads NaN."""
     AMPLIFIER_CLIPPED = 16
-    """The voltage asked for would take the amplifier beyond its limit."""
+    """The demanded voltage would drive the amplifier beyond its limit."""
 
 
 LAW_RANGE, SENSOR_CLIPPED, DAC_CLIPPED, DIVERGED, AMPLIFIER_CLIPPED = (int(flag) for flag in Flag)
 
 
 class SiteKind(IntEnum):
-    """Force laws of local sites without memory. Jenkins sites have a table of their own."""
+    """Force laws of local sites without memory. Jenkins sites have a separate table."""
 
     MAGNET_ONE_SIDED = 0
     MAGNET_SYMMETRIC = 1
@@ -64,10 +64,11 @@ SITE = np.dtype(
         ("parameters", "f8", (N_PARAMETER,)),
     ]
 )
-"""A local site: limit of validity (m), linear stiffness that the linear part already holds (N/m); strength K0 (N m^4), k3
-(N/m^3) or k (N/m), quadratic stiffness k2 (N/m^2), gaps (m), force at rest that is taken off (N); how many sites before
-stands the position that a droop depends on, with G b_1 as quadratic and G b_2 as strength; address of a user's
-function, good in the process that made the table, and the numbers that it is given."""
+"""A local site. ``limit``: limit of validity (m). ``stiffness``: linear stiffness that the linear plant already contains (N/m).
+``strength``: K0 (N m^4), k3 (N/m^3) or k (N/m). ``quadratic``: quadratic stiffness k2 (N/m^2). ``gap``, ``other_gap`` (m).
+``offset``: force at rest that is subtracted (N). For a droop, ``quadratic`` is G b_1, ``strength`` is G b_2, and ``partner``
+says how many sites before stands the position that the droop depends on. ``address``: address of a user's function, valid in
+the process that made the table; ``parameters``: the numbers passed to it."""
 
 CHANNEL = np.dtype(
     [
@@ -80,8 +81,8 @@ CHANNEL = np.dtype(
         ("delay", "i8"),
     ]
 )
-"""A sensor: low-pass coefficients of its high-pass, noise of sensor and converter together (RMS, V), V per SI unit, own
-range (V), and how many internal instants back its first tap lies."""
+"""A sensor: coefficients of the low-pass that forms its high-pass, noise of sensor and converter together (RMS, V), V per SI
+unit, the sensor's own range (V), and the number of internal instants back to its first tap."""
 
 CONVERTER = np.dtype(
     [
@@ -98,15 +99,15 @@ CONVERTER = np.dtype(
 
 
 class RigArrays(NamedTuple):
-    """The rig as its kernels see it; never written to during a run.
+    """The rig's constant arrays for the kernels; never written to during a run.
 
     ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_joint]``; its
-    rows are ``[joint coordinates, local coordinates, x]``. ``correct`` [n_site, n_row]: what a change of each site
-    force over the sub-step adds. ``elements`` [2, n_element, n_joint]: stiffness and slip force of every Jenkins element;
+    rows are ``[joint coordinates, local coordinates, x]``. ``correct`` [n_site, n_row]: contribution of a change of each site
+    force over the sub-step. ``elements`` [2, n_element, n_joint]: stiffness and slip force of every Jenkins element;
     ``stuck`` [n_joint]: sum of the stiffnesses of a joint. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
     vector. Inputs, rows, joints and the columns of ``sense`` are padded with zeros to whole vectors of the compiled loops.
 
-    ``noise_keys`` [1 + n_channel]: of the output, then of each channel. ``sections`` [n_section, 5, n_channel] and
+    ``noise_keys`` [1 + n_channel]: key of the output, then of each channel. ``sections`` [n_section, 5, n_channel] and
     ``reconstruction`` [n_section, 5, 1]: filters of sensors and output as second-order sections, b_0 b_1 b_2 a_1 a_2, at
     the internal rate; n_section is 0 without filters. ``taps`` [n_channel, n_tap]: weights that interpolate a skewed
     channel.
@@ -133,9 +134,9 @@ class RigState(NamedTuple):
     ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_joint]`` at the present instant. ``deflection``
     [n_joint] and ``friction`` [n_element, n_joint]: committed state of the Jenkins elements. ``filters``
     [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
-    which its noise is drawn. ``memory`` [n_section, 2, n_channel] and ``output_memory`` [n_section, 2, 1]: of the filters.
-    ``history`` [n_ring, n_channel]: ring of conditioned volts at internal instants, its length a power of two, or 0 where
-    no channel is skewed. The others carry nothing from one sample to the next.
+    which its noise is drawn. ``memory`` [n_section, 2, n_channel] and ``output_memory`` [n_section, 2, 1]: state of the
+    filters. ``history`` [n_ring, n_channel]: ring of conditioned volts at internal instants; its length is a power of two, or 0
+    if no channel is skewed. The other fields carry nothing from one sample to the next.
     """
 
     inputs: NDArray[np.float64]

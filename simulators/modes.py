@@ -10,7 +10,7 @@ from simulators.plant.assembly import LinearPlant
 __all__ = ["LinearModes", "coupled_modes", "structure_modes"]
 
 _FREE = 1e-6
-"""Share of the highest frequency up to which a frequency is that of a free motion, but for rounding."""
+"""Fraction of the highest frequency below which a frequency counts as zero, that of a free motion with rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,17 +27,17 @@ class LinearModes:
     """Modes as columns over the structure's modal coordinates [n_mode, n_mode]; empty for the coupled rig."""
 
     def at(self, shape: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Mass-normalised deflection [n_mode] (kg^-1/2) of a point, from ``VirtualRig.shape`` there; structure only."""
+        """Return the mass-normalised deflection [n_mode] (kg^-1/2) of a point from its ``VirtualRig.shape``; structure only."""
         return shape @ self.vectors
 
     def nearest(self, near_hz: float) -> int:
-        """Index of the mode nearest to a frequency; motions that nothing holds (0 Hz) are none, unless there are no others."""
+        """Return the index of the mode nearest to a frequency; free motions (0 Hz) count only if there are no other modes."""
         held = self.frequency_hz > _FREE * np.max(self.frequency_hz)
         return int(np.argmin(np.where(held, np.abs(self.frequency_hz - near_hz), np.inf)))
 
 
 def structure_modes(plant: LinearPlant) -> LinearModes:
-    """Undamped modes of the structure, elements linear and joints stuck; damping from the diagonal of its matrix."""
+    """Return the structure's undamped modes with linear elements and stuck joints; damping: diagonal of the modal matrix."""
     squared, vectors = np.linalg.eigh(plant.modal_stiffness)
     omega = np.sqrt(np.maximum(squared, 0.0))
     drive = plant.drive_shape @ vectors
@@ -48,7 +48,7 @@ def structure_modes(plant: LinearPlant) -> LinearModes:
 
 
 def coupled_modes(plant: LinearPlant) -> LinearModes:
-    """Oscillating eigenvalues of the coupled rig from voltage."""
+    """Return the oscillating eigenvalues of the coupled rig with the voltage as input."""
     poles = np.linalg.eigvals(plant.dynamics)
     poles = poles[poles.imag > 0.0]
     poles = poles[np.argsort(np.abs(poles))]

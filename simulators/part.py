@@ -1,4 +1,4 @@
-"""Base of every part that a virtual rig is configured from."""
+"""Base class of all configured parts of a virtual rig."""
 
 from typing import Annotated, TypeVar
 
@@ -10,7 +10,7 @@ Item = TypeVar("Item")
 
 Positive = Annotated[float, Field(gt=0.0)]
 Several = Annotated[tuple[Item, ...], Field(strict=False)]
-"""A tuple that may be given as a list, as TOML does."""
+"""A tuple that may also be given as a list, as in TOML."""
 
 
 class Part(BaseModel):

@@ -1,9 +1,8 @@
 """Scatter of a specimen: from run to run, and from one assembly of it to the next.
 
-Modal frequencies and damping wander from run to run (temperature, fixture); joints and magnets come out differently each
-time the specimen is put together. Both are drawn by counter, from the seed of the run and the number of the assembly, so
-that the same seed and assembly give the same rig. Every quantity has its own numbers: scattering one more leaves the
-others as they were.
+Modal frequencies and damping vary from run to run (temperature, fixture); joints and magnets vary each time the specimen is
+assembled. The first are drawn from the seed of the run, the second from the number of the assembly, so that the same seed and
+assembly give the same rig. Every quantity has its own random numbers: scattering a further quantity does not change the others.
 """
 
 from collections.abc import Sequence
@@ -23,7 +22,7 @@ Relative = Annotated[float, Field(ge=0.0, le=0.3)]
 AboveMinusOne = Annotated[float, Field(gt=-1.0)]
 Drawn = TypeVar("Drawn", bound=Part)
 
-_RUN, _ASSEMBLY = 1, 2  # streams beside the noise, whose own is the bare seed
+_RUN, _ASSEMBLY = 1, 2  # random streams; the noise uses the seed without a stream
 _STIFFNESS_FIELDS = ("stiffness", "stiffness_n_m")
 _SLIP_FIELDS = ("slip", "phi_max_m")
 
@@ -37,7 +36,7 @@ class Deviation(Part):
     """Relative deviation of each modal damping ratio; empty for none."""
 
     def combined(self, frequency: NDArray[np.float64], damping: NDArray[np.float64]) -> "Deviation":
-        """What comes of further factors [n_mode] on frequencies and damping ratios."""
+        """Return the deviation that results from further factors [n_mode] on frequencies and damping ratios."""
         first = [np.array(own) if own else np.zeros(frequency.size) for own in (self.frequency, self.damping)]
         factors = [(1.0 + own) * factor - 1.0 for own, factor in zip(first, (frequency, damping), strict=True)]
         return Deviation(frequency=tuple(factors[0].tolist()), damping=tuple(factors[1].tolist()))
@@ -73,12 +72,12 @@ class Scatter(Part):
         return self.assembly > 0 and any(size > 0.0 for size in sizes)
 
     def modal_factors(self, seed: int, n_mode: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Factors [n_mode] on the natural frequencies and on the damping ratios of a run."""
+        """Return factors [n_mode] on the natural frequencies and on the damping ratios of a run."""
         z = _numbers(seed, _RUN, n_mode)
         return np.exp(self.frequency * z[0]), np.exp(self.damping * z[1])
 
     def joints(self, nominal: Sequence[Drawn]) -> tuple[Drawn, ...]:
-        """The friction joints of this assembly."""
+        """Return the friction joints of this assembly."""
         z = _numbers(self.assembly, _ASSEMBLY, len(nominal))
         stiffness, slip = np.exp(self.joint_stiffness * z[0]), np.exp(self.joint_slip * z[1])
         return tuple(
@@ -87,7 +86,7 @@ class Scatter(Part):
         )
 
     def magnets(self, nominal: Sequence[Drawn]) -> tuple[Drawn, ...]:
-        """The magnets of this assembly."""
+        """Return the magnets of this assembly."""
         z = _numbers(self.assembly, _ASSEMBLY, len(nominal))
         strength, gap = np.exp(self.magnet_strength * z[2]), np.exp(self.magnet_gap * z[3])
         return tuple(
@@ -97,10 +96,10 @@ class Scatter(Part):
 
 
 def deviated(plant: LinearPlant, omega_rad_s: NDArray[np.float64], deviation: Deviation) -> LinearPlant:
-    """The plant with the structure's frequencies ``omega_rad_s`` [n_mode] and damping ratios moved by a deviation.
+    """Return the plant with the structure's frequencies ``omega_rad_s`` [n_mode] and damping ratios changed by a deviation.
 
-    ``w_i^2`` becomes ``(w_i (1 + e_i))^2``, ``2 zeta_i w_i`` becomes ``2 zeta_i (1 + d_i) w_i (1 + e_i)``; what magnets add
-    stays. Raises `ValueError` where the deviation has another number of modes.
+    ``w_i^2`` becomes ``(w_i (1 + e_i))^2``, and ``2 zeta_i w_i`` becomes ``2 zeta_i (1 + d_i) w_i (1 + e_i)``. The contribution
+    of the magnets does not change. Raises `ValueError` if the deviation has another number of modes.
     """
     if not (deviation.frequency or deviation.damping):
         return plant
@@ -126,13 +125,13 @@ def deviated(plant: LinearPlant, omega_rad_s: NDArray[np.float64], deviation: De
 
 
 def _numbers(entropy: int, stream: int, n: int) -> NDArray[np.float64]:
-    """Standard normal numbers [4, n]; those of one item do not depend on how many follow."""
+    """Return standard normal numbers [4, n]; the numbers of an item do not depend on how many items follow."""
     generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy, spawn_key=(stream,))))
     return generator.standard_normal((n, 4)).T
 
 
 def _scaled(part: Drawn, factors: dict[str, float]) -> Drawn:
-    """A part with those of its fields that have a factor multiplied by it."""
+    """Return a part whose fields are multiplied by their factor, where ``factors`` has one."""
     table = part.model_dump()
     for name, factor in factors.items():
         if name in table:

@@ -8,7 +8,7 @@ __all__ = ["merged", "shipped_specimens", "specimen_table"]
 
 
 def shipped_specimens() -> tuple[str, ...]:
-    """Names of the shipped specimens."""
+    """Return the names of the shipped specimens."""
     folder = files("simulators") / "specimens"
     return tuple(sorted(file.name.removesuffix(".toml") for file in folder.iterdir() if file.name.endswith(".toml")))
 

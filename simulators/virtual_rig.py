@@ -65,7 +65,7 @@ class VirtualRig(Part):
 
     @classmethod
     def shipped(cls, specimen: str, **changes: Any) -> "VirtualRig":
-        """A shipped specimen, with changes by table or value; `pydantic.ValidationError` where they do not fit."""
+        """Return a shipped specimen with changes by table or value; raise `pydantic.ValidationError` if they are invalid."""
         return cls.model_validate({"specimen": specimen, **changes})
 
     @model_validator(mode="before")
@@ -113,7 +113,7 @@ class VirtualRig(Part):
                 raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
 
     def _check_joints(self, plant: LinearPlant) -> None:
-        """Refuse joints that are stiffer than the structure they are part of: slipping, it would not hold together."""
+        """Raise `ValueError` if joints are stiffer than their structure, which would be unstable while they slip."""
         slipping = plant.modal_stiffness.copy()
         for joint, row in zip(self.friction, plant.site_rows[plant.n_local :], strict=True):
             coordinate = row[: plant.n_mode]
@@ -124,7 +124,7 @@ class VirtualRig(Part):
             raise ValueError(f"friction: stiffness {total:.6g} in all, allowed is less than the structure has there")
 
     def _check_wear(self) -> None:
-        """Refuse wear that is for other modes, goes in steps of less than a sample, or leaves less than holds together."""
+        """Raise `ValueError` if wear is for another number of modes, has steps below a sample, or ends in an invalid rig."""
         self._worn_deviation(0.0)
         if self.wear.every_s * self.converter.sample_rate_hz < 1.0:
             shortest_s = 1.0 / self.converter.sample_rate_hz
@@ -145,7 +145,7 @@ class VirtualRig(Part):
                 raise ValueError(f"sensors[{i}].low_pass_hz = {sensor.low_pass_hz:g}: {message}")
 
     def build(self, seed: int | None = None) -> tuple[RigArrays, RigState]:
-        """Arrays for the kernels, and a state at rest; ``seed`` of noise and scatter in place of the rig's own."""
+        """Return the kernels' arrays and a state at rest; ``seed`` of noise and scatter replaces the rig's own."""
         if self.scatters:
             return self.realised(seed).build(seed)
         rig = rig_arrays(
@@ -163,11 +163,11 @@ class VirtualRig(Part):
 
     @property
     def scatters(self) -> bool:
-        """Whether a run gets anything else than the nominal specimen."""
+        """Whether the specimen of a run differs from the nominal specimen."""
         return self.scatter.run_scatters or self.scatter.assembly_scatters
 
     def realised(self, seed: int | None = None) -> "VirtualRig":
-        """The specimen that a run with this seed gets, of the assembly that ``scatter`` names; nothing in it scatters."""
+        """Return the specimen of a run with this seed, in the assembly of ``scatter``; the returned rig has no scatter."""
         if not self.scatters:
             return self
         frequency, damping = self.scatter.modal_factors(self.seed if seed is None else seed, self.plant.n_mode)
@@ -181,10 +181,10 @@ class VirtualRig(Part):
         return self._changed(changes)
 
     def worn(self, time_s: float) -> "VirtualRig":
-        """The specimen as it is at a time (s) of a run, which does not wear: the truth for what is measured then.
+        """Return the specimen at a time (s) of a run, without further wear: the reference for measurements at that time.
 
-        It has the plant that a run has at the sample nearest to that time: that of the last multiple of ``wear.every_s``.
-        Raises `ValueError` for a time below 0.
+        Its plant is that of the run at the nearest sample, which is held since the last multiple of ``wear.every_s``. Raises
+        `ValueError` for a time below 0.
         """
         deviation = self._worn_deviation(time_s)
         if time_s > 0.0 and self.wear.wears:
@@ -193,10 +193,10 @@ class VirtualRig(Part):
         return self._changed({"deviation": deviation, "wear": Wear()})
 
     def pieces(self, arrays: RigArrays, first: int, n: int) -> Iterator[tuple[RigArrays, slice]]:
-        """The next ``n`` samples of a run, from sample ``first`` on, in pieces over each of which the plant is held.
+        """Split the next ``n`` samples of a run, from sample ``first`` on, into pieces during which the plant is constant.
 
-        Yields the arrays of a piece and its slice of the n; ``arrays`` are those of the sample before, or those built. At
-        least one piece, the whole where nothing wears. Of a rig that scatters, ask what is `realised`.
+        Yield the arrays of each piece and its slice of the n samples. ``arrays`` are those of the previous sample, or those
+        built. Without wear there is one piece. For a rig with scatter, call this on the rig that `realised` returns.
         """
         if not self.wear.wears:
             yield arrays, slice(0, n)
@@ -211,7 +211,7 @@ class VirtualRig(Part):
             start = stop
 
     def _rediscretised(self, arrays: RigArrays, sample: int) -> RigArrays:
-        """The arrays with the plant that is held from a sample on; the same ones where it is that of the sample before."""
+        """Return the arrays with the plant held from a sample on; the given arrays if the plant does not change there."""
         rate_hz = self.converter.sample_rate_hz
         time_s = self.wear.held_s(sample, rate_hz)
         if sample == 0 or time_s == self.wear.held_s(sample - 1, rate_hz):
@@ -231,14 +231,14 @@ class VirtualRig(Part):
         return VirtualRig.model_validate({name: getattr(self, name) for name in VirtualRig.model_fields} | changes)
 
     def output_row(self, sensor: Sensor) -> NDArray[np.float64]:
-        """What a sensor senses (SI), as a row over the input vector ``[x, u, f]``."""
+        """Return the quantity that a sensor senses (SI), as a row over the input vector ``[x, u, f]``."""
         return self._row(self.plant, sensor)
 
     def _row(self, plant: LinearPlant, sensor: Sensor) -> NDArray[np.float64]:
         return plant.force_row() if sensor.at is None else plant.acceleration_row(self.shape(sensor.at))
 
     def shape(self, at: str) -> NDArray[np.float64]:
-        """Mode shapes (kg^-1/2) of the structure at a named point, turned so that the drive point moves forward."""
+        """Return the mode shapes (kg^-1/2) at a named point, with signs such that the drive point moves forward."""
         return self.plant.signs * self.structure.shape(at)
 
     @property
@@ -278,9 +278,9 @@ class VirtualRig(Part):
 
     @cached_property
     def coupled_modes(self) -> LinearModes:
-        """Modes of the coupled rig from voltage: with exciter and stinger, not what a phase-resonant test finds."""
+        """Modes of the coupled rig with voltage input, exciter and stinger; a phase resonance test does not find these."""
         return coupled_modes(self.plant)
 
     def drive_shape(self, near_hz: float) -> float:
-        """Mass-normalised deflection (kg^-1/2) of the drive point in the mode of `linear_modes` nearest to a frequency."""
+        """Return the drive point's mass-normalised deflection (kg^-1/2) in the linear mode nearest to a frequency."""
         return float(self.linear_modes.drive_shape[self.linear_modes.nearest(near_hz)])

@@ -1,8 +1,8 @@
 """Wear of a specimen: natural frequencies and damping ratios that change slowly within a run.
 
-The plant is linear in its modal coordinates and is discretised exactly, so that it is held for a while and then replaced by
-that of a later time: the state vector, forces of joints and filters stay as they are, for none of their coordinates depends
-on frequencies or damping ratios.
+The plant is linear in its modal coordinates and is discretised exactly. It is therefore kept constant for a while and then
+replaced by the plant of a later time. The state vector, the joints' forces and the filters carry over unchanged, because none
+of their coordinates depends on frequencies or damping ratios.
 """
 
 import math
@@ -57,18 +57,18 @@ class Wear(Part):
         return any(self.frequency_per_s) or any(self.damping_per_s)
 
     def step_samples(self, sample_rate_hz: float) -> int:
-        """For how many samples the plant is held."""
+        """Return the number of samples for which the plant is held."""
         return max(1, round(self.every_s * sample_rate_hz))
 
     def held_s(self, sample: int, sample_rate_hz: float) -> float:
-        """The time (s) whose plant is the one at a sample: that of the last change."""
+        """Return the time (s) of the plant that is in use at a sample: the time of the last change."""
         step = self.step_samples(sample_rate_hz)
         return min(sample // step * step / sample_rate_hz, math.inf if self.until_s is None else self.until_s)
 
     def deviation(self, time_s: float, n_mode: int, unworn: Deviation | None = None) -> Deviation:
-        """Deviation at a time, on top of that of the ``unworn`` specimen; not in steps of ``every_s``.
+        """Return the deviation at a time, including that of the ``unworn`` specimen; not in steps of ``every_s``.
 
-        Raises `ValueError` for a time below 0, and where the rates are for another number of modes.
+        Raises `ValueError` for a time below 0, or if the rates are for another number of modes.
         """
         if not 0.0 <= time_s < math.inf:
             raise ValueError(f"time_s = {time_s:g}: allowed is from 0, finite")
@@ -79,7 +79,7 @@ class Wear(Part):
 
 
 def _per_mode(name: str, rates: tuple[float, ...], n_mode: int) -> NDArray[np.float64]:
-    """One rate per mode [n_mode]."""
+    """Return one rate per mode [n_mode]."""
     if len(rates) not in (0, 1, n_mode):
         raise ValueError(
             f"wear.{name}: has {len(rates)} values, allowed is {n_mode}, one per mode, one for all, or none"

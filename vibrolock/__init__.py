@@ -1,4 +1,4 @@
-"""What the four packages of this distribution share: its version and how its kernels are compiled."""
+"""Common parts of the four packages of this distribution: its version and the compilation of kernels."""
 
 from importlib.metadata import version
 

@@ -1,10 +1,10 @@
-"""One decorator for every compiled kernel of the distribution, and a cache of machine code that knows its content.
+"""Decorators for the compiled kernels of the distribution, and a cache of machine code by content.
 
-A kernel is a module-level function: plain arrays, structured arrays and scalars in and out, no allocation per sample, never
-raising. It returns codes; its caller raises.
+A kernel is a module-level function. It takes and returns plain arrays, structured arrays and scalars, allocates nothing per
+sample and never raises. It returns codes; its caller raises.
 
-numba's own cache knows a kernel by its file, and does not notice when a kernel that it calls, or a constant that is compiled
-in, has changed elsewhere. Here machine code is found by a digest of all that goes into it (`content_digest`).
+numba's own cache identifies a kernel by its file. It does not notice changes in other files, of a called kernel or of a
+constant that is compiled in. Here machine code is found by a digest of everything that determines it (`content_digest`).
 """
 
 import contextlib
@@ -30,11 +30,11 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 Record: TypeAlias = Any
-"""One record of a structured array inside a kernel; numba knows its fields, the type checker does not."""
+"""One record of a structured array inside a kernel; numba knows the fields, the type checker does not."""
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "_nrt": False}
-"""IEEE arithmetic only, so that runs repeat bit for bit. Kernels allocate nothing, so arrays need no reference counts
-inside them, which otherwise cost a third of the time of a sample."""
+"""Options of numba: IEEE arithmetic only, so that runs repeat bit for bit. Kernels allocate nothing, so that arrays inside them
+need no reference counts, which would cost a third of the time of a sample."""
 
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 _UNUSED_AFTER_DAYS = 30
@@ -47,9 +47,10 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a kernel that becomes part of each kernel that calls it.
+    """Compile a kernel that is inlined into each kernel that calls it.
 
-    For what runs every sample and takes bundles of arrays: handing over a rig and its state costs as much as the sensors do.
+    Use it for kernels that run every sample and take bundles of arrays: passing a rig and its state costs as much time as the
+    sensors.
     """
     return _compiled(function, {**OPTIONS, "forceinline": True})
 
@@ -64,11 +65,11 @@ def _compiled(function: Callable[P, R], options: dict[str, Any]) -> Callable[P, 
 
 
 def content_digest(kernel: Any) -> str:
-    """Digest of all that goes into a kernel's machine code, as hexadecimal text.
+    """Return a digest of everything that determines a kernel's machine code, as hexadecimal text.
 
-    Code and options of the kernel and of every kernel that it calls, and the constants that they name. The types of the
-    arguments, the processor and numba's version are further keys of the cache. Comments and docstrings do not count.
-    Module-level names are looked up when the digest is made, so a kernel may call one that is defined below it.
+    It covers code and options of the kernel and of all kernels that it calls, and the constants that they name. The types of
+    the arguments, the processor and numba's version are further keys of the cache. Comments and docstrings do not count.
+    Module-level names are looked up when the digest is made, so that a kernel may call one that is defined below it.
     """
     known: str | None = getattr(kernel, "_content_digest", None)
     if known is None:
@@ -81,7 +82,7 @@ def content_digest(kernel: Any) -> str:
 
 
 def _content(value: Any, seen: set[int]) -> Iterator[str]:
-    """A value that a kernel names, as texts that differ where the machine code may."""
+    """Yield texts for a value that a kernel names; they differ if the machine code may differ."""
     inner = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel; of a numba intrinsic
     if isinstance(value, types.FunctionType):
         inner = value
@@ -103,7 +104,7 @@ def _content(value: Any, seen: set[int]) -> Iterator[str]:
     elif isinstance(value, type | types.BuiltinFunctionType):
         yield f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
     else:
-        yield _ADDRESS.sub("", f"{type(value).__qualname__} {value!r}")  # an address is another one in every process
+        yield _ADDRESS.sub("", f"{type(value).__qualname__} {value!r}")  # addresses differ between processes
 
 
 def _code(code: types.CodeType, names: dict[str, Any], seen: set[int], doc: str | None) -> Iterator[str]:
@@ -149,7 +150,7 @@ class _ContentImpl(CompileResultCacheImpl):
 
 
 class _ContentCache(FunctionCache):
-    """numba's cache of one kernel, opened when the kernel is first called: by then all that it names is defined."""
+    """numba's cache of one kernel, opened at the kernel's first call, when all names that it uses are defined."""
 
     _impl_class = _ContentImpl
 
@@ -188,10 +189,10 @@ _folder: Path | None = None
 
 
 def kernel_cache_folder() -> Path:
-    """Folder that holds the machine code of all kernels; made if need be.
+    """Return the folder with the machine code of all kernels; create it if necessary.
 
-    Below ``NUMBA_CACHE_DIR``, ``XDG_CACHE_HOME`` or ``~/.cache``, the first that can be written; else a temporary folder of
-    this process alone, for machine code is loaded from it and nobody else may have put it there.
+    It lies below ``NUMBA_CACHE_DIR``, ``XDG_CACHE_HOME`` or ``~/.cache``, the first that can be written. Otherwise it is a
+    temporary folder of this process alone, because machine code is loaded from it and no other user may place code there.
     """
     global _folder
     if _folder is None:
@@ -227,7 +228,7 @@ def _note_use(index: Path) -> None:
 
 
 def _remove_unused(parent: Path) -> None:
-    """Remove machine code that nobody has asked for in a month, and folders that earlier versions kept it in."""
+    """Remove machine code that was not used for a month, and the cache folders of earlier versions."""
     oldest = time.time() - _UNUSED_AFTER_DAYS * _DAY_S
     with contextlib.suppress(OSError):
         for folder in parent.iterdir():

@@ -1,10 +1,10 @@
-"""Eight double-precision numbers side by side, for the innermost loops of kernels.
+"""Vectors of eight double-precision numbers, for the innermost loops of kernels.
 
-The compiler turns them into whatever vector registers the processor has (one of 512 bits, two of 256, four of 128), and
-never finds out by itself that a short loop over a runtime length is worth it. Each lane does IEEE arithmetic of its own;
-nothing is reordered, so that the numbers are those of a scalar loop.
+The compiler maps them to the vector registers of the processor (one of 512 bits, two of 256, four of 128). By itself it does
+not vectorise a short loop of a length known only at run time. Each lane does its own IEEE arithmetic; nothing is reordered, so
+that the results are those of a scalar loop.
 
-Arrays are C-contiguous and counted flat; ``load`` and ``store`` touch all of ``[index, index + WIDTH)``, unchecked.
+Arrays are C-contiguous and indexed flat. ``load`` and ``store`` access all of ``[index, index + WIDTH)`` without a check.
 """
 
 import operator
@@ -23,7 +23,7 @@ WIDTH = 8
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
 _INDEX = ir.IntType(32)
-_ALIGNMENT = 8  # of a double: no more is known of an array
+_ALIGNMENT = 8  # of a double: arrays need not be aligned further
 
 
 class Lanes(types.Type):
@@ -82,11 +82,11 @@ def _lane_by_lane(build: Callable[[Any, Any, Any], Any]) -> Any:
 
 
 load: Any = intrinsic(_load)
-"""``load(array, index)``: the eight numbers from a flat index on."""
+"""``load(array, index)``: return the eight numbers from a flat index on."""
 store: Any = intrinsic(_store)
-"""``store(array, index, lanes)``: write them there."""
+"""``store(array, index, lanes)``: write eight numbers from a flat index on."""
 spread: Any = intrinsic(_spread)
-"""``spread(value)``: one number on all lanes."""
+"""``spread(value)``: return one number on all lanes."""
 least: Any = _lane_by_lane(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", a, b), a, b))
 """``least(a, b)``: the smaller one, lane by lane; b where one is not a number."""
 greatest: Any = _lane_by_lane(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b))
@@ -94,7 +94,7 @@ greatest: Any = _lane_by_lane(lambda builder, a, b: builder.select(builder.fcmp_
 
 
 def _operator(symbol: Any, build: Callable[[Any, Any, Any], Any]) -> None:
-    """Let an operator stand between two lanes."""
+    """Define an operator between two vectors of lanes."""
     compute = _lane_by_lane(build)
 
     def typed(a: Any, b: Any) -> Any:

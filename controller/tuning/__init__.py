@@ -1,7 +1,8 @@
-"""Gain design: a plant near a mode, laws around it, and what their loop does, as pure functions.
+"""Gain design as pure functions: model of the plant near a mode, control laws, and assessment of the closed loop.
 
-`PlantModel.from_frequency_responses` fits the plant; `hippold_gains`, `exact_phase_law`, `exact_scheduled_law`,
-`frequency_error_law` and `complex_response_law` give gains; `assess` says what they do, `design_phase_law` chooses.
+`PlantModel.from_frequency_responses` fits the plant. `hippold_gains`, `exact_phase_law`, `exact_scheduled_law`,
+`frequency_error_law` and `complex_response_law` compute gains. `assess` evaluates given laws; `design_phase_law` chooses the
+gains of a phase law.
 """
 
 from controller.tuning.design import Design, Settling, Steps, assess, design_phase_law, worst

@@ -1,4 +1,4 @@
-"""Designed gains with everything that speaks for and against them, as numbers and as arrays to plot."""
+"""Assessment of designed gains: margins, poles and step responses, as numbers and as arrays to plot."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,47 +19,47 @@ __all__ = ["Design", "Settling", "Steps", "assess", "design_phase_law", "worst"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-LEVEL_STEP = 0.3  # about what a backbone of ten levels over a decade steps by
+LEVEL_STEP = 0.3  # relative step, about that of a backbone with ten levels over a decade
 POOR_SENSITIVITY = 3.0
 POOR_FIT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Step responses as demodulated, one entry per instant."""
+    """Step responses of the demodulated quantities, one entry per instant."""
 
     time_s: Real
     """Instants [n]."""
     lag_after_target: Real
     """Lag after a unit step of the wanted lag [n]."""
     lag_after_frequency_rad: Real
-    """Lag after the rig's frequencies have shifted by D w_0, half the bandwidth [n]; 45 deg if nothing acted."""
+    """Lag after the rig's frequencies have shifted by D w_0, half the bandwidth [n]; 45 deg without a frequency law."""
     log_response_after_level: Real
-    """ln|A| after a unit step of the level's logarithm [n]."""
+    """ln|A| after a unit step of the logarithm of the level [n]."""
     lag_after_level_rad: Real
-    """Lag after a unit step of the level's logarithm [n]."""
+    """Lag after a unit step of the logarithm of the level [n]."""
 
 
 @dataclass(frozen=True)
 class Settling:
-    """Periods until a step has died away; infinite where it does not within the time looked at."""
+    """Number of periods until a step response has settled; infinite if it does not settle within the computed time."""
 
     frequency_shift: float
-    """Lag within 1 deg after the rig's frequencies have shifted by half the bandwidth."""
+    """Until the lag is within 1 deg after the rig's frequencies have shifted by half the bandwidth."""
     level_amplitude: float
-    """Response within 1 % after the level has been raised by 30 %."""
+    """Until the response is within 1 % after the level has been raised by 30 %."""
     level_lag: float
-    """Lag within 1 deg after the level has been raised by 30 %."""
+    """Until the lag is within 1 deg after the level has been raised by 30 %."""
 
     @property
     def longest(self) -> float:
-        """The longest of them: about the periods that a backbone point waits."""
+        """Largest of the three settling times: about the number of periods that a backbone point waits."""
         return max(self.frequency_shift, self.level_amplitude, self.level_lag)
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Laws on a plant at a lag: margins, poles, step responses, and whether they are fit to be used."""
+    """Control laws on a plant at a phase lag: margins, poles, step responses, and whether the gains are fit for use."""
 
     loop: ControlLoop
     """Plant, low-pass and laws."""
@@ -68,29 +68,29 @@ class Design:
     poles_rad_s: Complex
     """Poles of the closed loop within half the frequency [n] (1/s)."""
     frequency_margins: Margins
-    """Of the frequency law, the amplitude law closed; they mean nothing where the loop is unstable."""
+    """Margins of the frequency law with the amplitude law closed; meaningless if the loop is unstable."""
     amplitude_margins: Margins | None
-    """Of the amplitude law with the frequency held; None where the level is a voltage."""
+    """Margins of the amplitude law with the frequency held; None if the level is a voltage."""
     settling: Settling
-    """Periods; infinite where the loop is unstable."""
+    """Settling times in periods; infinite if the loop is unstable."""
     failed: tuple[str, ...]
-    """Assumptions of the gains' design that do not hold."""
+    """Assumptions of the gain design that do not hold."""
     notes: tuple[str, ...]
-    """What was chosen, and why."""
+    """Which design was chosen, and why."""
     reasons: tuple[str, ...]
-    """Why the gains are not fit to be used; none where they are."""
+    """Reasons why the gains are not fit for use; empty if they are fit."""
     omega_rad_s: Real
-    """Frequencies of a slow change [n] (rad/s)."""
+    """Modulation frequencies [n] (rad/s)."""
     frequency_loop_gain: Complex
-    """L of the frequency law at i omega [n]."""
+    """Loop gain L of the frequency law at i omega [n]."""
     amplitude_loop_gain: Complex
-    """L of the amplitude law at i omega and at -i omega [2, n]; 0 where there is none."""
+    """Loop gain L of the amplitude law at i omega and at -i omega [2, n]; 0 without an amplitude law."""
     steps: Steps | None
-    """Step responses; None where the loop is unstable."""
+    """Step responses; None if the loop is unstable."""
 
     @property
     def suited(self) -> bool:
-        """Whether nothing speaks against the gains."""
+        """Whether the gains are fit for use."""
         return not self.reasons
 
     @property
@@ -100,7 +100,10 @@ class Design:
 
 
 def assess(loop: ControlLoop, *, failed: Sequence[str] = (), notes: Sequence[str] = (), end_s: float = 0.0) -> Design:
-    """Everything about given laws on a known plant; ``end_s`` of the step responses is 600 periods where it is 0."""
+    """Assess given laws on a known plant.
+
+    ``end_s`` is the length of the step responses (s); 0 stands for 600 periods.
+    """
     omega = frequencies_for(loop.plant)
     gain = loop.frequency_loop_gain(1j * omega)
     upper, lower = loop.amplitude_loop_gain(1j * omega), loop.amplitude_loop_gain(-1j * omega)
@@ -129,7 +132,7 @@ def assess(loop: ControlLoop, *, failed: Sequence[str] = (), notes: Sequence[str
 
 
 def worst(loop: ControlLoop, plants: Sequence[PlantModel]) -> Design:
-    """Laws on the plant of several that they suit least: unstable first, then by the peak of the sensitivity."""
+    """Assess the laws on the worst of several plants: most unstable poles first, then highest peak of the sensitivity."""
     if not plants:
         raise ValueError("plants: none given, allowed is at least one")
 
@@ -142,9 +145,11 @@ def worst(loop: ControlLoop, plants: Sequence[PlantModel]) -> Design:
 
 
 def design_phase_law(plants: Sequence[PlantModel], low_pass_rad_s: float, *, sensitivity_peak: float = 1.6) -> Design:
-    """Phase PI for resonance: closed form where its assumptions hold on the first plant, else on the exact map of all.
+    """Design a phase PI law for phase resonance.
 
-    The first plant is the one that was measured; the others are what it becomes over the levels of the test.
+    The closed form is used if its assumptions hold on the first plant and the loop is stable with ``max |S|`` up to
+    ``sensitivity_peak`` on all plants. Otherwise the gains come from the exact map of all plants. The first plant is the
+    measured one; the others represent it at the other levels of the test.
     """
     closed = hippold_gains(plants[0], low_pass_rad_s)
     if not closed.failed:
@@ -167,7 +172,7 @@ def _steps(loop: ControlLoop, end_s: float) -> Steps:
 
 
 def _step(loop: ControlLoop, transfer: Callable[[Complex], Complex], end_s: float) -> tuple[Real, Real]:
-    """Step response without what is faster than half the frequency, where the plant is the fit's and not the rig's."""
+    """Return a step response without content above half the frequency, where the fitted plant does not represent the rig."""
     return step_response(transfer, end_s, highest_rad_s=0.5 * loop.omega_rad_s)
 
 

@@ -1,4 +1,4 @@
-"""Gains from the exact map of the measured plant: the strongest integral action that a bound on the sensitivity leaves."""
+"""Gains from the exact map of the measured plant: the strongest integral action within a bound on the sensitivity."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -25,11 +25,11 @@ def exact_phase_law(
     lag_deg: float = -90.0,
     amplitude_law: LinearAmplitudeLaw | None = None,
 ) -> PhaseLaw:
-    """Phase PI of the largest ki with ``max |S| <= sensitivity_peak`` on every one of the plants.
+    """Return the phase PI law with the largest ki for which ``max |S| <= sensitivity_peak`` on every plant.
 
-    For a ratio kp/ki the bound ``|1 + g L| >= 1/sensitivity_peak`` is a quadratic in the gain g at each frequency: its smallest
-    positive root over all frequencies is the largest gain, and as g = 0 is stable, so is everything below. The ratio is
-    searched for.
+    For a given ratio kp/ki the bound ``|1 + g L| >= 1/sensitivity_peak`` is quadratic in the gain g at each frequency. The
+    smallest positive root over all frequencies is the largest gain. As g = 0 is stable, every gain below it is stable too.
+    The ratio kp/ki is found by a search.
     """
     return _best(plants, low_pass_rad_s, PhaseLaw, sensitivity_peak, lag_deg, amplitude_law)
 
@@ -42,14 +42,20 @@ def exact_scheduled_law(
     lag_deg: float = -90.0,
     amplitude_law: LinearAmplitudeLaw | None = None,
 ) -> FrequencyErrorLaw:
-    """The same with gains that scale with the measured damping: a PI on the frequency error."""
+    """Return the PI law on the frequency error with the largest ki within the sensitivity bound; see `exact_phase_law`.
+
+    It is a phase PI law whose gains scale with the measured damping.
+    """
     return _best(
         plants, low_pass_rad_s, lambda kp, ki: FrequencyErrorLaw(ki, kp), sensitivity_peak, lag_deg, amplitude_law
     )
 
 
 def frequency_error_law(low_pass_rad_s: float, *, share: float = 1.0 / 12.0) -> FrequencyErrorLaw:
-    """Integral frequency-error loop of gain ``share w_LP``: 1/12 suits where the coupled pole is far, 1/8 where it is near."""
+    """Return an integral frequency-error law of gain ``share w_LP``.
+
+    A ``share`` of 1/12 suits a coupled pole far from the mode, 1/8 a coupled pole near the mode.
+    """
     return FrequencyErrorLaw(share * low_pass_rad_s)
 
 
@@ -62,9 +68,9 @@ def complex_response_law(
     smoothing_rad_s: float = math.inf,
     lag_deg: float = -90.0,
 ) -> ComplexResponseLaw:
-    """Complex response control: ``K = share w_LP``, kp = K/(-p) cancels the coupled pole p.
+    """Return a complex response law: ``K = share w_LP``, and kp = K/(-p) cancels the coupled pole p.
 
-    Force loop of gain ``force_share w_LP``; the error passes a low-pass of the corner ``smoothing_rad_s``.
+    The force loop has the gain ``force_share w_LP``. The error passes a low-pass with the corner ``smoothing_rad_s``.
     """
     gain = share * low_pass_rad_s
     pole = plant.pole_offset_rad_s(lag_deg)
@@ -72,7 +78,7 @@ def complex_response_law(
 
 
 def frequencies_for(plant: PlantModel, n: int = 1500) -> Real:
-    """Frequencies of a slow change (rad/s), up to half the mode's, that resolve poles and zeros of every size [n]."""
+    """Return modulation frequencies [n] (rad/s) from 1e-4 to 0.5 times the mode's frequency, spaced geometrically."""
     return np.geomspace(1e-4, 0.5, n) * plant.frequency_rad_s
 
 
@@ -87,7 +93,7 @@ def _best(
     lag_deg: float,
     amplitude_law: LinearAmplitudeLaw | None,
 ) -> Law:
-    """Largest ki over the ratio kp/ki, by a grid and golden section."""
+    """Return the law with the largest ki over all ratios kp/ki, by a grid and a bounded scalar search."""
     from scipy.optimize import minimize_scalar
 
     if not plants:
@@ -115,7 +121,7 @@ def _best(
 
 
 def _largest_gain(loop_gain: Complex, sensitivity_peak: float) -> float:
-    """Largest g with ``|1 + g L| >= 1/sensitivity_peak`` for all gains from 0 to g."""
+    """Return the largest g for which ``|1 + g L| >= 1/sensitivity_peak`` holds for all gains from 0 to g."""
     size = np.abs(loop_gain) ** 2
     half = loop_gain.real / size
     inside = half**2 - (1.0 - sensitivity_peak**-2) / size

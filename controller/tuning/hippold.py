@@ -9,33 +9,33 @@ from controller.tuning.plant import PlantModel
 
 __all__ = ["HippoldGains", "hippold_gains"]
 
-DETUNED = 0.5  # of the pole's own decay: |w_p - w_0| above it is far
-REACTIVE_DEG = 20.0  # phase of the force behind a voltage that a phase-neutral exciter does not have
+DETUNED = 0.5  # fraction of the coupled pole's decay; a larger |w_p - w_0| counts as far
+REACTIVE_DEG = 20.0  # largest phase between voltage and force of an exciter that counts as phase neutral
 
 
 @dataclass(frozen=True)
 class HippoldGains:
-    """A phase PI that puts the poles of the idealised loop where they are wanted, and what speaks against it."""
+    """Phase PI law that places the poles of the idealised loop, and the assumptions that the plant violates."""
 
     law: PhaseLaw
     """The gains."""
     poles_rad_s: tuple[complex, complex, complex]
     """Poles of the idealised loop (1/s)."""
     failed: tuple[str, ...]
-    """Assumptions of the closed form that do not hold on this plant; none where it may be used."""
+    """Assumptions of the closed form that do not hold on this plant; empty if the closed form may be used."""
 
 
 def hippold_gains(plant: PlantModel, low_pass_rad_s: float, *, imaginary_part: float = 0.0) -> HippoldGains:
-    """Closed-form gains of the phase PI at phase resonance.
+    """Return the closed-form gains of the phase PI law at phase resonance.
 
-    With ds = D w_0 of the structure, dp the decay of the coupled pole (which is D_p w_p as measured in the coupled plant; a
-    further factor 1 + mu would enter the exciter's mass twice) and db = dp/w_LP, the idealised loop has the poles
-    ``w_LP (lR, lR +- i lI)`` with ``lR = -(1 + db)/3`` for
+    Let ds = D w_0 be the decay of the structure's mode, dp the decay of the coupled pole, and db = dp/w_LP. dp is D_p w_p as
+    measured in the coupled plant; a further factor 1 + mu would count the exciter's mass twice. The idealised loop has the
+    poles ``w_LP (lR, lR +- i lI)`` with ``lR = -(1 + db)/3`` for
 
         ``kp = w_LP (ds/dp)(3 lR^2 + lI^2 - db)``,  ``ki = w_LP^2 (ds/dp)(-lR)(lR^2 + lI^2)``.
 
-    ``imaginary_part`` is lI; 0 is conservative. The idealised loop has the plant ``T(s) = dp/(ds (s + dp))``: one coupled pole,
-    at the frequency of the structure, behind a phase-neutral exciter, no delay.
+    ``imaginary_part`` is lI; 0 is conservative. The plant of the idealised loop is ``T(s) = dp/(ds (s + dp))``: one coupled
+    pole at the frequency of the structure, a phase-neutral exciter and no delay.
     """
     ds = plant.damping_ratio * plant.frequency_rad_s
     offset = plant.pole_offset_rad_s()

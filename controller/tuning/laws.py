@@ -1,7 +1,8 @@
-"""Laws whose gains are designed, linearised about a locked state.
+"""Control laws whose gains are designed, linearised about a locked state.
 
-Each is a row or two of the feedback ``v = K(s) (reference - m)`` from the demodulated ``m = (ln|F|, arg F, ln|A|, arg A)``
-to ``v = (ln|U|, arg U, Omega)``, all of them small deviations; arguments are taken against the oscillator's phase.
+Each law is one or two rows of the feedback ``v = K(s) (reference - m)`` from the demodulated
+``m = (ln|F|, arg F, ln|A|, arg A)`` to ``v = (ln|U|, arg U, Omega)``. All entries are small deviations. Arguments are relative
+to the oscillator's phase.
 """
 
 import math
@@ -41,7 +42,7 @@ class PhaseLaw:
     """ki (1/s^2)."""
 
     def phase_gain(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """From phase error (rad) to frequency (rad/s)."""
+        """Return the transfer function from phase error (rad) to frequency (rad/s)."""
         del plant, lag_deg
         return self.proportional_per_s + self.integral_per_s2 / s
 
@@ -50,8 +51,8 @@ class PhaseLaw:
 class FrequencyErrorLaw:
     """``Omega = omega_m + k_p eps + k int eps`` with ``eps = (phi_d^2 Omega/2)(|F|/|A|) sin(e)/|sin phi*|``.
 
-    The error eps is the distance in frequency to the wanted lag: gains are scheduled by the damping that is measured
-    with every sample. With the gain ``proportional`` it is the phase PI whose gains scale with the identified damping.
+    The error eps is the frequency distance to the wanted lag. It schedules the gains by the damping that is measured with every
+    sample. With the gain ``proportional`` the law is a phase PI whose gains scale with the measured damping.
     """
 
     integral_per_s: float
@@ -59,10 +60,10 @@ class FrequencyErrorLaw:
     proportional: float = 0.0
     """k_p (1)."""
     shape_factor: float = 1.0
-    """phi_d^2 as the law takes it, over that of the plant."""
+    """phi_d^2 assumed by the law, divided by phi_d^2 of the plant."""
 
     def phase_gain(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """From phase error (rad) to frequency (rad/s)."""
+        """Return the transfer function from phase error (rad) to frequency (rad/s)."""
         slope = self.shape_factor * frequency_per_lag(plant, lag_deg)
         return (self.proportional + self.integral_per_s / s) * slope
 
@@ -87,7 +88,7 @@ def linear_frequency_law(law: PhaseLockedLoop, plant: PlantModel, bench_shape: f
 
 
 def frequency_per_lag(plant: PlantModel, lag_deg: float) -> float:
-    """``(phi_d^2 W/2) |F|/|A| / |sin phi*|`` in rad/s per rad: about D w_0/sin^2 phi*."""
+    """Return ``(phi_d^2 W/2) |F|/|A| / |sin phi*|`` in rad/s per rad; it is about D w_0/sin^2 phi*."""
     omega = plant.lock_frequency_rad_s(lag_deg)
     size = 1.0 / abs(complex(plant.accelerance(1j * omega)))
     return 0.5 * plant.drive_shape**2 * omega * size / abs(math.sin(math.radians(lag_deg)))
@@ -103,33 +104,33 @@ class ForceLaw:
     """K4 (V/(N s))."""
 
     def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        """Return the rows of K(s) for ln|U| and arg U [n, 2, 4]."""
         per_volt = abs(complex(plant.force_per_v(1j * plant.lock_frequency_rad_s(lag_deg))))
         return _amplitude_row(s, 0, (self.k3_v_n + self.k4_v_n_s / s) * per_volt)
 
     def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        """Return the direct gain from a relative change of the level to ln|U| and arg U [n, 2]."""
         return self.rows(s, plant, lag_deg)[:, :, 0]
 
 
 @dataclass(frozen=True)
 class _LogLaw:
-    """``ln U = kp e + ki int e``, e the logarithm of wanted over measured size of one quantity."""
+    """``ln U = kp e + ki int e``, where e is the logarithm of wanted over measured amplitude of one quantity."""
 
     proportional: float
     """kp (1)."""
     integral_per_s: float
     """ki (1/s)."""
     measured: ClassVar[int]
-    """Which of m is held."""
+    """Index in m of the held quantity."""
 
     def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        """Return the rows of K(s) for ln|U| and arg U [n, 2, 4]."""
         del plant, lag_deg
         return _amplitude_row(s, self.measured, self.proportional + self.integral_per_s / s)
 
     def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        """Return the direct gain from a relative change of the level to ln|U| and arg U [n, 2]."""
         return self.rows(s, plant, lag_deg)[:, :, self.measured]
 
 
@@ -147,9 +148,9 @@ class LogResponseLaw(_LogLaw):
 
 @dataclass(frozen=True)
 class ComplexResponseLaw:
-    """``ln U_c = kp E + K int E``, ``E = ln(A_ref/|A|) + i(phi_0 - arg A)``; around it, if wanted, a force loop.
+    """``ln U_c = kp E + K int E``, ``E = ln(A_ref/|A|) + i(phi_0 - arg A)``, with an optional outer force loop.
 
-    The force loop is ``d ln A_ref/dt = k_F ln(F* sin psi*/(|F| sin psi))``: active force drives the level.
+    The force loop is ``d ln A_ref/dt = k_F ln(F* sin psi*/(|F| sin psi))``: the active force sets the level of the response.
     """
 
     proportional: complex
@@ -157,19 +158,19 @@ class ComplexResponseLaw:
     integral_per_s: float
     """K (1/s)."""
     force_per_s: float = 0.0
-    """k_F (1/s); 0 where the level is that of the response."""
+    """k_F (1/s); 0 if the level prescribes the response."""
     smoothing_rad_s: float = math.inf
-    """Corner of a first-order low-pass that E passes before the gains (rad/s); infinite where there is none."""
+    """Corner of a first-order low-pass that E passes before the gains (rad/s); infinite without a low-pass."""
 
     def gain(self, s: Complex) -> Complex:
-        """From E to ln U_c."""
+        """Return the transfer function from E to ln U_c."""
         return np.asarray((self.proportional + self.integral_per_s / s) * self._smoothing(s))
 
     def _smoothing(self, s: Complex) -> Complex:
         return np.asarray(1.0 / (1.0 + s / self.smoothing_rad_s))
 
     def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """K's rows of ln|U| and arg U [n, 2, 4]."""
+        """Return the rows of K(s) for ln|U| and arg U [n, 2, 4]."""
         del plant
         force = self.force_per_s / s
         cot = 1.0 / math.tan(math.radians(lag_deg))
@@ -179,13 +180,13 @@ class ComplexResponseLaw:
         return self._turn(s, np.stack([level, phase], axis=1))
 
     def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
-        """What a change of the level (relative) does to ln|U| and arg U directly [n, 2]."""
+        """Return the direct gain from a relative change of the level to ln|U| and arg U [n, 2]."""
         del plant, lag_deg
         error = np.stack([self.force_per_s / s if self.force_per_s else np.ones_like(s), np.zeros_like(s)], axis=-1)
         return self._turn(s, error[:, :, None])[:, :, 0]
 
     def _turn(self, s: Complex, error: Complex) -> Complex:
-        """(kp + K/s) E, real and imaginary part apart [n, 2, ...]."""
+        """Return (kp + K/s) E after the smoothing, with real and imaginary part as separate rows [n, 2, ...]."""
         smoothing = self._smoothing(s)
         real = ((complex(self.proportional).real + self.integral_per_s / s) * smoothing)[:, None]
         imag = (complex(self.proportional).imag * smoothing)[:, None]

@@ -1,13 +1,13 @@
-"""The linearised loop: slow changes of the output's amplitude, phase and frequency, and what the demodulators make of them.
+"""The linearised loop: transfer from slow changes of the output's amplitude, phase and frequency to the demodulated signals.
 
-With ``u = Re U exp(a + i b + i theta)`` and ``theta' = W + Omega``, a slow complex change ``c = a + i(b + delta)``,
-``delta = Omega/s``, of the output leaves a linear plant as ``h c`` with the envelope's transfer function
-``h(s) = H(s + i W)/H(i W)``. Its coefficients are complex; real signals see
+Let ``u = Re U exp(a + i b + i theta)`` and ``theta' = W + Omega``. A slow complex change ``c = a + i(b + delta)`` of the
+output, ``delta = Omega/s``, becomes ``h c`` behind a linear plant, with the envelope's transfer function
+``h(s) = H(s + i W)/H(i W)``. The coefficients of h are complex. Real signals see
 
     ``P = [h(s) + h*(s)]/2``, ``R = [h(s) - h*(s)]/(2 i)``, ``h*(s) = H(s - i W)/H(-i W)``,
 
-so that ``ln|Y| <- P a - R (b + delta)`` and ``arg Y <- R a + P (b + delta) - delta``. From frequency to lag that is the map
-``T(s) = [P_F(s) - P_A(s)]/s``. Demodulators add their low-pass ``w_LP/(s + w_LP)``, the rig its delay.
+so that ``ln|Y| <- P a - R (b + delta)`` and ``arg Y <- R a + P (b + delta) - delta``. The transfer function from frequency to
+lag is therefore ``T(s) = [P_F(s) - P_A(s)]/s``. The demodulators add their low-pass ``w_LP/(s + w_LP)``, the rig its delay.
 """
 
 from collections.abc import Callable
@@ -34,14 +34,17 @@ Complex = NDArray[np.complex128]
 
 
 def envelope(response: Callable[[Complex], Complex], s: Complex, omega: float) -> tuple[Complex, Complex]:
-    """P(s) and R(s) of a response H at the frequency omega (rad/s)."""
+    """Return P(s) and R(s) of a frequency response H at the frequency omega (rad/s)."""
     upper = response(s + 1j * omega) / response(np.array([1j * omega]))
     lower = response(s - 1j * omega) / response(np.array([-1j * omega]))
     return 0.5 * (upper + lower), -0.5j * (upper - lower)
 
 
 def lag_per_frequency(plant: PlantModel, s: ArrayLike, lag_deg: float = -90.0) -> Complex:
-    """T(s) in s: change of the lag (rad) per change of the oscillator's frequency (rad/s), no low-pass, no delay."""
+    """Return T(s) in seconds: change of the lag (rad) per change of the oscillator's frequency (rad/s).
+
+    The demodulators' low-pass and the delay are not included.
+    """
     s = np.atleast_1d(np.asarray(s, np.complex128))
     omega = plant.lock_frequency_rad_s(lag_deg)
     difference = envelope(plant.force_per_v, s, omega)[0] - envelope(plant.acceleration_per_v, s, omega)[0]
@@ -50,11 +53,11 @@ def lag_per_frequency(plant: PlantModel, s: ArrayLike, lag_deg: float = -90.0) -
 
 @dataclass(frozen=True)
 class ControlLoop:
-    """Plant, demodulator and laws at one lag; everything that follows is of its linearisation."""
+    """Plant, demodulator and laws at one lag; all methods refer to the linearised loop."""
 
     plant: PlantModel
     low_pass_rad_s: float
-    """w_LP of the demodulators: first-order low-pass, or adaptive filter, which averages to the same."""
+    """w_LP of the demodulators: a first-order low-pass, or an adaptive filter, which is equivalent on average."""
     frequency_law: LinearFrequencyLaw
     amplitude_law: LinearAmplitudeLaw | None = None
     """None: the level is the output's amplitude in volts."""
@@ -66,7 +69,7 @@ class ControlLoop:
         return self.plant.lock_frequency_rad_s(self.lag_deg)
 
     def measured(self, s: Complex) -> Complex:
-        """M(s) [n, 4, 3]: from (ln|U|, arg U, Omega) to (ln|F|, arg F, ln|A|, arg A) as demodulated."""
+        """Return M(s) [n, 4, 3]: from (ln|U|, arg U, Omega) to the demodulated (ln|F|, arg F, ln|A|, arg A)."""
         rows = []
         for response in (self.plant.force_per_v, self.plant.acceleration_per_v):
             p, r = envelope(response, s, self.omega_rad_s)
@@ -77,7 +80,7 @@ class ControlLoop:
         return np.asarray(self.low_pass_rad_s / (s + self.low_pass_rad_s) * np.exp(-s * self.plant.delay_s))
 
     def feedback(self, s: Complex) -> Complex:
-        """K(s) [n, 3, 4]: from the measured deviations to (ln|U|, arg U, Omega)."""
+        """Return K(s) [n, 3, 4]: from the measured deviations to (ln|U|, arg U, Omega)."""
         out = np.zeros((s.size, 3, 4), np.complex128)
         if self.amplitude_law is not None:
             out[:, :2] = self.amplitude_law.rows(s, self.plant, self.lag_deg)
@@ -86,24 +89,24 @@ class ControlLoop:
         return out
 
     def return_difference(self, s: Complex) -> Complex:
-        """I + K M [n, 3, 3]; its determinant vanishes at the poles of the closed loop."""
+        """Return I + K M [n, 3, 3]; its determinant vanishes at the poles of the closed loop."""
         return np.asarray(np.eye(3) + self.feedback(s) @ self.measured(s))
 
     def determinant(self, s: ArrayLike) -> Complex:
-        """``det(I + K M)``."""
+        """Return ``det(I + K M)``."""
         return np.asarray(np.linalg.det(self.return_difference(np.atleast_1d(np.asarray(s, np.complex128)))))
 
     def frequency_loop_gain(self, s: ArrayLike) -> Complex:
-        """L(s) of the frequency law, the amplitude law closed."""
+        """Return the loop gain L(s) of the frequency law with the amplitude law closed."""
         matrix = self.return_difference(np.atleast_1d(np.asarray(s, np.complex128)))
         opened = matrix.copy()
         opened[:, 2] = [0.0, 0.0, 1.0]
         return np.asarray(np.linalg.det(matrix) / np.linalg.det(opened) - 1.0)
 
     def amplitude_loop_gain(self, s: ArrayLike) -> Complex:
-        """L(s) of the amplitude law alone, the frequency held; 0 where there is none.
+        """Return the loop gain L(s) of the amplitude law with the frequency held; 0 without an amplitude law.
 
-        That of complex response control has complex coefficients: both signs of the frequency count.
+        For complex response control L has complex coefficients, so that both signs of the frequency count.
         """
         s = np.atleast_1d(np.asarray(s, np.complex128))
         law = self.amplitude_law
@@ -117,16 +120,19 @@ class ControlLoop:
         return np.asarray(np.linalg.det(matrix) - 1.0)
 
     def lag_after_target(self, s: Complex) -> Complex:
-        """From the wanted lag to the measured one."""
+        """Return the transfer function from the wanted lag to the measured lag."""
         gain = self.frequency_law.phase_gain(s, self.plant, self.lag_deg)
         return self._lag(self._outputs(s, 2, gain))
 
     def lag_after_frequency(self, s: Complex) -> Complex:
-        """From a shift of the rig's frequencies (rad/s) to the measured lag (rad): the oscillator is that much too low."""
+        """Return the transfer function from a shift of the rig's frequencies (rad/s) to the measured lag (rad).
+
+        A shift upwards acts like an oscillator frequency that is too low by the same amount.
+        """
         return -self._lag(self._outputs(s, 2, np.ones_like(s)))
 
     def response_after_level(self, s: Complex) -> tuple[Complex, Complex]:
-        """From the logarithm of the level to that of the measured response, and to the lag (rad)."""
+        """Return the transfer functions from the logarithm of the level to ln|A| as measured and to the lag (rad)."""
         inputs = np.zeros((s.size, 3), np.complex128)
         if self.amplitude_law is None:
             inputs[:, 0] = 1.0

@@ -1,4 +1,4 @@
-"""The low-pass of the demodulators from an open-loop run at the wanted level."""
+"""Choice of the demodulators' low-pass from the noise of an open-loop run at the wanted level."""
 
 import math
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["LowPassChoice", "low_pass_from_densities", "low_pass_from_noise"]
 
 Real = NDArray[np.float64]
-HIGHEST, LOWEST = 1.0 / 5.0, 1.0 / 20.0  # of the frequency: beyond, the average over a period is none; below, it waits
+HIGHEST, LOWEST = 1.0 / 5.0, 1.0 / 20.0  # of the frequency: above, it does not average a period; below, it is too slow
 
 
 @dataclass(frozen=True)
 class LowPassChoice:
-    """A bandwidth, and the noise it was chosen by."""
+    """Chosen bandwidth of the low-pass, and the lag noise that remains."""
 
     low_pass_rad_s: float
     """w_LP."""
     lag_std_deg: float
-    """Fluctuation of the lag that it leaves."""
+    """Standard deviation of the lag with this low-pass (deg)."""
     quiet: bool
-    """Whether that is within what was asked for; if not, the lowest allowed low-pass was taken."""
+    """Whether ``lag_std_deg`` is within the requested value; if not, the lowest allowed low-pass was taken."""
 
 
 def low_pass_from_densities(
@@ -33,10 +33,10 @@ def low_pass_from_densities(
     *,
     lag_std_deg: float = 0.5,
 ) -> LowPassChoice:
-    """Highest w_LP whose lag fluctuates less than ``lag_std_deg``, within w_0/20 and w_0/5.
+    """Return the highest w_LP at which the lag's standard deviation is at most ``lag_std_deg``, within w_0/20 and w_0/5.
 
-    One-sided noise densities N_0 (unit^2/Hz) near the frequency and peak amplitudes A; the phase of each has the variance
-    ``N_0 w_LP/(2 A^2)``.
+    The densities are one-sided noise densities N_0 (unit^2/Hz) near the frequency; the amplitudes A are peak values. The phase
+    of each signal has the variance ``N_0 w_LP/(2 A^2)``.
     """
     if not min(force_amplitude, acceleration_amplitude, omega_rad_s, lag_std_deg) > 0.0:
         raise ValueError(
@@ -58,10 +58,10 @@ def low_pass_from_noise(
     harmonics: int = 7,
     lag_std_deg: float = 0.5,
 ) -> LowPassChoice:
-    """The same from a steady record [n] in open loop, at the lowest level that the test will hold.
+    """Choose w_LP from a steady open-loop record [n] at the lowest level of the test; see `low_pass_from_densities`.
 
-    ``theta_rad`` is the oscillator's phase. Harmonics, their linear drift, and the mean are taken out; what is left between 1/2
-    and 3/2 of the frequency is noise. Raises ValueError on fewer than 20 periods.
+    ``theta_rad`` is the oscillator's phase. Mean, linear drift, harmonics and the linear drift of the fundamental are
+    subtracted. The remainder between 1/2 and 3/2 of the frequency counts as noise. Raises ValueError for fewer than 20 periods.
     """
     theta = np.unwrap(np.asarray(theta_rad, float))
     omega = (theta[-1] - theta[0]) / (theta.size - 1) * sample_rate_hz
@@ -80,12 +80,12 @@ def low_pass_from_noise(
 
 
 def _density(signal: Real, basis: Real, omega: float, sample_rate_hz: float) -> tuple[float, float]:
-    """Mean one-sided noise density around omega (unit^2/Hz), and the amplitude of the fundamental."""
+    """Return the mean one-sided noise density around omega (unit^2/Hz), and the amplitude of the fundamental."""
     coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
     window = np.hanning(signal.size)
     spectrum = np.fft.rfft(window * (signal - basis @ coefficients))
     density = 2.0 * np.abs(spectrum) ** 2 / (sample_rate_hz * np.sum(window**2))
     frequency = 2.0 * math.pi * np.fft.rfftfreq(signal.size, 1.0 / sample_rate_hz) / omega
-    # The lines that the fit has emptied would make it look quieter than it is.
+    # The fit empties the lines around omega; including them would bias the density low.
     near = (frequency > 0.5) & (frequency < 1.5) & (np.abs(frequency - 1.0) > 4.0 * frequency[1])
     return float(np.mean(density[near])), float(np.hypot(coefficients[2], coefficients[3]))

@@ -1,13 +1,13 @@
-"""The plant that a phase-locked loop turns: exciter and structure near one mode, from voltage to force and acceleration.
+"""The plant of a phase-locked loop: exciter and structure near one mode, from voltage to force and acceleration.
 
-The structure answers the force with its accelerance ``A = Y(s) F``, one mode and the residuals of the others; any
-linear exciter is a relation ``u = alpha(s) F + beta(s) A`` that knows nothing of the structure. Both together give
+The structure responds to the force with its accelerance, ``A = Y(s) F``: one mode and the residuals of the other modes. Any
+linear exciter obeys ``u = alpha(s) F + beta(s) A``, where alpha and beta do not depend on the structure. Together they give
 
-    ``H_F = 1/(alpha + beta Y)``,  ``H_A = Y/(alpha + beta Y)``,
+    ``H_F = 1/(alpha + beta Y)``,  ``H_A = Y/(alpha + beta Y)``.
 
-rational, with shared poles, and with a structural mode that can be moved alone (`PlantModel.at`), which is how a nonlinear
-structure looks at another level. For a voltage-driven shaker behind an elastic stinger alpha and beta are polynomials:
-alpha of degree 3 in s, beta of powers -2 to 1.
+H_F and H_A are rational and share their poles. The structural mode can be changed alone (`PlantModel.at`), which represents a
+nonlinear structure at another level. For a voltage-driven shaker with an elastic stinger alpha is a polynomial of degree 3
+in s, and beta has the powers -2 to 1 of s.
 """
 
 import cmath
@@ -27,7 +27,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True)
 class PlantModel:
-    """Linear plant near a mode; ``H`` for ``exp(s t)``, of a voltage whose phase is that on the converter."""
+    """Linear plant near a mode; ``H`` is for ``exp(s t)``, with the phase of the voltage taken at the converter."""
 
     frequency_rad_s: float
     """w_0: frequency of the mode of the structure alone."""
@@ -42,15 +42,15 @@ class PlantModel:
     acceleration_v_s2_m: tuple[float, float, float, float]
     """beta: volts per m/s^2, coefficients of (s/centre)^-2 to ^1."""
     centre_rad_s: float
-    """Frequency that s is divided by in the polynomials."""
+    """Frequency by which s is divided in the polynomials."""
     band_hz: tuple[float, float]
-    """Band that the model was fitted in."""
+    """Frequency band of the fit."""
     fit_error: float
     """Largest of the two relative errors (root mean square over the band) of H_F and H_A."""
     sample_rate_hz: float
     """Sample rate of the loop."""
     latency_samples: float
-    """Delay that is common to all channels, from an output to the input that shows it, in samples."""
+    """Delay common to all channels, from an output sample to the input sample that shows its effect, in samples."""
 
     def __post_init__(self) -> None:
         for name in ("frequency_rad_s", "damping_ratio", "drive_shape", "centre_rad_s", "sample_rate_hz"):
@@ -61,35 +61,35 @@ class PlantModel:
 
     @property
     def delay_s(self) -> float:
-        """Delay of the loop."""
+        """Delay of the loop (s)."""
         return self.latency_samples / self.sample_rate_hz
 
     def accelerance(self, s: ArrayLike) -> Complex:
-        """Y: acceleration of the drive point per force on the structure alone (1/kg), at complex s (rad/s)."""
+        """Return Y: acceleration of the drive point per force on the structure alone (1/kg), at complex s (rad/s)."""
         s = np.asarray(s, dtype=np.complex128)
         constant, rising = self.residual_per_kg
         pole = s**2 + 2.0 * self.damping_ratio * self.frequency_rad_s * s + self.frequency_rad_s**2
         return np.asarray(self.drive_shape**2 * s**2 / pole + constant + rising * (s / self.centre_rad_s) ** 2)
 
     def exciter(self, s: ArrayLike) -> tuple[Complex, Complex]:
-        """Exciter: alpha (V/N) and beta (V s^2/m) of ``u = alpha F + beta A`` at complex s."""
+        """Return alpha (V/N) and beta (V s^2/m) of the exciter, ``u = alpha F + beta A``, at complex s."""
         z = np.asarray(s, dtype=np.complex128) / self.centre_rad_s
         alpha = np.polyval(np.array(self.force_v_n[::-1], np.complex128), z)
         beta = np.polyval(np.array(self.acceleration_v_s2_m[::-1], np.complex128), z) / z**2
         return np.asarray(alpha, np.complex128), np.asarray(beta, np.complex128)
 
     def force_per_v(self, s: ArrayLike) -> Complex:
-        """H_F (N/V) at complex s, without the common delay."""
+        """Return H_F (N/V) at complex s, without the common delay."""
         alpha, beta = self.exciter(s)
         return np.asarray(1.0 / (alpha + beta * self.accelerance(s)))
 
     def acceleration_per_v(self, s: ArrayLike) -> Complex:
-        """H_A (m/s^2/V) at complex s, without the common delay."""
+        """Return H_A (m/s^2/V) at complex s, without the common delay."""
         return np.asarray(self.accelerance(s) * self.force_per_v(s))
 
     @cached_property
     def poles_rad_s(self) -> Complex:
-        """All poles of H_F and H_A (1/s); far from the band they are the fit's, not the rig's."""
+        """All poles of H_F and H_A (1/s); far from the band they belong to the fit and not to the rig."""
         w, c = self.frequency_rad_s / self.centre_rad_s, self.centre_rad_s
         mode = np.array([1.0, 2.0 * self.damping_ratio * w, w**2])
         accelerance = np.polyadd(
@@ -106,13 +106,13 @@ class PlantModel:
         return complex(poles[np.argmin(np.abs(poles - 1j * self.frequency_rad_s))])
 
     def pole_offset_rad_s(self, lag_deg: float = -90.0) -> complex:
-        """p: the coupled pole as an offset from the frequency that the loop locks to at a lag (1/s)."""
+        """Return p (1/s): the coupled pole minus i times the frequency at which the loop locks for this lag."""
         return self.coupled_pole_rad_s - 1j * self.lock_frequency_rad_s(lag_deg)
 
     def lock_frequency_rad_s(self, lag_deg: float = -90.0) -> float:
-        """Frequency near the mode at which the acceleration lags the force by ``lag_deg``.
+        """Return the frequency (rad/s) near the mode at which the phase lag of the acceleration is ``lag_deg``.
 
-        Raises ValueError where no frequency near the mode does.
+        Raises ValueError if no frequency near the mode has this lag.
         """
         from scipy.optimize import brentq
 
@@ -133,25 +133,26 @@ class PlantModel:
         raise ValueError(f"lag_deg = {lag_deg:g}: the accelerance of this plant does not have it near the mode")
 
     def volts_per_newton(self, lag_deg: float = -90.0) -> float:
-        """Voltage that a newton of force needs at the frequency of that lag, both peak."""
+        """Return the voltage (peak) for one newton of force (peak) at the frequency with this lag."""
         return float(1.0 / abs(self.force_per_v(1j * self.lock_frequency_rad_s(lag_deg))))
 
     @property
     def exciter_mass_kg(self) -> complex:
-        """beta/alpha at the mode: what the exciter hangs on the drive point, in effect.
+        """beta/alpha at the mode: effective complex mass by which the exciter loads the drive point.
 
-        Its real part is m_ex, the moving mass (less its spring's); its imaginary part is damping, times -w_0.
+        The real part is m_ex, the moving mass reduced by the effect of the suspension's stiffness. The imaginary part is the
+        exciter's damping divided by -w_0.
         """
         alpha, beta = self.exciter(1j * self.frequency_rad_s)
         return complex(beta / alpha)
 
     @property
     def mass_ratio(self) -> float:
-        """Mass ratio mu = phi_d^2 m_ex: by how much the exciter's mass loads the mode."""
+        """Mass ratio mu = phi_d^2 m_ex: effective mass of the exciter over the modal mass."""
         return self.drive_shape**2 * self.exciter_mass_kg.real
 
     def at(self, frequency_rad_s: float | None = None, damping_ratio: float | None = None) -> Self:
-        """The plant with another modal frequency and damping, as a nonlinear structure has it at another level."""
+        """Return the plant with another modal frequency and damping, as a nonlinear structure has at another level."""
         return replace(
             self,
             frequency_rad_s=self.frequency_rad_s if frequency_rad_s is None else frequency_rad_s,
@@ -159,12 +160,15 @@ class PlantModel:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Floats and lists of floats, for a table of a plan."""
+        """Return the fields as floats and lists of floats, for a table in a plan."""
         return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
     @classmethod
     def from_dict(cls, table: Mapping[str, Any]) -> Self:
-        """The model of `to_dict`; ValueError where a key is missing, unknown or not of the right shape."""
+        """Return the model from a table made by `to_dict`.
+
+        Raises ValueError if a key is missing or unknown, or if a value has the wrong shape.
+        """
         names = {f.name for f in fields(cls)}
         if wrong := sorted(names.symmetric_difference(table)):
             raise ValueError(f"plant.{wrong[0]}: {'missing' if wrong[0] in names else 'not known'}")
@@ -190,7 +194,7 @@ class PlantModel:
         force_std: ArrayLike | None = None,
         acceleration_std: ArrayLike | None = None,
     ) -> Self:
-        """The plant from measured voltage FRFs; see `controller.tuning.plant_fit.fitted`."""
+        """Fit the plant to measured FRFs from voltage; see `controller.tuning.plant_fit.fitted`."""
         from controller.tuning.plant_fit import fitted
 
         found = fitted(frequency_hz, force_per_v, acceleration_per_v, force_std, acceleration_std)

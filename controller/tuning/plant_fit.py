@@ -1,4 +1,4 @@
-"""Fit of a plant near a mode to measured frequency responses from voltage."""
+"""Fit of the plant near one mode to measured frequency responses from voltage."""
 
 import math
 from typing import Any
@@ -12,9 +12,10 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 NO_RESONANCE = "force_per_v, acceleration_per_v: their ratio shows no damped resonance inside the band"
 NO_MODE = 0.15
-"""The accelerance shows no mode where the residuals of other modes leave no more than this part of it unexplained.
+"""Largest relative misfit of the residual terms alone at which the accelerance counts as showing no mode.
 
-A mode inside the band leaves 0.8 and more. Without one, the equations for the pole hold noise or rounding alone."""
+If the residuals of other modes explain the accelerance to within this fraction, there is no mode inside the band: the
+equations for the pole then contain only noise or rounding. With a mode inside the band the misfit is 0.8 or more."""
 
 
 def fitted(
@@ -24,17 +25,17 @@ def fitted(
     force_std: ArrayLike | None = None,
     acceleration_std: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Fields of a `PlantModel` that the FRFs [n] tell, from a band around one mode.
+    """Fit the FRFs [n] in a band around one mode; return the identified fields of a `PlantModel`.
 
-    The mode is where the accelerance peaks. Started by linear least squares (of the accelerance as Sanathanan and Koerner
-    do, 1963; of the exciter ``1 = alpha H_F + beta H_A``), finished by nonlinear least squares on both FRFs, weighted by the
-    standard deviations [n] or one number each (by default equal parts of each FRF's root mean square). Coefficients are
-    real, so ``H(-i w)`` is the conjugate of ``H(i w)`` by construction.
+    The mode is taken at the peak of the accelerance. Linear least squares give the start values: for the accelerance by the
+    iteration of Sanathanan and Koerner (1963), for the exciter from ``1 = alpha H_F + beta H_A``. Nonlinear least squares then
+    fit both FRFs, weighted by their standard deviations ([n] or one number each; by default the root mean square of each FRF).
+    Coefficients are real, so that ``H(-i w)`` is the conjugate of ``H(i w)`` by construction.
 
     Raises
     ------
     ValueError
-        On FRFs that are not finite, of unequal length, too few, or that show no resonance of the structure.
+        If the FRFs are not finite, differ in length, have too few lines, or show no resonance of the structure.
     """
     from scipy.optimize import least_squares
 
@@ -102,7 +103,7 @@ def _model(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
 
 
 def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
-    """Frequency to scale with, and first values of log w, log D, log phi_d^2, residuals, alpha, beta."""
+    """Return the scaling frequency (rad/s), and start values of log w, log D, log phi_d^2, residuals, alpha, beta."""
     y = h_a / h_f
     centre = float(np.abs(s[np.argmax(np.abs(y))]))
     z = s / centre
@@ -131,7 +132,7 @@ def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
 
 
 def _real_least_squares(columns: Complex, target: Complex) -> Real:
-    """Real x of the complex equations ``columns x = target``, the columns scaled to equal length."""
+    """Return the real least-squares solution x of the complex equations ``columns x = target``; columns are normalised."""
     left, right = np.vstack([columns.real, columns.imag]), np.concatenate([target.real, target.imag])
     scale = np.linalg.norm(left, axis=0)
     return np.asarray(np.linalg.lstsq(left / scale, right, rcond=None)[0] / scale)

@@ -1,9 +1,9 @@
 """Stability, margins and poles of a linearised loop with delay, without approximating the delay.
 
-Closed-loop poles are zeros of ``det(I + K M)``, analytic but for the known poles of plant, low-pass and integrators. They
-are counted on a contour by the argument principle, and found by Newton's method from a grid. The region is the half disc of
-radius 0.8 W: further out the map runs into what the exciter does at rest, and averaging over a period means nothing. A loop
-that is strong enough to have poles there is not counted but recognised by its gain at W/2 (`gains_at_half`).
+Closed-loop poles are zeros of ``det(I + K M)``, which is analytic except at the known poles of plant, low-pass and integrators.
+The poles are counted on a contour by the argument principle, and found by Newton's method from a grid. The region is the half
+disc of radius 0.8 W. Further out, the map is dominated by the exciter's response near zero frequency, and averaging over a
+period has no meaning. A loop whose gain is high enough for poles there is recognised by its gain at W/2 (`gains_at_half`).
 """
 
 import math
@@ -20,11 +20,12 @@ __all__ = ["LARGEST_AT_HALF", "Margins", "closed_loop_poles", "gains_at_half", "
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-REACH = 0.8  # of W: radius within which poles are looked for
-HALF = 0.5  # of W: changes within two periods, the quickest that averaging over one can follow
+REACH = 0.8  # of W: radius within which poles are searched
+HALF = 0.5  # of W: changes within two periods, the fastest that an average over one period can follow
 LARGEST_AT_HALF = 2.2
-"""Largest loop gain at W/2: with up to this, poles that grow stay within the radius that is looked at, also those of a loop
-that falls steeply. Above 1, for the paper's force loop crosses over at 0.5 to 1 W off resonance and holds."""
+"""Largest allowed loop gain at W/2. Up to this gain, growing poles stay within the searched radius, even if the loop gain
+falls steeply with frequency. The value is above 1 because the paper's force loop, off resonance, crosses over at 0.5 to 1 W and
+is stable."""
 INSET = 2e-4  # of W: closer to the imaginary axis than this, a pole counts as marginal, not as unstable
 
 
@@ -35,15 +36,15 @@ class Margins:
     sensitivity_peak: float
     """max |S|, S = 1/(1 + L)."""
     gain_margin: float
-    """Smallest factor above 1 on the gains at which the loop becomes unstable; infinite where there is none."""
+    """Smallest factor above 1 on the gains that makes the loop unstable; infinite if there is none."""
     phase_margin_deg: float
-    """Smallest additional phase, of either sign, at which it becomes unstable; 180 where there is none."""
+    """Smallest additional phase, of either sign, that makes the loop unstable; 180 if there is none."""
     crossover_rad_s: float
-    """Highest frequency with |L| = 1; 0 where there is none."""
+    """Highest frequency with |L| = 1; 0 if there is none."""
 
 
 def unstable_poles(loop: ControlLoop) -> int:
-    """Number of closed-loop poles in the right half plane, by the argument principle."""
+    """Return the number of closed-loop poles in the right half plane, by the argument principle."""
     omega = loop.omega_rad_s
     radius = REACH * omega
     offsets = loop.plant.poles_rad_s - 1j * omega
@@ -52,10 +53,11 @@ def unstable_poles(loop: ControlLoop) -> int:
 
 
 def gains_at_half(loop: ControlLoop) -> dict[str, float]:
-    """Largest gain of each loop, the others open, on the half circle of radius W/2 in the right half plane.
+    """Return the largest gain of each loop on the half circle of radius W/2 in the right half plane.
 
-    It is linear in the loop's gains. A pole leaves the half disc only where it passes 1; a pole that has left is not found,
-    hence a loop above `LARGEST_AT_HALF` is to be taken as unusable, whatever the number of poles.
+    For each loop the outer loops are open; the force loop is taken with the response loop closed. The gain is linear in the
+    gains of the law. A pole can leave the half disc only if the gain exceeds 1, and a pole that has left is not found.
+    Therefore a loop above `LARGEST_AT_HALF` counts as unusable, whatever the number of poles.
     """
     angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 101)
     s = HALF * loop.omega_rad_s * np.exp(1j * angle)
@@ -73,7 +75,7 @@ def gains_at_half(loop: ControlLoop) -> dict[str, float]:
 
 
 def _windings(function: Callable[[Complex], Complex], inset: float, radius: float) -> int:
-    """Turns of a function's value around 0 along the half disc's border, counter-clockwise."""
+    """Return how often a function's value winds around 0 along the half disc's border, counter-clockwise."""
     corner = math.acos(inset / radius)
     height = radius * math.sin(corner)
     slow = np.geomspace(inset, height, 400)
@@ -92,9 +94,9 @@ def _windings(function: Callable[[Complex], Complex], inset: float, radius: floa
 
 
 def closed_loop_poles(loop: ControlLoop) -> Complex:
-    """Poles of the closed loop (1/s) within 0.8 times the locked frequency of the origin, slowest first [n].
+    """Return the poles of the closed loop (1/s) within 0.8 W of the origin, sorted by modulus [n]; W is the locked frequency.
 
-    A multiple pole is given once.
+    A multiple pole is listed once.
     """
     omega = loop.omega_rad_s
     offsets = loop.plant.poles_rad_s - 1j * omega
@@ -110,7 +112,7 @@ def closed_loop_poles(loop: ControlLoop) -> Complex:
     height = np.concatenate([[0.01], np.linspace(0.05, 1.0, 14)]) * reach
     start = (grid[:, None] + 1j * height).ravel()
     s, _ = _newton(function, start, 40, 0.1 * reach, 1e-6 * omega)
-    # A factor that the determinant does not have as a pole is no zero of it: from there its own steps grow.
+    # A known pole that the determinant does not have appears here as a false zero; Newton steps on the determinant then grow.
     final, first = _newton(loop.determinant, s, 1, 0.1 * reach, 1e-6 * omega)
     final, last = _newton(loop.determinant, final, 4, 0.1 * reach, 1e-6 * omega)
     closing = np.abs(last) < np.maximum(0.7 * np.abs(first), 1e-8 * omega)
@@ -121,7 +123,10 @@ def closed_loop_poles(loop: ControlLoop) -> Complex:
 def _newton(
     function: Callable[[Complex], Complex], s: Complex, steps: int, longest: float, width: float
 ) -> tuple[Complex, Complex]:
-    """Zeros approached from s [n], and the last steps taken; the derivative by differences over ``width``."""
+    """Take Newton steps from the points s [n]; return the final points and the last steps.
+
+    The derivative comes from central differences over +-``width``; no step is longer than ``longest``.
+    """
     change = np.zeros_like(s)
     with np.errstate(all="ignore"):
         for _ in range(steps):
@@ -133,7 +138,7 @@ def _newton(
 
 
 def _distinct(found: Complex, known: Complex, apart: float) -> Complex:
-    """One of each cluster, with conjugates, without those that stand on a known pole (a pole that is not closed over)."""
+    """Return one pole of each cluster, with conjugates, without those that coincide with a known open-loop pole."""
     found = np.concatenate([found, found.conj()])
     out: list[complex] = []
     for pole in found[np.argsort(-found.real)]:
@@ -143,7 +148,7 @@ def _distinct(found: Complex, known: Complex, apart: float) -> Complex:
 
 
 def margins(omega: Real, loop_gain: Complex) -> Margins:
-    """Margins of a stable loop from L(i omega) [n] on rising frequencies (of both signs where L is complex)."""
+    """Return the margins of a stable loop from L(i omega) [n] at rising frequencies; of both signs if L is complex."""
     sensitivity = 1.0 / np.abs(1.0 + loop_gain)
     size, angle = np.abs(loop_gain), np.angle(-loop_gain)
     across = np.flatnonzero(

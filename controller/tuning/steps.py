@@ -15,17 +15,20 @@ Complex = NDArray[np.complex128]
 def step_response(
     transfer: Callable[[Complex], Complex], end_s: float, n: int = 2048, *, highest_rad_s: float = math.inf
 ) -> tuple[Real, Real]:
-    """Times [n] up to ``end_s`` and the response of a stable transfer function to a unit step.
+    """Return times [n] up to ``end_s`` and the response of a stable transfer function to a unit step.
 
-    Inversion of the Laplace transform along a vertical line, as a Fourier series of period ``4 end_s`` (Dubner and Abate,
-    1968), eight times finer than the output. Lanczos's factors smooth what is cut off; a jump is smeared over a few of the
-    fine steps. The transfer function is faded out around ``highest_rad_s``, beyond which it is not trusted.
+    The Laplace transform is inverted along a vertical line, as a Fourier series of period ``4 end_s`` (Dubner and Abate,
+    1968), on a grid eight times finer than the output. Lanczos's factors reduce the ringing of the truncated series; a jump is
+    smeared over a few of the fine steps. The transfer function is faded out around ``highest_rad_s``, above which it is not
+    trusted.
     """
     period, fine = 4.0 * end_s, 32 * n
     shift = math.log(1e6) / period
     order = np.arange(fine // 2 + 1)
     s = np.asarray(shift + 2j * np.pi / period * order, np.complex128)
-    fading = np.clip(3.0 - 2.0 * s.imag / highest_rad_s, 0.0, 2.0)  # 2 up to a half of it, 0 from one and a half on
+    fading = np.clip(
+        3.0 - 2.0 * s.imag / highest_rad_s, 0.0, 2.0
+    )  # 2 up to 0.5 highest_rad_s, 0 from 1.5 highest_rad_s
     taper = np.sinc(2.0 * order / fine) * np.sin(0.25 * np.pi * fading) ** 2
     damped = np.fft.irfft(transfer(s) / s * taper, fine)[: fine // 4 : 8]
     time = np.asarray(np.arange(n) * (end_s / n), np.float64)
@@ -33,7 +36,7 @@ def step_response(
 
 
 def settling_s(time_s: Real, error: Real, within: float) -> float:
-    """Time after which ``|error|`` stays within a bound; infinite where it does not."""
+    """Return the time (s) after which ``|error|`` stays within a bound; infinite if it does not."""
     outside = np.flatnonzero(np.abs(error) > within)
     if outside.size == 0:
         return 0.0

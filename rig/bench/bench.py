@@ -185,9 +185,9 @@ class Bench(Configured):
 
     @property
     def response_ratios(self) -> dict[str, float]:
-        """How far a channel moves for one metre at the drive point, in the mode under test, where its shapes are known.
+        """Displacement of each channel over that of the drive point, in the mode under test, by channel name.
 
-        By name; the drive channel itself has 1.
+        Only channels with known mode shape are included; the drive channel itself has 1.
         """
         drive, own = self.specimen.drive_mode_shape, self.channels[self.index_of("drive")].name
         shapes = {channel.name: channel.mode_shape for channel in self.channels if channel.mode_shape is not None}
@@ -205,12 +205,13 @@ def shipped_benches() -> list[str]:
 
 
 def load_bench(name_or_path: str | Path) -> Bench:
-    """A shipped bench by its name, or a bench from a TOML file.
+    """Load a shipped bench by its name, or a bench from a TOML file.
 
-    ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file beside it; what else
-    stands there changes it key by key. Another ``driver.name`` than the base's begins with no ``driver.options``.
+    ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file in the same folder. The
+    other entries of the file change the base key by key. If ``driver.name`` differs from the base's, the base's
+    ``driver.options`` are dropped.
 
-    Raises `ConfigurationError` for what is no bench, and for one that must not run as it is (`rig.bench.cross_checks`).
+    Raises `ConfigurationError` if the file is not a valid bench, or if the bench must not run (`rig.bench.cross_checks`).
     """
     bench = validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
     try:
@@ -221,7 +222,7 @@ def load_bench(name_or_path: str | Path) -> Bench:
 
 
 def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, Any]:
-    """The table of a bench on top of those it starts from; ``over`` are the files that start from this one."""
+    """Return the table of a bench merged with its bases; ``over`` are the files for which this one is a base."""
     path = find_toml(name_or_path, _folder(), "bench")
     table = read_toml(path)
     base = table.pop("base", None)
@@ -240,7 +241,7 @@ def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, An
 
 
 def _changed(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
-    """The base with what stands in ``table``; options of a driver that gives way to another go with it."""
+    """Return the base with the changes of ``table``; the base's driver options are dropped if the driver changes."""
     driver, other = base.get("driver"), table.get("driver")
     if (
         isinstance(driver, dict)

@@ -21,7 +21,7 @@ def _check_day(name: str, text: str) -> None:
 
 
 class Role(IntEnum):
-    """What a channel measures in the test."""
+    """Quantity that a channel measures in the test."""
 
     FORCE = 0
     """Force at the drive point, by the load cell."""
@@ -86,7 +86,7 @@ class Channel(Configured):
 
     @property
     def role_code(self) -> Role:
-        """The role as the kernels know it."""
+        """The role as an integer code for the kernels."""
         return Role[self.role.upper()]
 
     @property

@@ -1,4 +1,4 @@
-"""Benches and plans from TOML files: read, validated, and refused in one clear line."""
+"""Reading and validation of benches and plans from TOML files; faults are reported in one line."""
 
 import json
 import tomllib
@@ -16,9 +16,9 @@ from rig.text.printable import shown
 __all__ = ["Configured", "explain", "find_toml", "merged", "read_toml", "shipped_names", "validated"]
 
 LARGEST_TOML_BYTES = 1_000_000
-MOST_DOTS = 100  # between two commas of a line: keys with many parts take the parser a time that goes with their square
-MOST_FAULTS = 5  # that one line names
-FEW_NAMES = 10  # that one line lists
+MOST_DOTS = 100  # between two commas of a line: the parser's time grows with the square of the number of a key's parts
+MOST_FAULTS = 5  # in one message
+FEW_NAMES = 10  # listed in one message
 
 
 class Configured(BaseModel):
@@ -28,7 +28,7 @@ class Configured(BaseModel):
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """``base`` with ``changes``: tables key by key, anything else replaced whole."""
+    """Return ``base`` with ``changes``: tables are merged key by key, any other value is replaced."""
     out = dict(base)
     for key, value in changes.items():
         old = base.get(key)
@@ -37,12 +37,12 @@ def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
 
 
 def shipped_names(folder: Path) -> list[str]:
-    """Names of the TOML files below a folder, without their ending."""
+    """Return the names of the TOML files below a folder, without the suffix."""
     return sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.toml"))
 
 
 def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:
-    """The path of a shipped file of ``folder`` by its name, or the path itself where it ends on .toml."""
+    """Return the path of a shipped file in ``folder`` by its name, or the given path if it ends in .toml."""
     path = Path(name_or_path)
     if path.suffix == ".toml":
         return path
@@ -62,10 +62,10 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The table in a TOML file of up to 1 MB.
+    """Return the table in a TOML file of up to 1 MB.
 
-    Raises `ConfigurationError`, which names the file and the line or key, where it cannot be read or holds what no table may
-    hold (`rig.bench.vetting`).
+    Raises `ConfigurationError`, naming the file and the line or key, if the file cannot be read or holds a value that is never
+    allowed (`rig.bench.vetting`).
     """
     text = read_text(path, LARGEST_TOML_BYTES)
     for number, line in enumerate(text.split("\n"), 1):
@@ -87,12 +87,12 @@ def _refuse_absurd(table: Any, source: str) -> None:
 
 
 def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
-    """A model from a table; every bad value is named with its path, itself and what is allowed."""
+    """Build a model from a table; raise `ConfigurationError` naming path, value and allowed values of each fault."""
     _refuse_absurd(table, source)
     try:
         if model.model_config.get("strict"):
             return model.model_validate(table)
-        # By way of JSON, whose strict mode takes a list for a tuple and 1 for 1.0, but no text or truth for a number.
+        # Via JSON, whose strict mode accepts a list as a tuple and 1 as 1.0, but no text or boolean as a number.
         return model.model_validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
         raise ConfigurationError(f"{source}: {explain(error, model)}") from None
@@ -104,7 +104,7 @@ def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """The faults of a validation error in one line, a few of them where there are many."""
+    """Return the faults of a validation error in one line; if there are many, only the first few."""
     count = error.error_count()
     details = [dict(detail) for detail in error.errors(include_url=False)[: 4 * MOST_FAULTS]]
     keys = _keys(model)
@@ -114,7 +114,7 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _follows(detail: dict[str, Any], details: list[dict[str, Any]]) -> bool:
-    """Whether a list is too short only because its items are at fault."""
+    """Return whether the fault only says that a list is too short because its items are faulty."""
     inside = (other for other in details if other["loc"][: len(detail["loc"])] == detail["loc"] and other is not detail)
     return detail["type"] == "too_short" and any(inside)
 
@@ -125,7 +125,7 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
         if isinstance(part, int):
             path += f"[{part}]"
         elif part in keys or (part == detail["loc"][-1] and detail["type"] != "value_error"):
-            # Else it is the kind of a part, which stands in no path.
+            # Otherwise it is the discriminator of a union, which is not part of the path.
             path += f".{part}" if path else str(part)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if detail["type"] == "extra_forbidden":
@@ -149,7 +149,7 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
 
 
 def _keys(model: Any) -> set[str]:
-    """All keys that a model and the models inside it know."""
+    """Return all keys of a model and of the models inside it."""
     if isinstance(model, type) and issubclass(model, BaseModel):
         fields = model.model_fields
         return set(fields).union(*(_keys(field.annotation) for field in fields.values()))

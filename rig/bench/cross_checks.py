@@ -1,8 +1,9 @@
-"""Whether the numbers of a bench fit each other: limits and sensors, block and reaction, ramp and vibration.
+"""Cross-checks between the numbers of a bench: limits and sensors, block and reaction time, ramp and vibration.
 
-The one place for such cross-checks. What no rig can have, or what would leave it unwatched, is refused: when a bench is
-loaded, and again when it is to run, for a bench may also be made in Python. The rest is a caution: a finding of
-``rig check``, and a line before a person arms. A recording's bench is read without either, so that old files stay readable.
+All such cross-checks are in this module. Numbers that no rig can have, or that would leave the rig unsupervised, are refused
+when a bench is loaded, and again before a run, because a bench may also be made in Python. Other inconsistencies give a
+caution: a finding of ``rig check``, and a line before a person arms. The bench of a recording is read without these checks, so
+that old files stay readable.
 """
 
 from dataclasses import dataclass
@@ -17,58 +18,58 @@ if TYPE_CHECKING:
 __all__ = ["Objection", "cautions", "objections", "refuse"]
 
 LONGEST_BLOCK_S = (
-    0.2  # a person's reaction at the stop button: a loop that looks less often protects less than a person
+    0.2  # a person's reaction time at the stop button: a loop that checks less often protects less than a person
 )
 OVERTRAVEL_FACTOR = 1.25
-"""Beyond this multiple of a limit a ramp would take too long: the output drops to 0 V."""
+"""Multiple of a limit beyond which a ramp would take too long and the output drops to 0 V."""
 RANGES = {
     "force": (1e-3, 1e8),  # N: from micro force sensors to the load cells of building test floors
     "drive": (1e-2, 1e7),  # m/s^2: from seismic accelerometers to shock ones, with a decade to spare at either end
     "response": (1e-2, 1e7),
     "monitor": (1e-12, 1e12),  # any unit
 }
-"""Plausible ranges of a channel in its unit: a slip of an exponent lies outside, no sensor does."""
+"""Plausible ranges of a channel in its unit: every sensor lies inside, a wrong exponent usually outside."""
 
 
 @dataclass(frozen=True)
 class Objection:
-    """Numbers of a bench that do not fit each other."""
+    """An inconsistency between numbers of a bench."""
 
     field: str
     """Key of the bench that is at fault."""
     value: float
-    """Its value, in ``unit``."""
+    """Value of the key, in ``unit``."""
     unit: str
     """Unit of the value."""
     allowed: str
-    """What it may be."""
+    """Allowed values."""
     why: str
-    """What would go wrong."""
+    """Consequence of the present value."""
     refused: bool
-    """Whether nothing may run with it; else it is a caution."""
+    """Whether the bench must not run; otherwise the objection is a caution."""
 
     @property
     def line(self) -> str:
-        """One line for people."""
+        """The objection as one line of text."""
         number = f"{self.value:g} {self.unit}".strip()
         return f"{self.field} = {number}: {self.why}; allowed is {self.allowed}"
 
 
 def objections(bench: "Bench") -> tuple[Objection, ...]:
-    """All that does not fit, what is refused first."""
+    """Return all objections to a bench, refusals first."""
     found = [*_ranges(bench), *_block(bench), *_ramp(bench), *_drops(bench)]
     return tuple(sorted(found, key=lambda one: not one.refused))
 
 
 def refuse(bench: "Bench") -> None:
-    """Raise `ConfigurationError` where the bench must not run as it is; it names field, value and what is allowed."""
+    """Raise `ConfigurationError`, naming field, value and allowed values, if the bench must not run."""
     lines = [one.line for part in (_ranges, _block, _ramp) for one in part(bench) if one.refused]
     if lines:
         raise ConfigurationError("; ".join(lines))
 
 
 def cautions(bench: "Bench") -> tuple[str, ...]:
-    """What a person should know before arming, one line each."""
+    """Return the cautions that a person should read before arming, one line each."""
     return tuple(one.line for one in objections(bench) if not one.refused)
 
 
@@ -93,7 +94,7 @@ def _ranges(bench: "Bench") -> list[Objection]:
 
 
 def _block(bench: "Bench") -> list[Objection]:
-    """Nothing is looked at between two blocks; a single sample is as short as a block can be."""
+    """Check the block length: limits are not checked within a block. A block of one sample is always accepted."""
     block_s = bench.block / bench.sample_rate_hz
     if bench.block == 1:
         return []
@@ -111,7 +112,7 @@ def _block(bench: "Bench") -> list[Objection]:
 
 
 def _ramp(bench: "Bench") -> list[Objection]:
-    """A ramp within a period of the vibration is a step: it kicks the specimen instead of bringing it down."""
+    """Check the ramp-down time: a ramp shorter than a period of the vibration excites the specimen like a step."""
     least_s = 1.0 / bench.specimen.linear_frequency_hz
     ramp_s = bench.limits.ramp_down_s
     if ramp_s >= least_s:
@@ -122,7 +123,7 @@ def _ramp(bench: "Bench") -> list[Objection]:
 
 
 def _drops(bench: "Bench") -> list[Objection]:
-    """Limits whose multiple at which the output drops to 0 V is more than a channel can show."""
+    """Check the limits: the multiple at which the output drops to 0 V should be within the range of the channels."""
     out = []
     for field, roles in (("force_n", ("force",)), ("acceleration_m_s2", ("drive", "response"))):
         narrowest: Channel = min((c for c in bench.channels if c.role in roles), key=lambda c: c.range_in_unit)

@@ -1,4 +1,4 @@
-"""Code that a bench names by ``function = "module:name"``: imported for a bench of the user, not for one in a recording."""
+"""Code named by a bench as ``function = "module:name"``: imported for the user's own bench, not for one in a recording."""
 
 import sys
 
@@ -9,7 +9,7 @@ __all__ = ["imported_code", "named_code", "refuse_code"]
 
 
 def named_code(bench: Bench) -> list[str]:
-    """Every ``function`` in the options of the driver, at any depth."""
+    """Return every ``function`` in the options of the driver, at any depth, sorted."""
     found, waiting = [], list(bench.driver.options.items())
     while waiting:
         key, value = waiting.pop()
@@ -23,7 +23,7 @@ def named_code(bench: Bench) -> list[str]:
 
 
 def refuse_code(bench: Bench, source: str) -> None:
-    """Refuse a bench that names code by `ConfigurationError`; ``source`` is the recording that holds it."""
+    """Raise `ConfigurationError` if a bench names code; ``source`` is the recording that holds the bench."""
     if code := named_code(bench):
         raise ConfigurationError(
             f"{source}: bench: function = {code[0]!r}: is code that the recording names, and is not imported unless you "
@@ -32,7 +32,7 @@ def refuse_code(bench: Bench, source: str) -> None:
 
 
 def imported_code(bench: Bench) -> list[dict[str, str]]:
-    """For the record: each function that a bench names, and the file that its module was imported from."""
+    """Return, for the recording, each function that a bench names and the file its module was imported from."""
     return [
         {"function": name, "file": str(getattr(sys.modules.get(name.partition(":")[0]), "__file__", None) or "")}
         for name in named_code(bench)

@@ -1,6 +1,6 @@
-"""What no table of a user's may hold, whatever it describes: refused before a model reads it.
+"""Checks of a user's table, independent of its meaning, before a model reads it.
 
-So no model has to fear a number whose square overflows, a text that moves the cursor, or a table without a bottom.
+Models can then rely on numbers whose squares do not overflow, on texts without control characters and on limited nesting.
 """
 
 from collections.abc import Iterator
@@ -12,16 +12,16 @@ from rig.text.printable import shown
 __all__ = ["DEEPEST", "LARGEST", "SMALLEST", "objection_to"]
 
 DEEPEST = 16
-"""Tables and lists within each other."""
+"""Largest number of nested tables and lists."""
 SMALLEST, LARGEST = 1e-30, 1e30
-"""Sizes of a number other than 0, in any SI unit: no quantity of a vibration test lies outside, a slip of the keyboard does."""
+"""Allowed magnitudes of a number other than 0, in any SI unit: every quantity of a vibration test lies inside."""
 LARGEST_INTEGER = 2**63 - 1
 LONGEST_KEY = 200
 LONGEST_TEXT = 10_000
 
 
 def objection_to(table: Any) -> str | None:
-    """What is wrong with the first value that is not allowed, with its path; None for a table as it should be."""
+    """Return path and fault of the first value that is not allowed; None if all values are allowed."""
     for path, depth, value in _values(table):
         fault = _fault(value) if depth <= DEEPEST else f"is nested too deeply: allowed are up to {DEEPEST} levels"
         if fault is not None:
@@ -30,7 +30,7 @@ def objection_to(table: Any) -> str | None:
 
 
 def _values(table: Any) -> Iterator[tuple[str, int, Any]]:
-    """Path, depth and value of everything in a table, without recursion; nothing below what is too deep."""
+    """Yield path, depth and value of all entries of a table, without recursion; do not descend below `DEEPEST` levels."""
     left: list[tuple[str, int, Any]] = [("", 0, table)]
     while left:
         path, depth, value = left.pop()
@@ -47,7 +47,7 @@ def _values(table: Any) -> Iterator[tuple[str, int, Any]]:
 
 
 def _fault(value: Any) -> str | None:
-    """What is wrong with one value."""
+    """Return the fault of one value, or None."""
     if isinstance(value, dict):
         wrong = next((key for key in value if not isinstance(key, str) or not _is_a_key(key)), None)
         what = f"a printable name of up to {LONGEST_KEY} characters"
@@ -78,5 +78,5 @@ def _fault_of_text(text: str) -> str | None:
 
 
 def _moves_the_cursor(text: str) -> bool:
-    """Whether a text holds control characters, or half of a character."""
+    """Return whether a text holds control characters or unpaired surrogates."""
     return any(category(one) in ("Cc", "Cs") for one in text)

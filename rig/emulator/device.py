@@ -162,7 +162,7 @@ class Device:
         self._life.stop(now_s)
 
     def _reset(self, now_s: float) -> None:
-        """Start anew, as after a loss of supply."""
+        """Restart the device, as after a loss of supply."""
         self._life.begin_anew(now_s)
         self.words[Parameter.BOOT, 0] = (self.words[Parameter.BOOT, 0] + 1) & 0xFFFFFFFF
         self._last = None

@@ -57,7 +57,7 @@ class FaultySender:
         return self._late[0][0] if self._late else math.inf
 
     def start(self, now_s: float) -> None:
-        """A new stream begins."""
+        """Begin a new stream."""
         self.dropped_samples = 0
         self._kept = None
         self._late.clear()

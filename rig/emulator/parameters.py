@@ -1,4 +1,4 @@
-"""A device's parameters: what it says of itself, and what may be set to what."""
+"""A device's parameters: the values that it reports, and the settings that are allowed."""
 
 from rig.emulator.faults import Faults
 from rig.emulator.plant import Plant
@@ -36,7 +36,7 @@ def described(
     layout_crc: int = 0,
     boot: int = 1,
 ) -> Words:
-    """The words of a device in front of a plant."""
+    """Return the words of a device in front of a plant."""
     words: Words = {}
 
     def put(parameter: Parameter, word: int, item: int = 0) -> None:

@@ -1,4 +1,4 @@
-"""What stands behind a device's converters: a virtual rig, its wiring, and a log of the output."""
+"""The plant behind a device's converters: a virtual rig, its wiring, and a log of the output."""
 
 import os
 import time
@@ -216,7 +216,7 @@ class LoggedPlant:
         self._write(0.0)
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
-        """Write down, then measure."""
+        """Log the output, then measure."""
         self._write(float(np.abs(voltages).max()))
         self._first += voltages.size
         return self._plant.step(voltages)

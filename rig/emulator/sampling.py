@@ -24,7 +24,7 @@ class Gate:
         self._opens, self._closes = first, math.inf
 
     def close(self, instant: float, ramp_samples: float = 0.0) -> None:
-        """0 V from an instant on, after a ramp of ``ramp_samples`` that begins there."""
+        """Bring the output to 0 V by a ramp of ``ramp_samples`` that begins at an instant."""
         self._closes, self._ramp_samples = instant, ramp_samples
 
     def is_closing(self, first: int) -> bool:
@@ -32,7 +32,7 @@ class Gate:
         return first < self._closes + self._ramp_samples and self._closes < math.inf
 
     def let_through(self, first: int, volts: np.ndarray) -> np.ndarray:
-        """The outputs [n] of a block as they reach the converter."""
+        """Return the outputs [n] of a block as they reach the converter."""
         if first < self._opens:
             volts[: int(min(volts.size, self._opens - first))] = 0.0
         if first + volts.size > self._closes:

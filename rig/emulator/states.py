@@ -77,13 +77,13 @@ class Life:
         return Status.DONE, 0
 
     def disarm(self, now_s: float) -> tuple[Status, int]:
-        """0 V at once; sampling goes on."""
+        """Set the output to 0 V at once; sampling continues."""
         if self.state is DeviceState.ARMED:
             self._bring_down(now_s, DeviceState.RUNNING)
         return Status.DONE, int(self.state)
 
     def stop(self, now_s: float) -> tuple[Status, int]:
-        """0 V at once, end sampling; latched flags stay."""
+        """Set the output to 0 V at once and end sampling; latched flags stay."""
         self._sampling.stop()
         self._fed_s = math.inf
         if self.state is not DeviceState.LATCHED:
@@ -99,7 +99,7 @@ class Life:
         return Status.DONE, 0
 
     def emergency_stop(self, now_s: float) -> None:
-        """0 V at once, and latch."""
+        """Set the output to 0 V at once, and latch."""
         self._counts["emergency_stops"] += 1
         self.latch |= DeviceFlag.EMERGENCY_STOP
         self._bring_down(now_s, DeviceState.LATCHED)

@@ -1,1 +1,1 @@
-"""The loop: a session with a bench, the loop in this process or in one of its own, and what this machine can promise."""
+"""The loop: a session with a bench, the loop in this or in a separate process, and the timing of this machine."""

@@ -1,4 +1,4 @@
-"""What this machine and a bench can promise: the answers of ``rig doctor``."""
+"""Examination of this machine and of a bench, for ``rig doctor``."""
 
 import os
 import platform
@@ -17,10 +17,10 @@ SECONDS = 1.0
 
 
 def examine(folder: Path) -> dict[str, Any]:
-    """Facts on processor, clock, privileges, kernels, disk, drivers and serial ports; ``folder`` is that of recordings.
+    """Return facts on processor, clock, privileges, kernels, disk, drivers and serial ports; ``folder`` holds recordings.
 
-    The lateness is that of a process like the one a wall-clock loop gets, woken a thousand times in a second, with and
-    without its privileges.
+    The wake-up lateness is measured in a process like that of a wall-clock loop, woken a thousand times in a second, with and
+    without the loop's privileges.
     """
     import vibrolock
     from rig.bench import shipped_benches
@@ -49,9 +49,9 @@ def examine(folder: Path) -> dict[str, Any]:
 
 
 def examine_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str, Any]:
-    """Open a bench's device, swap blocks of 0 V with it for some seconds, and say how that went; nothing is driven.
+    """Open a bench's device, exchange blocks of 0 V with it for some seconds, and return the statistics; nothing is driven.
 
-    Raises `rig.errors.DaqError`, `rig.errors.ConfigurationError` where the device cannot be opened.
+    Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError` if the device cannot be opened.
     """
     from rig.loop.worker.probe import round_trips
     from rig.loop.worker.spawn import ask, supported
@@ -73,7 +73,7 @@ def _probed(*, privileged: bool) -> dict[str, Any]:
 
 
 def _promise(probed: dict[str, Any]) -> str:
-    """One sentence on what a wall-clock loop can rely on here."""
+    """Return one sentence on the timing that a wall-clock loop can rely on here."""
     if "wake_up_us" not in probed:
         return "in the campaign's own process, and nothing is promised on this system"
     rate_hz = 0.5e6 / max(1.0, probed["wake_up_us"]["p99_9"])

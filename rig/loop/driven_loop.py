@@ -1,4 +1,4 @@
-"""The part of the loop that is the same in any process: exchange blocks, and come to 0 V whatever the driver raises."""
+"""The part of the loop common to all processes: exchange blocks, and bring the output to 0 V whatever the driver raises."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class Block(NamedTuple):
 
 
 def end_by_driver(tick: Tick, error: DaqError) -> None:
-    """Note in the guard that the driver has failed, so that the output counts as off."""
+    """Record in the guard that the driver has failed, so that the output counts as off."""
     guard = tick.guard
     if guard["mode"][0] in (GuardMode.ARMED, GuardMode.DISARMED):
         guard["reason"] = end_reason_of(error)
@@ -31,11 +31,11 @@ def end_by_driver(tick: Tick, error: DaqError) -> None:
 
 
 class DrivenLoop:
-    """A tick over a started driver, as far as both loops are alike.
+    """Base class of both loops: a tick over a started driver.
 
-    An exception of the driver ends the loop and is its ``failure``. What is no error, such as `KeyboardInterrupt` or
-    `SystemExit` raised inside the driver, is its ``interruption``: it asks for the ramp, and the block that it cost counts as
-    lost. A second one is a failure.
+    An exception of the driver ends the loop and is stored as ``failure``. An exception that is no error, such as
+    `KeyboardInterrupt` or `SystemExit` raised inside the driver, is stored as ``interruption``. It requests the ramp, and the
+    interrupted block counts as lost. A second interruption is a failure.
     """
 
     failure: DaqError | None
@@ -55,9 +55,9 @@ class DrivenLoop:
         return dict(self.daq.counters) if self._counted is None else self._counted
 
     def stop(self) -> None:
-        """Exchange 0 V for what is under way in the device, then stop it; any number of times.
+        """Exchange 0 V until the device's queue is flushed, then stop the device; may be called any number of times.
 
-        An error is the loop's failure unless there is one; whatever happens, the device is told to stop.
+        An error becomes the loop's failure unless there is one already. The device is told to stop in any case.
         """
         for step in (self._keep_counters, self.daq.exchange_zeros, self.daq.stop):
             try:

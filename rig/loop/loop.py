@@ -25,12 +25,12 @@ class FusedDAQ(Protocol):
     """A driver that can run the tick together with its rig in one compiled loop."""
 
     def run_fused(self, t: TickArrays, readings: np.ndarray, rows: np.ndarray) -> int:
-        """Fill ``readings`` and ``rows``; return the number of samples done, fewer than asked for if the output went off."""
+        """Fill ``readings`` and ``rows``; return the number of samples done, fewer than requested if the output went off."""
 
 
 @dataclass
 class LoopStatistics:
-    """Statistics of a loop. ``busy_s`` is the time in tick and driver alone."""
+    """Statistics of a loop. ``busy_s`` is the time spent in tick and driver."""
 
     sample_rate_hz: float
     samples: int = 0
@@ -40,29 +40,29 @@ class LoopStatistics:
 
     @property
     def realtime_factor(self) -> float:
-        """Seconds of rig time per second in tick and driver."""
+        """Seconds of rig time per second spent in tick and driver."""
         return self.samples / self.sample_rate_hz / self.busy_s if self.busy_s > 0 else 0.0
 
     @property
     def end_to_end_factor(self) -> float:
-        """Seconds of rig time per second of everything, recording included."""
+        """Seconds of rig time per second in total, including recording."""
         return self.samples / self.sample_rate_hz / self.wall_s if self.wall_s > 0 else 0.0
 
     def report(self, periods: int) -> dict[str, Any]:
-        """All of it as plain data; ``periods`` of the oscillator, in all."""
+        """Return the loop's statistics as plain data. ``periods``: number of oscillator periods in all."""
         factors = {name: getattr(self, name) for name in ("realtime_factor", "end_to_end_factor")}
         return {**asdict(self), "periods": periods, **factors}
 
 
 class RunningLoop(Protocol):
-    """A loop as a campaign sees it, in this process or in another."""
+    """Interface of a loop to a campaign; the loop runs in this process or in another."""
 
     tick: Tick
     """The tick, with its state at the last row that `run` has yielded."""
     failure: DaqError | None
     """Error of the driver that ended the loop, if one did."""
     cause: str
-    """Why the ramp was asked for, or by whom, in one sentence; else empty."""
+    """Why the ramp was requested, or by whom, in one sentence; else empty."""
     statistics: LoopStatistics
     """Statistics so far."""
 
@@ -74,13 +74,13 @@ class RunningLoop(Protocol):
         """Telemetry in chunks, until the output is off."""
 
     def request_stop(self, cause: str = "") -> None:
-        """Ask for the ramp to 0 V, for a ``cause`` if there is one to be recorded.
+        """Request the ramp to 0 V, with an optional ``cause`` that is recorded.
 
-        Returns at once, may be called any time and from a signal handler.
+        Returns at once; may be called at any time and from a signal handler.
         """
 
     def bring_down(self) -> None:
-        """Ramp to 0 V if it still runs, and wait for the end; for a caller that takes no more rows."""
+        """Ramp to 0 V if the loop still runs, and wait for its end; for a caller that takes no more rows."""
 
     @property
     def counters(self) -> dict[str, int]:
@@ -102,8 +102,8 @@ class Loop(DrivenLoop):
     ends the loop: the rows so far are yielded, ``failure`` holds the error. An interruption inside the driver
     (`KeyboardInterrupt`, `SystemExit`) is raised by `run` once the output is off and all rows are yielded.
 
-    ``paced`` holds a virtual rig back to the wall clock; a chunk that is done too late counts as an overrun. ``fused`` false
-    makes a virtual rig go through `DAQ.exchange` as a real one does.
+    ``paced`` slows a virtual rig to the wall clock; a chunk that is completed too late counts as an overrun. With
+    ``fused = False`` a virtual rig uses `DAQ.exchange` like a real device.
     """
 
     def __init__(self, daq: DAQ, tick: Tick, *, paced: bool = False, fused: bool = True) -> None:
@@ -125,7 +125,7 @@ class Loop(DrivenLoop):
             raise self.interruption
 
     def bring_down(self) -> None:
-        """Ramp to 0 V if it still runs; the rows are dropped."""
+        """Ramp to 0 V if the loop still runs; the rows are dropped."""
         self.request_stop()
         for _ in self._chunks():
             pass
@@ -150,7 +150,7 @@ class Loop(DrivenLoop):
         self.statistics.wall_s = time.perf_counter() - began
 
     def request_stop(self, cause: str = "") -> None:
-        """Ask for the ramp to 0 V; it begins with the next chunk."""
+        """Request the ramp to 0 V; it begins with the next chunk."""
         self.cause = self.cause or cause
         self.tick.request_stop()
 
@@ -165,7 +165,7 @@ class Loop(DrivenLoop):
         return {**self.statistics.report(int(self.tick.arrays.loop["cycles"][0])), **self.daq.statistics}
 
     def _load_kernels(self) -> None:
-        """Compile, or load from the cache, what the loop calls, before the clock runs."""
+        """Compile the loop's kernels, or load them from the cache, before the clock runs."""
         readings, rows = self.tick.buffers(0)
         if self._fused is not None:
             self._fused.run_fused(self.tick.arrays, readings, rows)

@@ -32,9 +32,9 @@ class Session(Protocol):
     """What the device had latched when it was opened, in words; empty if nothing."""
 
     def start(self, settings: TickSettings) -> RunningLoop:
-        """Start the device and a loop over it; the loop runs when its rows are asked for. Once in a session.
+        """Start the device and a loop over it, once in a session; the loop runs when its rows are requested.
 
-        The device forgets what it had latched when it was opened: whoever calls this has been armed.
+        Conditions that the device had latched when it was opened are reset, so the caller must be armed.
         """
 
 
@@ -59,17 +59,17 @@ class LocalSession:
         return loop
 
     def finish(self) -> None:
-        """Ramp down a loop that still runs, when the session is left early."""
+        """Ramp down a loop that still runs when the session is left early."""
         if self._loop is not None and not self._loop.over:
             self._loop.bring_down()
 
 
 @contextmanager
 def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iterator[Session]:
-    """Open the bench's driver; on the way out its output is at 0 V and it is closed, whatever happened.
+    """Open the bench's driver; when the context ends, whatever happened, set the output to 0 V and close the driver.
 
-    A driver with a clock behind it is opened in a process of its own, and so is a virtual rig that ``realtime`` holds back to
-    the wall clock. Raises `ConfigurationError`, `rig.errors.DaqError`.
+    A driver whose device has a clock is opened in a separate process, and so is a virtual rig that ``realtime`` slows to the
+    wall clock. Raises `ConfigurationError` or `rig.errors.DaqError`.
     """
     from rig.loop.worker.session import WorkerSession
     from rig.loop.worker.spawn import supported

@@ -28,8 +28,8 @@ class NameLost(OSError):  # noqa: N818 (says what happened)
 class BlockFile:
     """The file of a journal, open for appending and locked against other writers.
 
-    Every method raises ``OSError``; after a failed or interrupted write the file ends where the block began. Where even
-    that fails, nothing more is written: a block behind half a block could not be read.
+    Every method may raise ``OSError``. After a failed or interrupted write the file is cut to where the block began. If that
+    fails too, nothing more is written, because a block after half a block could not be read.
     """
 
     def __init__(self, descriptor: int, path: Path) -> None:

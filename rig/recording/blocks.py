@@ -2,10 +2,10 @@
 
 Head, little-endian: magic ``VLJB``, version (uint16), kind (uint16), payload length (uint32), sequence number from 0
 (uint64), number of the part from 1 (uint32, 0 in the header), rows of the part before the block (uint64), CRC-32 (uint32) of
-the 32 bytes before it followed by the payload. Every block so says where it belongs, and is of use behind a damaged one.
-Blocks of version 1 had neither part nor rows in their heads of 24 bytes: nothing is read behind a damaged one.
+the 32 bytes before it followed by the payload. Every block thus states its position and can be used even after a damaged block.
+Blocks of version 1 had neither part nor rows in their heads of 24 bytes; nothing after a damaged block is read there.
 
-The header and the beginning of each part are written twice, for nothing could be read without them.
+The header and the beginning of each part are written twice, because nothing could be read without them.
 """
 
 import struct

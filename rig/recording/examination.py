@@ -44,7 +44,7 @@ def examine(file: Any, size: int) -> None:
 
 
 def objects_in(file: Any) -> Iterator[Any]:
-    """Every group and dataset, the root first.
+    """Yield every group and dataset, the root first.
 
     Raises:
         RecordingError: a link that is not a plain one, an object with two names, or too many of them.

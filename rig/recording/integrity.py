@@ -1,4 +1,4 @@
-"""Whether a file is as it was written: by the digest at its end, or by reading all of it in a child process first."""
+"""Check whether a file is as it was written, by the digest at its end; files without one are first read in a child process."""
 
 import hashlib
 import io
@@ -28,7 +28,7 @@ def append_trailer(stream: "BinaryIO | io.RawIOBase") -> None:
 
 
 def digest_matches(path: Path) -> bool:
-    """Read ``path`` once, 1 MiB at a time: True where it is as it was written, False where it has no digest.
+    """Read ``path`` once, 1 MiB at a time; return True if it is as it was written, False if it has no digest.
 
     Raises:
         RecordingError: the digest does not match what is before it.
@@ -71,10 +71,10 @@ _known: dict[tuple[Path, int, int, int, int, int], str] = {}
 
 
 def integrity_of(path: Path) -> str:
-    """``"verified"`` where the digest matches, else ``"unverified: WHY"``: the file is whole, but anyone may have changed it.
+    """Return ``"verified"`` if the digest matches, else ``"unverified: WHY"``: the file is readable, but may have been changed.
 
-    What has no digest is first read by a child process, all of it, for at most 60 s and 1 s per 5 MB, in 4 GiB: bytes that
-    crash the HDF5 library crash that.
+    A file without a digest is first read completely by a child process, within 60 s plus 1 s per 5 MB and 4 GiB. A file that
+    crashes the HDF5 library then only crashes the child.
 
     Raises:
         RecordingError: the digest does not match, or the file cannot be read from beginning to end.

@@ -1,7 +1,7 @@
 """The writer of the journal: append-only, one write per block, readable up to its last whole block at any moment.
 
-When a method returns, what it was given is in the hands of the operating system: killing the process loses nothing of
-it. It is forced to the disk at most every half second and at every end, so a power cut costs at most that much.
+When a method returns, the operating system has the data, so that killing the process loses nothing. The data are forced to the
+disk at most every half second and at every end, so that a power cut loses at most half a second.
 """
 
 import shutil
@@ -34,7 +34,7 @@ def journal_path(output: str | Path) -> Path:
 
 
 def set_aside(path: Path) -> Path:
-    """A free path beside the damaged journal ``path`` to keep it under."""
+    """Return a free path beside ``path`` under which the damaged journal can be kept."""
     candidates = (path.with_name(f"{path.name}.damaged{n}") for n in ("", *(f"-{k}" for k in range(2, 1000))))
     return next(candidate for candidate in candidates if not candidate.exists())
 

@@ -1,1 +1,1 @@
-"""What the operating system gives: files written whole, locks, child processes, signals, privileges."""
+"""Services of the operating system: files written whole, locks, child processes, signals, privileges."""

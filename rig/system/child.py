@@ -1,7 +1,7 @@
-"""Reading in a child process: what crashes, hangs or asks for all memory there ends there.
+"""Reading in a child process, so that a crash, a hang or excessive memory does not affect this process.
 
-The child is a program of its own, so that a user's script needs no guard around its main part. Its memory and time are
-limited where the system can do that (Linux, macOS), and it ends with its parent.
+The child is a separate program, so that a user's script needs no ``__main__`` guard. Its memory and time are limited where the
+system supports it (Linux, macOS), and it ends with its parent.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ class ChildFailed(Exception):  # noqa: N818 (says what happened)
 
 
 def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
-    """What ``python -m MODULE ARGUMENTS TIMEOUT_S`` prints; raises `ChildFailed` where it crashes or takes too long."""
+    """Return the output of ``python -m MODULE ARGUMENTS TIMEOUT_S``; raise `ChildFailed` if it crashes or takes too long."""
     theirs, ours = os.pipe()
     try:
         child = subprocess.Popen(
@@ -56,7 +56,7 @@ def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
 
 
 def _import_path() -> list[str]:
-    """Where this process finds its modules; the working folder in full, unless it was removed."""
+    """Return the module search path of this process, with the working folder as a full path unless it was removed."""
     with contextlib.suppress(FileNotFoundError):
         return [path or str(Path.cwd()) for path in sys.path]
     return [path for path in sys.path if path]
@@ -69,7 +69,7 @@ def _how(status: int) -> str:
 
 
 def confine(cpu_s: float) -> None:
-    """Called by the child: limit its memory and time, leave Ctrl-C to the parent, and end when the parent has ended."""
+    """Limit memory and time of the child, leave Ctrl-C to the parent, and end with the parent; called by the child."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(ImportError, ValueError, OSError):  # not on Windows; a lower limit may be in force
@@ -80,6 +80,6 @@ def confine(cpu_s: float) -> None:
 
 
 def _end_with_parent() -> None:
-    """Nobody writes to the child's input: it ends when the parent closes it or has ended."""
+    """End the child when its input ends, because the parent closes the input or has ended; nothing is ever written to it."""
     os.read(0, 1)
     os._exit(1)

@@ -1,4 +1,4 @@
-"""What files need from the operating system beyond reading and writing: one writer at a time, and names that last."""
+"""File locks for one writer at a time, and names that survive a power cut."""
 
 import os
 import sys
@@ -17,8 +17,7 @@ __all__ = ["exclusive", "lock", "synchronise_folder"]
 def lock(descriptor: int, path: Path) -> None:
     """Make this process the only writer of an open file until it is closed, or refuse.
 
-    An advisory lock, which ends with the process. Windows has none of the kind and does without, as do network file
-    systems that know no locks.
+    The lock is advisory and ends with the process. No lock is taken on Windows, or on network file systems without locks.
 
     Raises:
         RecordingError: another process writes the file, or has just removed it.
@@ -56,7 +55,7 @@ def exclusive(path: Path) -> Iterator[None]:
 
 
 def synchronise_folder(path: Path) -> None:
-    """Let a name just made or changed survive a power cut, where the system can promise that."""
+    """Make a name just created or changed survive a power cut, where the system supports it."""
     if sys.platform != "win32":
         with suppress(OSError):
             descriptor = os.open(path.parent, os.O_RDONLY)

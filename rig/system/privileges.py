@@ -9,10 +9,10 @@ from pathlib import Path
 __all__ = ["CPU_VARIABLE", "PRIORITY", "prepare"]
 
 PRIORITY = 80
-"""Of SCHED_FIFO: above the interrupt threads of the kernel (50)."""
+"""Priority of SCHED_FIFO: above the interrupt threads of the kernel (50)."""
 
 CPU_VARIABLE = "VIBROLOCK_LOOP_CPU"
-"""Environment variable with the number of the processor that the loop is to keep to."""
+"""Environment variable with the number of the processor to which the loop is bound."""
 
 LOCK_CURRENT, LOCK_FUTURE = 1, 2
 SET_TIMER_SLACK = 29  # <sys/prctl.h>
@@ -22,8 +22,8 @@ NO_SUCH = "not on this system"
 def prepare(*, privileged: bool = True, priority: int = PRIORITY) -> dict[str, str]:
     """Request real-time scheduling, locked memory and CPU affinity for this process; return which were granted.
 
-    ``privileged`` false leaves out what needs a permission. The garbage collector is off from here on: what is there is kept
-    for good, and a loop without cyclic garbage needs none.
+    With ``privileged = False`` steps that need a permission are left out. The garbage collector is switched off: existing
+    objects are kept for good, and a loop without cyclic garbage needs no collector.
     """
     gc.collect()
     gc.freeze()
@@ -43,7 +43,7 @@ def prepare(*, privileged: bool = True, priority: int = PRIORITY) -> dict[str, s
 
 
 def _schedule(priority: int) -> str:
-    """SCHED_FIFO for every thread that there is by now; new ones inherit it."""
+    """Set SCHED_FIFO for all existing threads; new threads inherit it."""
     if not hasattr(os, "sched_setscheduler"):
         return NO_SUCH
     folder = Path("/proc/self/task")
@@ -64,7 +64,7 @@ def _lock_memory() -> str:
 
 
 def _timer_slack() -> str:
-    """Without real-time scheduling the kernel rounds a wake-up by 50 us; 1 ns asks for none of it."""
+    """Set the timer slack to 1 ns; without real-time scheduling the kernel's default delays wake-ups by up to 50 us."""
     library = ctypes.CDLL(None, use_errno=True)
     if not hasattr(library, "prctl"):
         return NO_SUCH

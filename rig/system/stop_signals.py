@@ -1,11 +1,11 @@
 """Signals of the operating system while a run is under way: Ctrl-C, SIGTERM, a closed terminal (SIGHUP) and SIGQUIT.
 
-A rig that is driven ramps down (`asking`). While nothing is driven, and files are made or put in their places, a signal ends
-the program by an exception, so that what is half-made is taken away (`ended_in_order`); where an exception could do harm, or
-get lost in a library, it is raised afterwards (`held`).
+While the rig is driven, a signal makes it ramp down (`asking`). While nothing is driven and files are written, a signal ends
+the program by an exception, so that incomplete files are removed (`ended_in_order`). Where an exception could do harm, or get
+lost in a library, it is raised afterwards (`held`).
 
-Outside the main thread, where Python delivers no signals, nothing of this has an effect. A closed terminal that was to be
-ignored when the program was started (``nohup``) stays ignored.
+Outside the main thread, where Python delivers no signals, these functions have no effect. If the program was started to ignore
+a closed terminal (``nohup``), the signal stays ignored.
 """
 
 import signal
@@ -22,13 +22,13 @@ _Handler = Callable[[int, FrameType | None], None]
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C; ``recorded`` names the recording that was whole when it came."""
+    """Ctrl-C was pressed; ``recorded`` names the recording that was complete at that time."""
 
     recorded: Path | None = None
 
 
 class Terminated(SystemExit):
-    """Another signal than Ctrl-C; ends the program with the status that shells give it, 128 and its number."""
+    """Another signal than Ctrl-C arrived; the program ends with the usual shell status, 128 plus the signal's number."""
 
     recorded: Path | None = None
 
@@ -42,7 +42,10 @@ def _raised(number: int) -> Interrupted | Terminated:
 
 
 def _by_nohup(number: int) -> bool:
-    """Whether a closed terminal was to be ignored already. A shell's ``&`` ignores Ctrl-C, but ``kill -INT`` is meant."""
+    """Return whether the signal is SIGHUP and was ignored at the start.
+
+    SIGINT is not exempted: a shell's ``&`` ignores Ctrl-C, but ``kill -INT`` shall still have an effect.
+    """
     return signal.Signals(number).name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN
 
 
@@ -63,7 +66,7 @@ def _handling(handler: _Handler, names: tuple[str, ...]) -> Iterator[None]:
 
 @contextmanager
 def asking(request_stop: Callable[[str], None]) -> Iterator[None]:
-    """While the rig is driven, signals ask for a ramp-down and end nothing; ``request_stop`` is told which."""
+    """Let signals only request a ramp-down while the rig is driven; ``request_stop`` gets a text naming the signal."""
 
     def ask(number: int, frame: FrameType | None) -> None:
         request_stop(f"stopped by request ({signal.Signals(number).name})")
@@ -74,7 +77,7 @@ def asking(request_stop: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def ended_in_order() -> Iterator[None]:
-    """Let other signals than Ctrl-C, which does so already, end the program by an exception (`Terminated`)."""
+    """Let signals other than Ctrl-C end the program by an exception (`Terminated`), as Ctrl-C does already."""
 
     def end(number: int, frame: FrameType | None) -> None:
         raise _raised(number)
@@ -84,7 +87,7 @@ def ended_in_order() -> Iterator[None]:
 
 
 class Held:
-    """A signal that has come and perhaps was not acted on."""
+    """The last signal that arrived and may still have to be acted on."""
 
     def __init__(self) -> None:
         self.number: int | None = None
@@ -94,7 +97,7 @@ class Held:
         self.number = number
 
     def check(self, recorded: Path | None = None) -> None:
-        """Raise what the signal that has come means, if one has; `Interrupted` or `Terminated`."""
+        """Raise `Interrupted` or `Terminated` if a signal has arrived."""
         if self.number is not None:
             error = _raised(self.number)
             error.recorded = recorded
@@ -104,7 +107,7 @@ class Held:
 
 @contextmanager
 def held() -> Iterator[Held]:
-    """Act on no signal until ``check`` is called; one that comes after the last call is raised at the end."""
+    """Act on no signal until ``check`` is called; a signal after the last call is raised when the context ends."""
     signals = Held()
     with _handling(signals.note, ("SIGINT", *_ENDING)):
         yield signals
@@ -113,7 +116,7 @@ def held() -> Iterator[Held]:
 
 @contextmanager
 def insisting() -> Iterator[Held]:
-    """Ctrl-C raises at once, and again at ``check`` where a library has swallowed the exception."""
+    """Let Ctrl-C raise at once, and again at ``check`` if a library has swallowed the exception."""
     signals = Held()
 
     def insist(number: int, frame: FrameType | None) -> None:
@@ -125,7 +128,7 @@ def insisting() -> Iterator[Held]:
 
 
 def ignore_from_now_on() -> None:
-    """Ignore other signals than Ctrl-C to the end of the program: all is done that can be done."""
+    """Ignore signals other than Ctrl-C until the program ends, because all work is done."""
     if threading.current_thread() is threading.main_thread():
         for name in _ENDING:
             if hasattr(signal, name):

@@ -1,4 +1,4 @@
-"""Files that a user has written, read without waiting for them: a regular file of a bounded size, or an error that names it."""
+"""Reading of a user's files without blocking: a regular file of bounded size, or an error that names the file."""
 
 import os
 import stat
@@ -13,7 +13,7 @@ _RAW = getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
 def read_bytes(path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError) -> bytes:
-    """All of a regular file; ``error`` with one line for anything else, for more than ``largest_bytes``, and for a failure."""
+    """Return the content of a regular file; raise ``error`` for another kind, more than ``largest_bytes``, or a failure."""
     try:
         descriptor = os.open(path, os.O_RDONLY | _AT_ONCE | _RAW)
         with os.fdopen(descriptor, "rb", closefd=True) as stream:
@@ -40,7 +40,7 @@ def read_bytes(path: Path, largest_bytes: int, error: type[RigError] = Configura
 def read_text(
     path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError, encoding: str = "utf-8-sig"
 ) -> str:
-    """All of a regular file as text; raises as `read_bytes`, and where it is not of this encoding."""
+    """Return the content of a regular file as text; raise as `read_bytes`, and if the encoding is wrong."""
     try:
         return read_bytes(path, largest_bytes, error).decode(encoding)
     except UnicodeDecodeError as failure:

@@ -1,4 +1,4 @@
-"""Files of other formats that appear whole or not at all."""
+"""Writing of export files so that they appear complete or not at all."""
 
 import os
 from collections.abc import Iterator
@@ -14,9 +14,9 @@ __all__ = ["whole_file"]
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Path of an empty file to write to; it takes the place of ``path`` once all is on the disk.
+    """Yield the path of an empty file to write to; it replaces ``path`` once all data are on the disk.
 
-    Raises `RecordingError` where that fails, with the system's reason; ``path`` is then as it was.
+    Raises `RecordingError` with the system's reason if that fails; ``path`` is then unchanged.
     """
     part = path.with_name(f"{path.name}.part")
     try:
@@ -36,7 +36,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def _reason(error: BaseException) -> str:
-    """What the system said, if it said anything, else the error's own text."""
+    """Return the operating system's message behind an error, or else the error's own text."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and cause.strerror:

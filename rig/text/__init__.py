@@ -1,1 +1,1 @@
-"""Text for people: what a terminal can show, tables, progress."""
+"""Text output: printable text for a terminal, tables and JSON."""

@@ -10,7 +10,7 @@ __all__ = ["number", "print_json", "print_table"]
 
 
 def print_json(value: Mapping[str, Any]) -> None:
-    """One JSON document on standard output; numbers that do not exist are null."""
+    """Print one JSON document on standard output; numbers that are not finite become null."""
     print(json.dumps(_finite(value), indent=2))
 
 
@@ -25,12 +25,12 @@ def _finite(value: Any) -> Any:
 
 
 def number(value: float | None, pattern: str, scale: float = 1.0) -> str:
-    """A number in a format, or a dash where there is none."""
+    """Return a number in a format, or a dash for None or NaN."""
     return "-" if value is None or value != value else format(scale * value, pattern)
 
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table of right-aligned columns."""
+    """Print a table of right-aligned columns."""
     lines = [[printable(cell) for cell in row] for row in [headings, *rows]]
     widths = [max(len(row[column]) for row in lines) for column in range(len(headings))]
     for row in lines:

@@ -1,4 +1,4 @@
-"""What is exchanged, in one form for all formats: named arrays with units, and attributes."""
+"""Content of an export, in one form for all formats: named arrays with units, and attributes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ _SUFFIXES = {
 
 
 def unit_of(name: str) -> str:
-    """SI unit of an array by the end of its name (``damping_ratio_std`` has that of ``damping_ratio``); 1 without any."""
+    """Return an array's SI unit by the suffix of its name; 1 without one. ``x_std`` has the unit of ``x``."""
     for end in ("_std", "_low", "_high", "_total_power", "_uncorrected"):
         name = name.removesuffix(end)
     return next((unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix)), "1")
@@ -27,22 +27,22 @@ def unit_of(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """One object, taken apart.
+    """The content of one exported object.
 
     Parameters
     ----------
     kind
         Kind of the object, for example ``nonlinear-mode``.
     title
-        What it is of, for a person: specimen, point or level.
+        Description for a person: specimen, point or level.
     arrays
-        Its arrays by name.
+        Arrays of the object, by name.
     attributes
         Everything else, ready for JSON.
     rows
-        For every array that belongs into a table: its axis along the table's rows.
+        For every array that belongs in a table: the array's axis along the table's rows.
     units
-        Units of arrays, one or several that fit the axes other than the rows; by `unit_of` where there is none.
+        Units of arrays: one, or several that broadcast to the axes other than the rows. Without an entry `unit_of` applies.
     labels
         Names along the axes other than the rows.
     """
@@ -56,16 +56,16 @@ class Contents:
     labels: Mapping[str, Labels] = field(default_factory=dict)
 
     def unit(self, name: str) -> str | Array:
-        """Unit of an array, or those of its columns."""
+        """Return the unit of an array, or the units of its columns."""
         return self.units.get(name, unit_of(name))
 
     def summary(self) -> dict[str, Any]:
-        """Kind, title, number of rows and names of the arrays."""
+        """Return kind, title, number of rows and names of the arrays."""
         rows = next((np.shape(self.arrays[name])[axis] for name, axis in self.rows.items()), 0)
         return {"kind": self.kind, "title": self.title, "rows": int(rows), "arrays": list(self.arrays)}
 
     def columns(self, name: str) -> list[tuple[str, str, Array]]:
-        """Name, unit and values of every column of an array; real and imaginary part are columns of their own."""
+        """Return name, unit and values of every column of an array; real and imaginary part are separate columns."""
         table = np.moveaxis(np.asarray(self.arrays[name]), self.rows[name], 0)
         units = np.broadcast_to(np.asarray(self.unit(name)), table.shape[1:])
         labels = self.labels.get(name) or tuple(tuple(map(str, range(size))) for size in table.shape[1:])

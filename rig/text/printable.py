@@ -1,4 +1,4 @@
-"""Text for one line of a terminal: nothing that moves a cursor or changes a colour, and not longer than a person reads."""
+"""Text for one line of a terminal: without characters that move the cursor or change the colour, and of limited length."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,13 +7,13 @@ from unicodedata import category
 __all__ = ["LONGEST_LINE", "error_text", "one_line", "printable", "printable_strings", "shown"]
 
 LONGEST_LINE = 800
-"""Characters of a message; what is left out lies in its middle, for it begins with the field and ends with what is allowed."""
+"""Largest length of a message. A longer one is cut in the middle, as it begins with the field and ends with what is allowed."""
 LONGEST_VALUE = 60
-"""Characters of a value inside a message."""
+"""Largest length of a value inside a message."""
 
 
 def printable(text: str) -> str:
-    """The text with control, escape and other characters that cannot be printed shown by their escape, as Python writes it."""
+    """Return the text with control and other unprintable characters replaced by Python's escape sequences."""
     if text.isprintable():
         return text
     return "".join(
@@ -23,7 +23,7 @@ def printable(text: str) -> str:
 
 
 def printable_strings(value: Any) -> Any:
-    """A JSON-able value in which every text, and every key that is one, is `printable`; line ends stay."""
+    """Return a JSON value in which every text and every text key is `printable`; line ends are kept."""
     if isinstance(value, str):
         return "\n".join(printable(line) for line in value.split("\n"))
     if isinstance(value, Mapping):
@@ -34,15 +34,15 @@ def printable_strings(value: Any) -> Any:
 
 
 def one_line(text: str, longest: int = LONGEST_LINE) -> str:
-    """The text in one printable line of about so many characters; the same again is left as it is."""
-    if len(text) > 10 * longest:  # the rest would not be seen, and is not to cost time either
+    """Return the text as one printable line of about ``longest`` characters; such a line is returned unchanged."""
+    if len(text) > 10 * longest:  # the rest would not be shown, so it should not cost time
         text = _without_middle(text, 8 * longest)
     line = printable(" ".join(text.split()))
     return line if len(line) <= longest + 40 else _without_middle(line, longest)
 
 
 def error_text(error: BaseException) -> str:
-    """The message of a library's error without its line breaks; the error's type where it has no message."""
+    """Return the message of a library's error without line breaks, or the error's type if it has no message."""
     return " ".join(str(error).split()) or type(error).__name__
 
 
@@ -52,7 +52,7 @@ def _without_middle(text: str, longest: int) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as it stands in a message: its ``repr``, shortened, with its size where it is long."""
+    """Return a value as shown in a message: its ``repr``, shortened and with its size if it is long."""
     if isinstance(value, str) and len(value) > LONGEST_VALUE:
         return f"{value[: LONGEST_VALUE // 2]!r}... ({len(value)} characters)"
     if isinstance(value, Mapping | list | tuple) and len(value) > LONGEST_VALUE:

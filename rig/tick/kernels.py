@@ -1,7 +1,7 @@
-"""The compiled tick, once, for every driver: per sample, per block, or fused with a virtual rig.
+"""The compiled tick, shared by all drivers: called per sample, per block, or fused with a virtual rig.
 
-Order within one sample: measure, take out the mean, demodulate against the phase that was on the output when the
-reading was made, lock state, sequencer, frequency law, amplitude law, safety, act, telemetry row.
+Order within one sample: measure, subtract the mean, demodulate with the phase that was on the output when the reading was
+made, lock state, sequencer, frequency law, amplitude law, safety, output, telemetry row.
 """
 
 import math
@@ -32,15 +32,17 @@ from rig.tick.sequencer.kernels import advance, is_ramp
 from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-SMALLEST_V = 1e-12  # no division by an output of nothing
-UNREACHED = 0.98  # of its level, below which a quantity whose loop stands at the voltage limit has not reached it
+SMALLEST_V = 1e-12  # lower bound of a divisor, against an output of zero
+UNREACHED = (
+    0.98  # of the level; a held quantity below it has not reached its level if the output is at the voltage limit
+)
 
 
 @kernel
 def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: float) -> float:
-    """Oscillator phase that was on the output when this sample's inputs were measured, in [0, 2 pi).
+    """Return the oscillator phase at the output when this sample's inputs were measured, in [0, 2 pi).
 
-    ``seen`` is the ring's entry of the last whole sample that the inputs show.
+    ``seen`` is the index in the ring of the last whole output sample that affects the inputs.
     """
     before = seen - 1 if seen > 0 else history.size - 1
     theta = history[seen].theta - lead_fraction * dt * history[before].omega
@@ -49,7 +51,7 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 
 @inner_kernel
 def measure_rms(t: TickArrays, amplitude_law: int) -> None:
-    """The force's root mean square, where it is what ``amplitude_law`` holds."""
+    """Update the root mean square of the force if ``amplitude_law`` holds it."""
     if amplitude_law == FORCE_RMS:
         control = t.control[0]
         control.vibration.force_rms_n = force_rms(t.law[0].detector, control.detector)
@@ -57,7 +59,10 @@ def measure_rms(t: TickArrays, amplitude_law: int) -> None:
 
 @kernel
 def judge_by_exciter(t: TickArrays, seen: Record) -> None:
-    """Trip where the known exciter contradicts the output ``seen`` (of the history) that force and drive show now."""
+    """Trip if force and drive contradict, by the known exciter, the output that caused them.
+
+    ``seen`` is the entry of the history with that output.
+    """
     loop, guard, following, vibration = t.loop[0], t.guard[0], t.following[0], t.control[0].vibration
     if guard.mode != ARMED or loop.drive == WAVEFORM:
         return
@@ -70,7 +75,7 @@ def judge_by_exciter(t: TickArrays, seen: Record) -> None:
 
 @kernel
 def begin_segment(t: TickArrays, segment: Record) -> None:
-    """A new segment's drive and amplitude law take over from what there is, so that nothing jumps."""
+    """Switch to the drive and amplitude law of a new segment, starting from the present output and frequency without a jump."""
     loop, control, progress = t.loop[0], t.control[0], t.progress[0]
     amplitude = control.amplitude
     if segment.drive == LOOP_DRIVE and loop.drive != LOOP_DRIVE:
@@ -86,7 +91,7 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
 
 @inner_kernel
 def step_sequencer(t: TickArrays) -> bool:
-    """The plan's level, lag and frequency for this sample; returns whether the run goes on."""
+    """Update the plan's level, lag and frequency for this sample; return whether the run goes on."""
     loop, progress, amplitude = t.loop[0], t.progress[0], t.control[0].amplitude
     if progress.entered == 0 and progress.finished == 0 and progress.segment < progress.segments:
         begin_segment(t, t.segments[progress.segment])
@@ -106,7 +111,7 @@ def step_sequencer(t: TickArrays) -> bool:
 
 @inner_kernel
 def choose_frequency(t: TickArrays) -> None:
-    """Frequency of the sample: that of the loop, held where no phase can be read, or the plan's."""
+    """Set the frequency of this sample: from the loop (held while no phase can be read) or from the plan."""
     control, loop, progress = t.control[0], t.loop[0], t.progress[0]
     if loop.drive == WAVEFORM:
         control.frequency.omega = TWO_PI / (t.waveforms.shape[1] * loop.dt_s)
@@ -120,7 +125,11 @@ def choose_frequency(t: TickArrays) -> None:
 
 @inner_kernel
 def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool) -> float:
-    """Safety: the amplitude (V) that goes out for the ``demanded`` one, of which the law's watch has ``allowed`` so much."""
+    """Apply the safety limits and return the permitted output amplitude (V).
+
+    ``demanded`` is the law's amplitude (V). ``allowed`` is the amplitude after the check that force and motion follow the
+    output; the limits apply to it.
+    """
     amplitude, guard, limits = t.control[0].amplitude, t.guard[0], t.limits[0]
     before, turn = guard.amplitude_v, amplitude.output.turn
     permitted = permitted_amplitude(guard, limits, allowed, t.loop[0].sample)
@@ -132,9 +141,9 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
 
 @inner_kernel
 def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
-    """The output (V) of this sample, ``Re(U exp(i theta))``, and the oscillator one sample on.
+    """Return the output (V) of this sample, ``Re(U exp(i theta))``, and advance the oscillator by one sample.
 
-    A waveform is played by its number of the sample.
+    A waveform is read from its table, one entry a sample.
     """
     loop, omega = t.loop[0], t.control[0].frequency.omega
     if loop.drive == WAVEFORM:
@@ -161,9 +170,10 @@ def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
 
 @kernel
 def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row: Record) -> float:
-    """One sample: ``volts`` (float64[n_channels]) in, output voltage out; fills ``readings`` (SI) and the telemetry ``row``.
+    """Process one sample: take ``volts`` (float64[n_channels]) and return the output voltage.
 
-    Of a sample that is ``lost`` the volts are not looked at: estimates hold, but for their ripple; all else goes on.
+    Fills ``readings`` (SI) and the telemetry ``row``. If the sample is ``lost``, its volts are ignored: the estimates are held
+    except for their ripple, and everything else continues.
     """
     law, control, loop, guard, progress = t.law[0], t.control[0], t.loop[0], t.guard[0], t.progress[0]
     vibration, frequency, amplitude = control.vibration, control.frequency, control.amplitude
@@ -231,9 +241,9 @@ def tick_block(
     rows: np.ndarray,
     outputs: np.ndarray,
 ) -> None:
-    """A block of samples: ``volts`` (float64[n, n_channels]) and the device's ``flags`` (uint16[n]) in, voltages out.
+    """Process a block: take ``volts`` (float64[n, n_channels]) and the device's ``flags`` (uint16[n]).
 
-    ``outputs`` (float64[n]) are for the next block.
+    Fills ``readings``, ``rows`` and ``outputs`` (float64[n]), the voltages for the next block.
     """
     for index in range(outputs.size):
         lost = (flags[index] & LOST) != 0

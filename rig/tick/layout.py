@@ -1,6 +1,6 @@
 """Records of the tick, and the bundle of arrays that its kernel takes.
 
-One bundle holds everything a run's control state consists of; a copy of it is a checkpoint.
+One bundle holds the complete control state of a run; a copy of it is a checkpoint.
 """
 
 from typing import Any, NamedTuple
@@ -33,13 +33,13 @@ LOOP = np.dtype(
         ("seen", "i8"),
     ]
 )
-"""What is the tick's own (one record): sample counter, way from output to input, channels, oscillator phase on the output and
-at the inputs, readings of the sample, what drives. ``skew_samples``: delay of the force's channel less the drive point's;
-``held``: the level is not being ramped; ``lost``: samples that have not come, less those that have since, never below 0;
-``seen``: all that have come."""
+"""State of the tick itself (one record): sample counter, delay from output to input, channels, oscillator phase at the output
+and at the inputs, readings of the sample, source of the frequency. ``skew_samples``: delay of the force channel minus that of
+the drive channel. ``held``: the level is not being ramped. ``lost``: counts up with each lost sample and down with each
+received one, never below 0. ``seen``: number of samples received."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
-"""What the tick has sent out and the inputs have not yet seen; a ring."""
+"""Outputs sent whose effect the inputs do not yet show; a ring."""
 
 ROW = np.dtype(
     [
@@ -93,10 +93,10 @@ def recorded_row(n_channels: int) -> np.dtype[Any]:
 
 
 class TickArrays(NamedTuple):
-    """Everything the tick reads and writes. The first seven are constants of the run, the rest is its state.
+    """All arrays that the tick reads and writes. The first seven are constants of the run, the others are its state.
 
-    ``law`` is of `controller.law.LAW`, ``control`` its state, of `controller.law.CONTROL`. ``waveforms`` [n, period]: periodic
-    waveforms of unit peak that segments may play; [1, 1] without any.
+    ``law`` has the dtype `controller.law.LAW`; its state ``control`` has the dtype `controller.law.CONTROL`. ``waveforms``
+    [n, period] are periodic waveforms of unit peak that segments may play; [1, 1] if there are none.
     """
 
     law: np.ndarray

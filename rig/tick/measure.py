@@ -1,4 +1,4 @@
-"""Compiled reading of the inputs: checks, scaling, means, and what stands for a sample that was lost."""
+"""Compiled reading of the inputs: checks, scaling, means, and substitutes for lost samples."""
 
 import math
 
@@ -11,15 +11,15 @@ from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.layout import WAVEFORM
 from vibrolock.compiled import kernel
 
-STUCK_SAMPLES = 16  # equal readings in a row, more than a turning point of a vibration worth watching has
+STUCK_SAMPLES = 16  # equal readings in a row; more than occur at a turning point of any vibration worth watching
 
 
 @kernel
 def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tuple[bool, bool]:
-    """A reading that is not plainly in order: watch it; returns whether it may be used, and whether it is a motion.
+    """Check a reading that may be out of order; return whether it may be used, and whether it represents motion.
 
-    A reading beyond its limit trips, and so does a faulty sensor: integrated, the fault would pass for travel. So would the
-    gap that is left without it: from then on the channel tells nothing of a motion any more.
+    A reading beyond its limit trips, and so does a faulty sensor. From then on the channel's displacement is no longer watched:
+    integrating the faulty readings, or leaving them out, would feign a displacement.
     """
     guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
     channel, watch = t.inputs[index], t.watches[index]
@@ -32,11 +32,11 @@ def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tupl
 
 @kernel
 def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
-    """Check and convert every input channel; returns the telemetry flags of the inputs."""
+    """Check and convert every input channel; return the telemetry flags of the inputs."""
     loop, guard, limits = t.loop[0], t.guard[0], t.limits[0]
     armed = guard.mode == ARMED
     driven = armed and (loop.held == 1 or t.progress[0].start_level > 0.0)  # in a ramp from a level, too
-    # At first the mean of all samples seen so far: noise or ambient vibration in a single one would be integrated as travel.
+    # Start with the mean of all samples so far: noise or ambient vibration in one sample would be integrated to displacement.
     mean_gain = max(t.law[0].detector.mean_gain, 1.0 / (loop.seen + 1.0))
     loop.seen += 1
     flags = 0
@@ -72,10 +72,10 @@ def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
 
 @kernel
 def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
-    """A sample that was lost on its way: nothing is read, the motion goes on as it was, a long gap trips.
+    """Bridge a lost sample: read nothing, extrapolate the motion, and trip if the gap is long.
 
-    For force and drive stand the fundamentals as they are known: so a detector's ripple goes on as well, and does not turn
-    into an error of the phase by stopping anywhere.
+    The known fundamentals replace force and drive. Thereby the detector's ripple continues; if it were frozen at an arbitrary
+    instant, it would become an error of the phase.
     """
     loop, limits, vibration = t.loop[0], t.limits[0], t.control[0].vibration
     dt, mean_gain = loop.dt_s, t.law[0].detector.mean_gain
@@ -86,7 +86,7 @@ def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: 
     for index in range(t.inputs.size):
         if t.inputs[index].watch_displacement == 1:
             watch = t.watches[index]
-            # The mean swings a little with the vibration: held anywhere, it would be integrated as travel for seconds.
+            # The mean oscillates a little with the vibration; a frozen mean would be integrated to displacement for seconds.
             watch.mean += mean_gain * carry_motion(limits, watch, cos_step, sin_step, omega)
     force, drive = vibration.force, vibration.drive
     loop.force = force.real * cos_theta - force.imag * sin_theta

@@ -1,4 +1,4 @@
-"""Compiled end of a period: lock state, settle rule and the watch on the rig take its means."""
+"""Compiled end of a period: passes the period's means to lock state, settle rule and rig supervision."""
 
 import math
 
@@ -16,7 +16,7 @@ from vibrolock.compiled import kernel
 
 @kernel
 def judge_following(t: TickArrays) -> None:
-    """Trip where a law that holds a level raises the output and what it holds stays away."""
+    """Trip if a law raises the output and the held quantity does not follow, or if force or motion shows no signal."""
     loop, control, guard, following = t.loop[0], t.control[0], t.guard[0], t.following[0]
     law, lock = control.amplitude.law, control.lock
     force, response = control.period.force_n, control.period.drive_m_s2
@@ -39,7 +39,7 @@ def judge_following(t: TickArrays) -> None:
 
 @kernel
 def close_period(t: TickArrays) -> None:
-    """An oscillator period has ended at the inputs."""
+    """Process the end of an oscillator period at the inputs."""
     loop, control = t.loop[0], t.control[0]
     period, amplitude, lock = control.period, control.amplitude, control.lock
     if not end_period(period):
@@ -53,7 +53,7 @@ def close_period(t: TickArrays) -> None:
     open_loop = loop.drive == TONE
     if not open_loop:
         next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad)
-    # Where a loop holds the level, its own error says whether the output may; its ripple may be cut all the time.
+    # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
     behind = amplitude.output.behind != 0 and amplitude.law == VOLTAGE
     locked = (open_loop or lock.state == LOCKED) and not behind
     period.output_v = t.guard[0].amplitude_v

@@ -1,4 +1,4 @@
-"""The tick as an object: its arrays built from bench, law and plan, and one call a block."""
+"""The tick as an object: builds its arrays from bench, law and plan."""
 
 import math
 from collections.abc import Sequence
@@ -27,11 +27,11 @@ SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bit
 class Tick:
     """The control state of a run.
 
-    ``lead_samples`` is the way from an output computed by the tick to the input that shows it: the block plus the
-    device's latency, with its fraction. ``waveforms`` [n, period] are those of unit peak that segments play. Where a plant is
-    known its ``exciter`` is held against every fundamental. ``armed`` false keeps the output at 0 V.
+    ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
+    latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
+    the fundamentals are checked against its ``exciter``. ``armed = False`` keeps the output at 0 V.
 
-    Raises `ConfigurationError` where the law does not fit the bench.
+    Raises `ConfigurationError` if the law does not suit the bench.
     """
 
     def __init__(
@@ -109,39 +109,39 @@ class Tick:
 
     @property
     def outcomes(self) -> np.ndarray:
-        """How each segment went so far."""
+        """Results of the segments so far."""
         return self.arrays.outcomes
 
     @property
     def sample(self) -> int:
-        """Number of samples done."""
+        """Number of samples processed."""
         return int(self.arrays.loop["sample"][0])
 
     @property
     def frequency_hz(self) -> float:
-        """Frequency of the oscillator."""
+        """Frequency of the oscillator (Hz)."""
         return float(self.arrays.control["frequency"]["omega"][0]) / (2.0 * math.pi)
 
     @property
     def row_dtype(self) -> np.dtype[np.void]:
-        """Dtype of the rows that `buffers` and `joined` deal in."""
+        """Dtype of the rows that `joined` returns."""
         return recorded_row(len(self.bench.channels))
 
     @property
     def over(self) -> bool:
-        """Whether the output is off for good, and what was still under way in the device's queue has gone out."""
+        """Whether the output is off for good and the device's queue holds no more output of the run."""
         return is_over(self.arrays.guard[0], int(self.arrays.loop["lead_whole"][0]))
 
     def request_stop(self) -> None:
-        """Ask for a ramp to 0 V at frozen frequency; the plan ends with it."""
+        """Request a ramp to 0 V at frozen frequency, which ends the plan."""
         self.arrays.guard["stop_requested"] = 1
 
     def buffers(self, n: int) -> tuple[np.ndarray, np.ndarray]:
-        """Empty telemetry of n samples: readings float32[n, n_channels] and rows."""
+        """Return empty telemetry for n samples: readings float32[n, n_channels] and rows [n] of `ROW`."""
         return np.zeros((n, len(self.bench.channels)), np.float32), np.zeros(n, ROW)
 
     def joined(self, readings: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Readings and rows as one structured array, the form that is recorded."""
+        """Join readings and rows into one structured array, the form that is recorded."""
         out = np.empty(rows.size, self.row_dtype)
         out["inputs"] = readings
         for name in ROW.names or ():
@@ -151,7 +151,7 @@ class Tick:
 
 @dataclass(frozen=True, eq=False)
 class TickSettings:
-    """What a tick is built from once the latency of the device is known; can be handed to another process."""
+    """Arguments of a tick except the device's latency, which is known later; can be passed to another process."""
 
     bench: Bench
     law: Law
@@ -163,7 +163,7 @@ class TickSettings:
     armed: bool = True
 
     def build(self, latency_samples: float) -> Tick:
-        """The tick for a device of this latency: its outputs are one block later still."""
+        """Build the tick for a device of this latency; its outputs show one block later in addition."""
         return Tick(
             self.bench,
             self.law,
@@ -178,7 +178,7 @@ class TickSettings:
 
 
 def _history(size: int, omega: float, dt: float) -> np.ndarray:
-    """The ring of what was sent out, as if the oscillator had been running silently before."""
+    """Return the ring of past outputs, as if the oscillator had been running before at zero amplitude."""
     out = np.zeros(size, HISTORY)
     ago = np.arange(size, 0, -1)
     out["theta"] = np.mod(-ago * omega * dt, 2.0 * math.pi)

@@ -131,7 +131,10 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
 
 
 def _force_share(plant: PlantModel, w: float, share: float) -> float:
-    """Return the largest candidate gain of a force loop around both laws that stays stable when it rises by half."""
+    """Return the largest trial gain of the outer force loop, around frequency and response law, with a gain margin of 1.5.
+
+    If no trial gain has this margin, return the last one of `FORCE_SHARES`.
+    """
     loops = ((part, _loop(plant, plant, w, share, 1.5 * part)) for part in FORCE_SHARES)
     return next((part for part, loop in loops if unstable_poles(loop) == 0), FORCE_SHARES[-1])
 

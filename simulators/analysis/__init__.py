@@ -1,4 +1,4 @@
-"""Analysis without a test: frequency responses, and periodic vibrations of the coupled rig by harmonic balance."""
+"""Computed analysis of a virtual rig: frequency responses, and periodic vibrations by harmonic balance."""
 
 from simulators.analysis.frequency_responses import FrequencyResponses, frequency_response
 from simulators.analysis.harmonic_balance import (

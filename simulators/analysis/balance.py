@@ -1,9 +1,9 @@
-"""Equations of the harmonic balance of the coupled rig, their Jacobian, and Newton's method for them.
+"""Equations of the harmonic balance of the coupled rig, their Jacobian, and their solution by Newton's method.
 
-Unknowns are the harmonics of the site coordinates, the angular frequency W and the voltage U of ``u = U cos(theta)``.
-With T the transfer of the linear part and F(Z) the site forces (alternating frequency-time), harmonic by harmonic
-``Z = T_zf F(Z) + T_zu U``. Two closing equations (`Conditions`) hold the level, and lag or frequency: the phase lag is
-itself a path parameter, along which folds of the frequency are passed without arc length.
+The unknowns are the harmonics Z of the site coordinates, the angular frequency W and the voltage U of ``u = U cos(theta)``.
+With the transfer T of the linear part and the site forces F(Z) (alternating frequency-time), each harmonic obeys
+``Z = T_zf F(Z) + T_zu U``. Two closing equations (`Conditions`) prescribe the level, and the lag or the frequency. The phase
+lag can serve as path parameter; along it, folds of the frequency are passed without arc-length continuation.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _TOLERANCE = 1e-9
-"""Largest residual, over the sizes of the contributions that balance."""
+"""Largest residual, relative to the magnitude of the terms of the equation."""
 _ITERATIONS = 20
 _HALVINGS = 4
 _LARGEST_FREQUENCY_STEP = 0.05
@@ -32,14 +32,14 @@ _LARGEST_FREQUENCY_STEP = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A periodic vibration: unknowns and Jacobian there, and the conditions that it meets."""
+    """A periodic vibration: its unknowns, the Jacobian at them, and the conditions that the vibration meets."""
 
     unknowns: Real
     jacobian: Real
     conditions: Conditions
 
     def tangent(self, level: float = 0.0, value: float = 0.0) -> Real:
-        """Change of the unknowns per relative change of the level, or per change of lag or frequency."""
+        """Return the change of the unknowns for a relative change ``level`` and a change ``value`` of lag or frequency."""
         change = np.zeros(self.unknowns.size)
         change[-1] = level
         change[-2] = value if self.conditions.at == "lag" else value / self.conditions.value
@@ -49,10 +49,10 @@ class Solution:
             raise NotConvergedError(f"the path has no direction at {self.conditions}") from None
 
     def stable(self, *, under_voltage: bool = False) -> bool:
-        """Static stability of the fundamental at constant frequency and level, without a loop.
+        """Return whether the fundamental is statically stable at constant frequency and level, without a control loop.
 
         The determinant of the equations at a given frequency is positive at rest and changes its sign at every fold.
-        ``under_voltage``: at constant voltage instead of the held quantity.
+        ``under_voltage``: the voltage is constant instead of the held quantity.
         """
         if under_voltage:
             left = self.jacobian[:-2, :-2]
@@ -61,7 +61,7 @@ class Solution:
         return bool(np.linalg.slogdet(left)[0] > 0.0)
 
     def held_by_voltage(self) -> float:
-        """``d ln(level) / d ln(U)`` at the lag or frequency that was held: what one loop on the level alone sees."""
+        """Return ``d ln(level) / d ln(U)`` at the held lag or frequency: the static gain for a loop on the level alone."""
         change = self.tangent(level=1.0)[-1] / self.unknowns[-1]
         return float(1.0 / change) if change else float("inf")
 
@@ -69,7 +69,7 @@ class Solution:
 class Balance:
     """Residual and Jacobian over ``y = [coefficients of every site coordinate, W, U]``.
 
-    With ``pure_sine`` U is the amplitude of a sinusoidal force on the structure alone instead.
+    With ``pure_sine``, U is instead the amplitude of a sinusoidal force on the structure without exciter.
     """
 
     def __init__(self, rig: VirtualRig, harmonics: int, samples: int, *, pure_sine: bool = False) -> None:
@@ -79,13 +79,13 @@ class Balance:
         self.n_site = self.linear.n_site
 
     def coefficients(self, unknowns: Real) -> Real:
-        """Coefficients of the site coordinates [n_site, P]."""
+        """Return the coefficients of the site coordinates [n_site, P]."""
         return unknowns[:-2].reshape(self.n_site, self.series.size)
 
     def responses(self, unknowns: Real) -> tuple[Complex, Complex, Real]:
-        """Site coordinates, force and drive displacement that the site forces cause [n_site + 2, H + 1].
+        """Return site coordinates, force and drive displacement caused by site forces and voltage [n_site + 2, H + 1].
 
-        Also their Jacobian [n_site + 2, H + 1, len(y)], and the sizes of the contributions to each sum [n_site + 2].
+        Also return their Jacobian [n_site + 2, H + 1, len(y)], and the magnitude of the terms of each sum [n_site + 2].
         """
         series, n = self.series, self.n_site
         omega, voltage = unknowns[-2], unknowns[-1]
@@ -104,7 +104,7 @@ class Balance:
         return response, jacobian, sizes
 
     def residual(self, unknowns: Real, conditions: Conditions) -> tuple[Real, Real, Real]:
-        """Residual [len(y)], its Jacobian, and the size of each equation's terms."""
+        """Return the residual [len(y)], its Jacobian, and the magnitude of each equation's terms."""
         series, n = self.series, self.n_site
         response, slopes, sizes = self.responses(unknowns)
         value, jacobian = np.empty_like(unknowns), np.zeros((unknowns.size, unknowns.size))
@@ -116,8 +116,8 @@ class Balance:
         return value, jacobian, scale
 
     def solve(self, start: Real, conditions: Conditions) -> Solution:
-        """Newton's method with steps halved until the residual falls; raises `NotConvergedError` if it does not converge."""
-        with np.errstate(all="ignore"):  # what is not finite is refused, and a trial may go far
+        """Solve by Newton's method, halving steps until the residual falls; raise `NotConvergedError` without convergence."""
+        with np.errstate(all="ignore"):  # a trial step may overflow; results that are not finite are refused
             return self._solve(start, conditions)
 
     def _solve(self, start: Real, conditions: Conditions) -> Solution:
@@ -145,14 +145,17 @@ class Balance:
         raise NotConvergedError(f"no periodic vibration found at {conditions}")
 
     def _checked(self, solution: Solution) -> Solution:
-        """Refuse the solution that is the same vibration half a period later, and solutions that are no vibration."""
+        """Return the solution; raise `NotConvergedError` unless frequency and voltage are positive.
+
+        A negative voltage describes the same vibration shifted by half a period.
+        """
         omega, voltage = solution.unknowns[-2:]
         if omega > 0.0 and voltage > 0.0:
             return solution
         raise NotConvergedError(f"no periodic vibration with a positive voltage found at {solution.conditions}")
 
     def linear_start(self, conditions: Conditions, omega_rad_s: float) -> Real:
-        """Vibration of the linear part alone at W, at the level asked for."""
+        """Return the vibration of the linear part alone at W, at the level of the conditions."""
         transfer = self.linear.transfer(omega_rad_s, self.series.orders)[0][1, :, -1]
         voltage = conditions.voltage_v(*np.abs(transfer[self.n_site :]))
         harmonics = np.zeros((self.n_site, self.series.orders.size), np.complex128)

@@ -1,4 +1,4 @@
-"""The linear part of the coupled rig in the frequency domain, condensed to what the harmonic balance needs."""
+"""The linear part of the coupled rig in the frequency domain, condensed to the inputs and outputs of the harmonic balance."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,16 @@ Complex = NDArray[np.complex128]
 
 _NOT_HELD = "structure: has a motion that no stiffness holds, allowed is a rig that returns to rest"
 _FREE = 1e-12
-"""Static stiffness over the largest there is, from which on down a motion counts as free."""
+"""Static stiffness relative to the largest, below which a motion counts as free."""
 _LOADED = 1e-6
-"""Share of its largest coefficient from which on a site's coordinate counts as moved."""
+"""Participation of a free motion in a site's coordinate, relative to the site's largest coefficient, that counts as load."""
 
 
 class CondensedRig:
     """Transfer from site forces and voltage to site coordinates, stinger force and drive-point displacement.
 
-    Per harmonic h of the angular frequency W, exactly: ``X_h = (i h W - A)^-1 (B_f F_h + b_u U_h)``. The time is
-    continuous: the hold of a converter is not in it.
+    For each harmonic h of the angular frequency W, ``X_h = (i h W - A)^-1 (B_f F_h + b_u U_h)`` exactly. Time is continuous; a
+    converter's hold is not included.
     """
 
     def __init__(self, rig: VirtualRig) -> None:
@@ -36,7 +36,7 @@ class CondensedRig:
         _check_held(plant)
 
     def resolvent(self, omega_rad_s: float, orders: NDArray[np.int64]) -> Complex:
-        """``(i h W - A)^-1`` [n_order, n, n]; `ValueError` where the rig has no static equilibrium."""
+        """Return ``(i h W - A)^-1`` [n_order, n, n]; raise `ValueError` if the rig has no static equilibrium."""
         s = 1j * omega_rad_s * orders[:, None, None]
         try:
             return np.asarray(np.linalg.inv(s * np.eye(self.dynamics.shape[0]) - self.dynamics))
@@ -44,23 +44,23 @@ class CondensedRig:
             raise ValueError(_NOT_HELD) from None
 
     def transfer(self, omega_rad_s: float, orders: NDArray[np.int64]) -> tuple[Complex, Complex]:
-        """T [n_order, n_site + 2, n_site + 1] and its derivative by W; rows as `rows`, columns as `columns`."""
+        """Return T [n_order, n_site + 2, n_site + 1] and its derivative by W; rows as `rows`, columns as `columns`."""
         inverse = self.resolvent(omega_rad_s, orders)
         states, left = inverse @ self.columns, self.rows @ inverse
         return self.rows @ states, -1j * orders[:, None, None] * (left @ states)
 
     def states(self, omega_rad_s: float, inputs: Complex) -> Complex:
-        """Harmonics of the state [n_order, n] from those of site forces and voltage [n_site + 1, n_order]."""
+        """Return the harmonics of the state [n_order, n] from those of site forces and voltage [n_site + 1, n_order]."""
         orders = np.arange(inputs.shape[1])
         forced = self.columns @ inputs
         return np.asarray(np.einsum("hij,jh->hi", self.resolvent(omega_rad_s, orders), forced))
 
 
 class CondensedStructure:
-    """The structure alone under a force of a pure sine at the drive point: no exciter feeds harmonics back.
+    """The structure without exciter under a purely sinusoidal force at the drive point.
 
-    As `CondensedRig`, with the force in the place of the voltage. What the rig's outputs are read off is the state of a rig
-    whose armature is moved so that the stinger's force is just that: ``X_a,h = X_d,h + F_h / (k_s + i h W c_s)``.
+    The interface is that of `CondensedRig`, with the force in place of the voltage. Outputs are read from the state of a rig
+    whose armature moves so that the stinger transmits the given force: ``X_a,h = X_d,h + F_h / (k_s + i h W c_s)``.
     """
 
     def __init__(self, rig: VirtualRig) -> None:
@@ -74,7 +74,7 @@ class CondensedStructure:
         _check_held(plant)
 
     def _receptance(self, omega_rad_s: float, orders: NDArray[np.int64]) -> tuple[Complex, Complex]:
-        """``(K + s C + s^2)^-1`` [n_order, n_mode, n_mode] at ``s = i h W``, and its derivative by W."""
+        """Return ``(K + s C + s^2)^-1`` [n_order, n_mode, n_mode] at ``s = i h W``, and its derivative by W."""
         s = 1j * omega_rad_s * orders[:, None, None]
         try:
             inverse = np.linalg.inv(self.stiffness + s * self.damping + s**2 * np.eye(self.drive.size))
@@ -84,7 +84,7 @@ class CondensedStructure:
         return inverse, slope
 
     def transfer(self, omega_rad_s: float, orders: NDArray[np.int64]) -> tuple[Complex, Complex]:
-        """T [n_order, n_site + 2, n_site + 1] and its derivative by W: site coordinates, force, drive displacement."""
+        """Return T [n_order, n_site + 2, n_site + 1] and its derivative by W: site coordinates, force, drive displacement."""
         inverse, slope = self._receptance(omega_rad_s, orders)
         s = 1j * omega_rad_s * orders[:, None, None]
         rows = np.concatenate([self.rows + s * self.rate_rows, self._drive_rows(orders)], axis=1)
@@ -104,7 +104,7 @@ class CondensedStructure:
         return np.broadcast_to(self.drive.astype(np.complex128), (orders.size, 1, self.drive.size))
 
     def states(self, omega_rad_s: float, inputs: Complex) -> Complex:
-        """Harmonics of the rig's state [n_order, n] from those of site forces and force [n_site + 1, n_order]."""
+        """Return the harmonics of the rig's state [n_order, n] from those of site forces and force [n_site + 1, n_order]."""
         orders = np.arange(inputs.shape[1])
         s = 1j * omega_rad_s * orders
         modal = np.einsum("hij,jh->hi", self._receptance(omega_rad_s, orders)[0], self.columns @ inputs)
@@ -114,9 +114,10 @@ class CondensedStructure:
 
 
 def _check_held(plant: LinearPlant) -> None:
-    """`ValueError` where a site pushes a motion that nothing holds at rest: its static deflection would have no bound.
+    """Raise `ValueError` if a site loads a motion without static stiffness: its static deflection would be unbounded.
 
-    Static stiffness of modal coordinates and armature, ``K = -d(q'', v_a')/d(q, x_a)``: symmetric but for the armature's mass.
+    The static stiffness of modal coordinates and armature is ``K = -d(q'', v_a')/d(q, x_a)``; it is symmetric except for the
+    factor of the armature's mass.
     """
     m = plant.n_mode
     moved, pushed = [*range(m), 2 * m], [*range(m, 2 * m), 2 * m + 1]

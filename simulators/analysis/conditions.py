@@ -1,7 +1,7 @@
-"""Conditions of a harmonic balance: a level that is held, and a phase lag or a frequency; checks of what a user asks for.
+"""Conditions of a harmonic balance (a held level, and a phase lag or a frequency), and checks of a user's arguments.
 
 The level is that of the stinger force (peak of its fundamental, or RMS of its harmonics), of the drive point's
-displacement, or of the voltage. Each condition gives one real equation whose residual is relative, and its slopes.
+displacement, or of the voltage. Each condition gives one real equation with relative residual, and its derivatives.
 """
 
 from dataclasses import dataclass, replace
@@ -42,7 +42,7 @@ _MOVES_A_SITE = 0.01
 
 
 def held_force(quantity: Quantity) -> Held:
-    """The condition that holds a force, by its fundamental or its RMS."""
+    """Return the name of the condition that holds a force, by its fundamental or its RMS."""
     if quantity not in ("fundamental", "rms"):
         raise ValueError(f"quantity = {quantity!r}: allowed is fundamental or rms")
     return "force" if quantity == "fundamental" else "force-rms"
@@ -53,9 +53,9 @@ class Conditions:
     """A level of force, response or voltage, and a phase lag or a frequency."""
 
     held: Held
-    """``force``: peak of its fundamental (N). ``force-rms``: RMS of its harmonics from the first on (N), the mean left
-    out, as piezoelectric sensors see none. ``response``: peak of the drive point's displacement, fundamental (m).
-    ``voltage``: its amplitude (V)."""
+    """``force``: peak of the force's fundamental (N). ``force-rms``: RMS of all its harmonics from the first on (N), without
+    the mean, which piezoelectric sensors do not measure. ``response``: peak of the fundamental of the drive point's
+    displacement (m). ``voltage``: amplitude of the voltage (V)."""
     level: float
     """Value of the level."""
     at: Literal["lag", "frequency"]
@@ -64,7 +64,7 @@ class Conditions:
     """Value of the lag or frequency."""
 
     def halfway_to(self, goal: "Conditions") -> "Conditions":
-        """Geometric mean of the levels, arithmetic of lag or frequency."""
+        """Return conditions halfway to ``goal``: geometric mean of the levels, arithmetic mean of lag or frequency."""
         middle = float(np.sqrt(self.level * goal.level))
         return replace(self, level=middle, value=0.5 * (self.value + goal.value))
 
@@ -74,9 +74,10 @@ class Conditions:
         return f"{name} {self.level:g} {unit}, {self.at} {at}"
 
     def equations(self, unknowns: Real, responses: Complex, slopes: Complex) -> tuple[Real, Real]:
-        """Residuals [2] of lag or frequency and of the level, and their slopes [2, len(y)].
+        """Return the residuals [2] of lag or frequency and of the level, and their derivatives [2, len(y)].
 
-        ``responses`` [2, H + 1] are the harmonics of force and drive displacement, ``slopes`` [2, H + 1, len(y)] theirs.
+        ``responses`` [2, H + 1] are the harmonics of force and drive displacement; ``slopes`` [2, H + 1, len(y)] are their
+        derivatives by the unknowns.
         """
         value, jacobian = np.zeros(2), np.zeros((2, unknowns.size))
         force, drive = responses[:, 1]
@@ -103,13 +104,13 @@ class Conditions:
         return float(np.log(peak / self.level)), np.asarray(np.real(np.conj(held) @ change) / power)
 
     def voltage_v(self, force_per_v: float, drive_per_v: float) -> float:
-        """Voltage that a linear rig with these gains (N/V, m/V) needs for the level."""
+        """Return the voltage that a linear rig with these gains (N/V, m/V) needs for the level."""
         gains = {"force": force_per_v, "force-rms": force_per_v / np.sqrt(2.0), "response": drive_per_v, "voltage": 1.0}
         return float(self.level / gains[self.held])
 
 
 def positive(name: str, values: ArrayLike) -> Real:
-    """``values`` as a row of finite numbers above zero."""
+    """Return ``values`` as a row; raise `ValueError` unless all are finite and above zero."""
     array = _row(name, values)
     for value in array[~((array > 0.0) & np.isfinite(array))]:
         raise ValueError(f"{name} = {value:g}: allowed is above 0")
@@ -119,7 +120,7 @@ def positive(name: str, values: ArrayLike) -> Real:
 def levels(
     forces_n: ArrayLike | None, voltages_v: ArrayLike | None, amplitudes_m: ArrayLike | None
 ) -> tuple[Literal["force", "voltage", "response"], Real]:
-    """The one of the three quantities that is given, and its values."""
+    """Return the name and the values of the one quantity that is given; raise `ValueError` unless it is exactly one."""
     if forces_n is not None and voltages_v is None and amplitudes_m is None:
         return "force", positive("forces_n", forces_n)
     if voltages_v is not None and forces_n is None and amplitudes_m is None:
@@ -130,7 +131,7 @@ def levels(
 
 
 def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Real:
-    """Phase lags in radians from degrees."""
+    """Return phase lags in radians from degrees; raise `ValueError` if one is out of range or, on request, not rising."""
     array = _row(name, values)
     lowest, highest = _LAG_LIMITS_DEG
     for value in array[~((array >= lowest) & (array <= highest))]:
@@ -141,7 +142,7 @@ def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Real:
 
 
 def checked_harmonics(harmonics: int, samples: int) -> tuple[int, int]:
-    """Highest harmonic and samples per period; the samples must resolve it and the products of the sites."""
+    """Return harmonics and samples after a check; the samples must resolve the highest harmonic and products of the sites."""
     for name, value in (("harmonics", harmonics), ("samples", samples)):
         if not isinstance(value, int | np.integer):
             raise ValueError(f"{name} = {value!r}: allowed is a whole number")
@@ -155,7 +156,7 @@ def checked_harmonics(harmonics: int, samples: int) -> tuple[int, int]:
 
 
 def followed_mode(rig: VirtualRig, near_hz: float | None) -> int:
-    """Index of the linear mode nearest to ``near_hz``; without it, of the lowest that moves a nonlinear site."""
+    """Return the index of the linear mode nearest to ``near_hz``, by default of the lowest mode that moves a nonlinear site."""
     modes = rig.linear_modes
     if near_hz is not None:
         return modes.nearest(float(positive("near_hz", [near_hz])[0]))

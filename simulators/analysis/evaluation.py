@@ -19,7 +19,7 @@ Complex = NDArray[np.complex128]
 
 
 class Evaluation:
-    """Solutions of a balance as `PeriodicResponses`; ``mode`` is the linear mode (from 0) that amplitudes refer to."""
+    """Converts solutions of a balance to `PeriodicResponses`; modal quantities refer to the linear mode ``mode`` (from 0)."""
 
     def __init__(self, rig: VirtualRig, balance: Balance, mode: int) -> None:
         self.rig, self.balance, self.mode = rig, balance, mode
@@ -34,7 +34,7 @@ class Evaluation:
         )
 
     def __call__(self, solutions: Sequence[Solution]) -> PeriodicResponses:
-        """One point per solution (at least one), in their order."""
+        """Return one point per solution (at least one), in the order of the solutions."""
         omega, voltage = np.array([solution.unknowns[-2:] for solution in solutions]).T
         imposed = isinstance(self.balance.linear, CondensedStructure)
         if imposed:
@@ -61,7 +61,10 @@ class Evaluation:
         )
 
     def _point(self, solution: Solution) -> tuple[Complex, Complex, Complex, float, bool]:
-        """Coordinates, forces and outputs of one point, the share of force left out, and whether a site is beyond."""
+        """Return site coordinates, site forces and outputs of one point, the neglected share, and whether a site is beyond.
+
+        A site is beyond if it leaves the range in which its law holds.
+        """
         balance, series = self.balance, self.balance.series
         omega, voltage = solution.unknowns[-2:]
         coefficients = balance.coefficients(solution.unknowns)
@@ -75,7 +78,7 @@ class Evaluation:
         return series.to_complex(coefficients), inputs[:-1], outputs, neglected, waves.beyond
 
     def _neglected(self, omega: float, forces: Real) -> float:
-        """RMS over harmonics H + 1 to 2 H + 1 of the stinger force (N) that the sites' forces cause."""
+        """Return the RMS over harmonics H + 1 to 2 H + 1 of the stinger force (N) that the sites' forces cause."""
         series = self.balance.series
         above = np.arange(series.harmonics + 1, 2 * series.harmonics + 2)
         spectrum = np.fft.rfft(forces, axis=1)[:, above] * (2.0 / series.samples)
@@ -83,7 +86,7 @@ class Evaluation:
         return float(np.linalg.norm(np.einsum("hi,ih->h", transfer, spectrum)))
 
     def _modal(self, omega: Real, force: Complex, drive: Complex) -> dict[str, Real]:
-        """Fundamentals, modal frequency and damping of every point; conventions of `PeriodicResponses`."""
+        """Return fundamentals, modal frequency and damping of every point; conventions of `PeriodicResponses`."""
         shape = float(self.rig.linear_modes.drive_shape[self.mode])
         amplitude = np.abs(drive[:, 1])
         q = amplitude / shape
@@ -106,7 +109,7 @@ class Evaluation:
         }
 
     def _flags(self, beyond: NDArray[np.bool_], voltage: Real, sensors: Complex) -> NDArray[np.int64]:
-        """Flags that a run of the rig would raise."""
+        """Return the flags that a run of the rig would raise."""
         rig, series = self.rig, Series(self.balance.series.harmonics, 128)
         converter = rig.converter
         flags = np.where(beyond, int(Flag.LAW_RANGE), 0)

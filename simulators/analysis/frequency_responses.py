@@ -1,4 +1,4 @@
-"""Frequency responses of the linear rig: elements at their linear stiffness, joints stuck."""
+"""Frequency responses of the linear rig, with elements at their linear stiffness and joints stuck."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrequencyResponses:
-    """Frequency responses of a rig, ``Y = H U`` for ``exp(i w t)``; of what sensors are exposed to, not of their signals."""
+    """Frequency responses of a rig, ``Y = H U`` for ``exp(i w t)``, to the true quantities, not to the sensors' signals."""
 
     frequency_hz: Real
     """Frequencies [n]."""
@@ -27,7 +27,7 @@ class FrequencyResponses:
     force_n_per_v: Complex
     """Stinger force per voltage [n]."""
     sensor_per_v: dict[str, Complex]
-    """What each sensor is exposed to per voltage, by channel name [n], N/V or m/s^2/V."""
+    """True quantity at each sensor per voltage, by channel name [n], N/V or m/s^2/V."""
     displacement_m_per_v: dict[str, Complex]
     """Displacement of each named point per voltage [n]."""
     receptance_m_per_n: dict[str, Complex]
@@ -38,21 +38,22 @@ class FrequencyResponses:
 
     @property
     def accelerance_per_kg(self) -> dict[str, Complex]:
-        """Acceleration of each named point per force at the drive point, structure alone [n] (m/s^2/N = 1/kg)."""
+        """Return the acceleration of each named point per force at the drive point, structure alone [n] (m/s^2/N = 1/kg)."""
         omega = 2.0 * np.pi * self.frequency_hz
         return {at: -(omega**2) * receptance for at, receptance in self.receptance_m_per_n.items()}
 
 
 def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool = False) -> FrequencyResponses:
-    """Linear frequency responses at the given frequencies [n].
+    """Return the linear frequency responses at the given frequencies [n].
 
-    With ``held`` as the converter has it: every image of the held voltage above half the sample rate that a sampled
-    output folds back is in it. Near a lightly damped resonance the force is so small that these images tell.
+    ``held`` takes the voltage as held by the converter between samples. The images of the held voltage above half the sample
+    rate, which sampling folds back, are then included. Near a lightly damped resonance the force is so small that these images
+    matter.
 
     Raises
     ------
     ValueError
-        On frequencies that are not above 0, or, held, not below half the sample rate.
+        If a frequency is not above 0 or, with ``held``, not below half the sample rate.
     """
     frequencies = positive("frequencies_hz", frequencies_hz)
     plant, points, rate_hz = rig.plant, rig.structure.points, rig.converter.sample_rate_hz
@@ -79,19 +80,19 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
 
 
 def _states(transition: Real, column: Real, z: Complex) -> Complex:
-    """``(z - A)^-1 b`` for every z [n_frequency, n]."""
+    """Return ``(z - A)^-1 b`` for every z [n_frequency, n]."""
     left = z[:, None, None] * np.eye(column.size) - transition
     return np.asarray(np.linalg.solve(left, np.broadcast_to(column[:, None], (z.size, column.size, 1)))[..., 0])
 
 
 def _held_states(plant: LinearPlant, s: Complex, step_s: float) -> Complex:
-    """``(e^{sT} - e^{AT})^-1 Gamma``: the state at the samples under a voltage held in between [n_frequency, n]."""
+    """Return ``(e^{sT} - e^{AT})^-1 Gamma``: state at the sample instants under a held voltage [n_frequency, n]."""
     phi = phi_matrices(plant.dynamics, plant.voltage_column[:, None], step_s)
     return _states(phi.transition, phi.held[:, 0], np.exp(s * step_s))
 
 
 def _receptances(plant: LinearPlant, shapes: dict[str, Real], s: Complex) -> dict[str, Complex]:
-    """``phi_p (s^2 + s C + K)^-1 phi_d`` of every point p."""
+    """Return ``phi_p (s^2 + s C + K)^-1 phi_d`` for every point p."""
     m = plant.n_mode
     left = s[:, None, None] * np.diag(plant.modal_damping) + plant.modal_stiffness + (s**2)[:, None, None] * np.eye(m)
     drive = np.broadcast_to(plant.drive_shape[:, None], (s.size, m, 1))

@@ -1,12 +1,12 @@
-"""Harmonic balance of the coupled rig, coil, armature and stinger included: an independent truth for tests.
+"""Harmonic balance of the coupled rig including coil, armature and stinger: an independent reference for tests.
 
-The rig is driven by the pure voltage ``u = U cos(theta)`` in continuous time. Its linear part is solved exactly per
-harmonic, the nonlinear sites by alternating frequency-time (Cameron & Griffin 1989) with ``samples`` per period;
-friction carries its memory over two periods from the virgin state, the second of which counts. Where a site leaves the
-range in which its law holds, the point is flagged. Of a rig that scatters it is the nominal specimen that is analysed;
-``rig.realised(seed)`` is that of one run.
+The rig is driven by the sinusoidal voltage ``u = U cos(theta)`` in continuous time. The linear part is solved exactly per
+harmonic. The nonlinear sites are evaluated by alternating frequency-time (Cameron & Griffin 1989) with ``samples`` per period.
+Friction is integrated over two periods from the virgin state, and the second period is used. If a site leaves the range in
+which its law holds, the point is flagged. For a rig with scatter the nominal specimen is analysed; ``rig.realised(seed)`` is
+the specimen of one run.
 
-Lags are those of the drive point's acceleration behind the stinger force, fundamentals: -90 deg is phase resonance.
+Phase lags are those of the drive point's acceleration behind the stinger force (fundamentals); -90 deg is phase resonance.
 """
 
 from typing import Literal
@@ -44,7 +44,7 @@ def phase_resonance_backbone(
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
 ) -> PeriodicResponses:
-    """Vibrations at phase resonance, or at any other lag, one per level, each followed from the one before.
+    """Compute the vibration at phase resonance, or at another lag, for each level; each level continues from the previous one.
 
     Parameters
     ----------
@@ -59,20 +59,20 @@ def phase_resonance_backbone(
         Lag held, -179 to -1.
     excitation
         ``exciter``: the coupled rig under a pure voltage, whose force has harmonics. ``pure-sine``: the structure alone
-        under a sinusoidal force at the drive point, given by ``forces_n``; a property of the structure, of no exciter.
+        under a sinusoidal force at the drive point, given by ``forces_n``; the result does not depend on an exciter.
     near_hz
         The linear mode of the structure nearest to this frequency is followed. Default: the lowest that moves a
         nonlinear site.
     harmonics, samples
-        Highest harmonic, and samples per period (at least four per harmonic). ``neglected_share`` of the result says
-        how much is left out; ask for more where that matters.
+        Highest harmonic, and samples per period (at least four per harmonic). ``neglected_share`` of the result tells how much
+        the higher harmonics contribute; increase ``harmonics`` if that is too much.
 
     Raises
     ------
     ValueError
         On values that are not allowed, by name.
     NotConvergedError
-        Where a level is out of reach: says which; the points before it are in ``found``.
+        If a level cannot be reached; the message names the level, and ``found`` holds the points before it.
     """
     held, values = levels(forces_n, voltages_v, amplitudes_m)
     if excitation not in ("exciter", "pure-sine"):
@@ -96,12 +96,12 @@ def constant_force_response(
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
 ) -> PeriodicResponses:
-    """Frequency response at constant force, from below to above resonance, unstable branch included.
+    """Compute the frequency response at constant force, from below to above resonance, including the unstable branch.
 
-    The phase lag is the path parameter: it grows along the whole curve, so that folds of the frequency need no arc
-    length. ``stable`` tells the branches that a test with constant force and slowly swept frequency can hold from those
-    between the folds, where the frequency falls: static stability of the fundamental. Bifurcations to other periods, and
-    the stability of a control loop, are not looked at.
+    The phase lag is the path parameter. It grows along the whole curve, so that folds of the frequency need no arc-length
+    continuation. ``stable`` marks the branches that a test with constant force and slowly swept frequency can hold; the branch
+    between the folds, where the frequency falls, is unstable. This is the static stability of the fundamental. Bifurcations to
+    other periods and the stability of a control loop are not examined.
 
     Parameters
     ----------
@@ -112,8 +112,8 @@ def constant_force_response(
     phase_lags_deg
         Lags, -179 to -1, rising. Default: 86 from -175 to -5, both ends far off resonance.
     quantity
-        What ``force_n`` is: the peak of the ``fundamental``, or the ``rms`` of all harmonics from the first on. The mean is
-        left out, as piezoelectric sensors see none.
+        Meaning of ``force_n``: the peak of the ``fundamental``, or the ``rms`` of all harmonics from the first on, without the
+        mean, which piezoelectric sensors do not measure.
     near_hz, harmonics, samples
         As for `phase_resonance_backbone`.
 
@@ -122,7 +122,7 @@ def constant_force_response(
     ValueError
         On values that are not allowed, by name.
     NotConvergedError
-        Where the force is out of reach or the path ends: says where. ``found`` holds the points in between.
+        If the force cannot be reached or the path ends; the message says where. ``found`` holds the points found.
     """
     force, held = float(positive("force_n", [force_n])[0]), held_force(quantity)
     lags = _lags(phase_lags_deg)
@@ -140,7 +140,7 @@ def constant_displacement_response(
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
 ) -> PeriodicResponses:
-    """Vibrations at constant amplitude of the drive point's displacement: what a response-controlled test steps through.
+    """Compute vibrations at constant displacement amplitude of the drive point, as in a response-controlled stepped test.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def constant_displacement_response(
     phase_lags_deg
         Lags, -179 to -1, rising. Default, without frequencies: 86 from -175 to -5.
     frequencies_hz
-        Frequencies [n] instead of lags, in any order; the first is approached at its own frequency from rest.
+        Frequencies [n] instead of lags, in any order; the first point is approached from rest at its frequency.
     near_hz, harmonics, samples
         As for `phase_resonance_backbone`.
 
@@ -160,7 +160,7 @@ def constant_displacement_response(
     ValueError
         On values that are not allowed, by name.
     NotConvergedError
-        Where the amplitude is out of reach: says where. ``found`` holds the points found before.
+        If the amplitude cannot be reached; the message says where. ``found`` holds the points found before.
     """
     amplitude = float(positive("amplitude_m", [amplitude_m])[0])
     if phase_lags_deg is not None and frequencies_hz is not None:
@@ -182,9 +182,10 @@ def forced_response(
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
 ) -> PeriodicResponses:
-    """Response to a constant voltage, frequency by frequency: what a slow uncontrolled sweep in that order sees.
+    """Compute the response to a constant voltage at each frequency, as in a slow sweep without control in this order.
 
-    Each point is followed from the one before; where the branch ends, as a sweep would jump, from rest at that frequency.
+    Each point continues from the previous one. Where the branch ends and a sweep would jump, the point is reached from rest at
+    its frequency.
 
     Parameters
     ----------
@@ -204,7 +205,7 @@ def forced_response(
     ValueError
         On values that are not allowed, by name.
     NotConvergedError
-        Where nothing is found at a frequency: says which; the points before it are in ``found``.
+        If no vibration is found at a frequency; the message names it, and ``found`` holds the points before it.
     """
     voltage = float(positive("voltage_v", [voltage_v])[0])
     omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
@@ -213,6 +214,6 @@ def forced_response(
 
 
 def _lags(phase_lags_deg: ArrayLike | None) -> NDArray[np.float64]:
-    """Rising lags in radians; without any, over the whole curve."""
+    """Return rising lags in radians; by default lags over the whole curve."""
     asked = np.linspace(*_FROM_BELOW_TO_ABOVE, _LAGS) if phase_lags_deg is None else phase_lags_deg
     return lags_rad("phase_lags_deg", asked, rising=True)

@@ -1,4 +1,4 @@
-"""Compiled forces of nonlinear sites over one period of a given motion, with what their Jacobian is made of."""
+"""Compiled forces of nonlinear sites over one period of a given motion, with their derivatives."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from vibrolock.compiled import kernel
 
 @kernel
 def clip(value: float, limit: float) -> float:
-    """``value`` within plus and minus ``limit``."""
+    """Return ``value`` limited to plus and minus ``limit``."""
     return min(max(value, -limit), limit)
 
 
@@ -25,11 +25,11 @@ def memoryless_over_a_period(
     forces: NDArray[np.float64],
     slopes: NDArray[np.float64],
 ) -> bool:
-    """Forces [N, m] of the sites without memory under ``motion`` [N, m], and ``slopes`` [N, m, m] by central differences.
+    """Evaluate the sites without memory under ``motion`` [N, m]: fill ``forces`` [N, m] and ``slopes`` [N, m, m].
 
-    ``slopes[n, i, j]`` is the change of force i with coordinate j, so that sites may act on each other. ``steps`` [m]
-    are the half steps of the differences, ``moved`` [m] and ``pair`` [2, m] scratch. True where a site is beyond its
-    range.
+    ``slopes[n, i, j]`` is the derivative of force i by coordinate j, by central differences; sites may act on each other.
+    ``steps`` [m] are the half steps of the differences; ``moved`` [m] and ``pair`` [2, m] are scratch. Return whether a site
+    left its range.
     """
     beyond = False
     for n in range(motion.shape[0]):
@@ -57,13 +57,13 @@ def friction_over_a_period(
     force: NDArray[np.float64],
     tangent: NDArray[np.float64],
 ) -> None:
-    """Force [N] of one Jenkins site over the second of two periods from the virgin state, and its ``tangent`` [N, P].
+    """Fill ``force`` [N] of one Jenkins site over the second of two periods from the virgin state, and ``tangent`` [N, P].
 
-    ``elements`` [2, n_element]: stiffness and slip force; ``deflection`` [N]: one period of the coordinate; ``basis``
-    [N, P]: its derivative by its coefficients. ``held`` and ``turned_at`` [n_element] are scratch. As in the plant, the
-    site acts minus its stuck linear part: ``sum_j k_j delta - f_j`` with ``f_j <- clip(f_j + k_j d(delta), +-limit_j)``.
-    An element that last slipped at sample s has moved by ``k (delta_n - delta_s)`` since; the derivative of the site is
-    therefore ``sum_j k_j basis_s(j)``, and one that never slipped leaves none.
+    ``elements`` [2, n_element]: stiffness and slip force. ``deflection`` [N]: one period of the coordinate. ``basis`` [N, P]:
+    derivative of the deflection by its coefficients. ``held`` and ``turned_at`` [n_element] are scratch. As in the plant, the
+    site's force excludes its stuck linear part: ``sum_j k_j delta - f_j`` with ``f_j <- clip(f_j + k_j d(delta), +-limit_j)``.
+    The force of an element that last slipped at sample s has changed by ``k (delta_n - delta_s)`` since. The derivative of the
+    site's force is therefore ``sum_j k_j basis_s(j)``; an element that never slipped contributes nothing.
     """
     n_sample, n_coefficient = basis.shape
     n_element = held.size

@@ -1,4 +1,4 @@
-"""Paths of periodic vibrations of one rig: prediction along the tangent, steps halved where Newton does not converge."""
+"""Paths of periodic vibrations of one rig: predict along the tangent, and halve steps where Newton's method fails."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -22,15 +22,15 @@ _NEARLY_LINEAR = 1e-3
 _DEEPEST = 8
 _LARGEST_LAG_STEP = 0.6
 _LARGEST_LEVEL_RATIO = 4.0
-"""With larger steps of the lag (rad) or the level Newton may converge to another vibration of the same conditions."""
+"""Largest steps of the lag (rad) and the level; beyond, Newton may converge to another vibration of the same conditions."""
 
 
 def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solution:
-    """The vibration at ``goal`` that is reached from rest as the level rises at constant lag or frequency.
+    """Return the vibration at ``goal`` that is reached from rest by raising the level at constant lag or frequency.
 
-    It starts at ``omega_rad_s``: the frequency of the goal, or that of resonance, from which the lag is then turned. With a
-    held response the level rises at resonance and the lag is turned afterwards, because away from resonance the response takes
-    more force and more vibrations exist.
+    The path starts at ``omega_rad_s``: the frequency of the goal or, if a lag is held, the resonance frequency, from which the
+    lag is then changed. With a held response the level is raised at resonance and the lag is changed afterwards, because away
+    from resonance the response needs more force and several vibrations may exist.
     """
     low = replace(goal, level=_NEARLY_LINEAR * goal.level)
     if goal.held == "response" and goal.at == "lag":
@@ -42,7 +42,7 @@ def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solutio
 
 
 def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -> Solution:
-    """The vibration at ``goal`` on the branch of ``here``; raises `NotConvergedError` if the branch does not reach it."""
+    """Return the vibration at ``goal`` on the branch of ``here``; raise `NotConvergedError` if the branch does not reach it."""
     now = here.conditions
     if _far(now, goal):
         return follow(balance, follow(balance, here, now.halfway_to(goal)), goal)
@@ -59,7 +59,7 @@ def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -
 
 
 def _far(now: Conditions, goal: Conditions) -> bool:
-    """Whether a step is too large to be tried as a whole."""
+    """Return whether a step is too large to be tried at once."""
     ratio = abs(math.log(goal.level / now.level))
     return ratio > math.log(_LARGEST_LEVEL_RATIO) or (
         goal.at == "lag" and abs(goal.value - now.value) > _LARGEST_LAG_STEP
@@ -78,21 +78,21 @@ class ModePaths:
     def of(
         cls, rig: VirtualRig, near_hz: float | None, harmonics: int, samples: int, *, pure_sine: bool = False
     ) -> "ModePaths":
-        """Paths of the mode nearest to ``near_hz``; the arguments are checked."""
+        """Return the paths of the mode nearest to ``near_hz``, after a check of the arguments."""
         balance = Balance(rig, *checked_harmonics(harmonics, samples), pure_sine=pure_sine)
         mode = followed_mode(rig, near_hz)
         resonance = 2.0 * np.pi * float(rig.linear_modes.frequency_hz[mode])
         return cls(balance, Evaluation(rig, balance, mode), resonance)
 
     def path(self, goals: Sequence[Conditions]) -> list[Solution]:
-        """One vibration per goal; raises `NotConvergedError` with those found before."""
+        """Return one vibration per goal; raise `NotConvergedError` with the vibrations found before a failure."""
         solutions, failure = self.tried(goals)
         if failure is not None:
             raise NotConvergedError(str(failure), self.evaluation(solutions) if solutions else None) from failure
         return solutions
 
     def over_lags(self, goals: Sequence[Conditions]) -> PeriodicResponses:
-        """One vibration per goal (one level, rising lags), followed in both directions from the goal nearest to resonance."""
+        """Return one vibration per goal (one level, rising lags), followed both ways from the goal nearest to resonance."""
         nearest = int(np.argmin([abs(goal.value - _RESONANCE_RAD) for goal in goals]))
         above, failure = self.tried(goals[nearest:])
         if not above:
@@ -106,7 +106,7 @@ class ModePaths:
     def tried(
         self, goals: Iterable[Conditions], here: Solution | None = None
     ) -> tuple[list[Solution], NotConvergedError | None]:
-        """Vibrations up to the first that is not found, and its error."""
+        """Return the vibrations up to the first goal that fails, and the error of that goal or None."""
         solutions: list[Solution] = []
         for goal in goals:
             try:

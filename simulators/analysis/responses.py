@@ -1,4 +1,4 @@
-"""Periodic vibrations of a coupled rig as data, one entry per point, and the error for those that are not found."""
+"""Periodic vibrations of a coupled rig as data, one entry per point, and the error if a vibration is not found."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeriodicResponses:
-    """Periodic vibrations under ``u = U cos(theta)``; every harmonic Y_h is that of ``y = Re sum_h Y_h exp(i h theta)``.
+    """Periodic vibrations under ``u = U cos(theta)``; harmonics Y_h are defined by ``y = Re sum_h Y_h exp(i h theta)``.
 
-    All values are the true ones of the rig in continuous time: without sensors' high-pass, noise, and the hold of the
-    converter (which costs the fundamental of the voltage ``sin(x)/x, x = pi f / sample_rate``).
+    All values are true values of the rig in continuous time, without the sensors' high-pass, noise, and the hold of the
+    converter (which reduces the fundamental of the voltage by ``sin(x)/x, x = pi f / sample_rate``).
     """
 
     frequency_hz: Real
@@ -30,7 +30,7 @@ class PeriodicResponses:
     phase_lag_deg: Real
     """Lag ``arg F_1 - arg A_1`` of the drive point's acceleration behind the force [n], -180 to 180; -90 is resonance."""
     modal_frequency_hz: Real
-    """Modal frequency w of the one-mode equation ``(w^2 - W^2 + 2 i W w z) q = phi_d F`` [n], as identification has it."""
+    """Modal frequency w of the one-mode equation ``(w^2 - W^2 + 2 i W w z) q = phi_d F`` [n], as in identification."""
     modal_amplitude: Real
     """q = ``|X_d1| / phi_d`` [n] (kg^1/2 m), phi_d of the followed linear mode at the drive point."""
     damping_ratio: Real
@@ -48,23 +48,26 @@ class PeriodicResponses:
     site_harmonics: Complex
     """Coordinate of each nonlinear site [n, n_site, H + 1], in the order of ``rig.plant.site_rows``."""
     site_force_harmonics: Complex
-    """Force of each nonlinear site [n, n_site, H + 1], minus the linear part that the linear plant holds."""
+    """Force of each nonlinear site [n, n_site, H + 1], without the linear part that belongs to the linear plant."""
     neglected_share: Real
-    """Neglected share [n]: RMS of the force harmonics H + 1 to 2 H + 1 that the motion causes, over the fundamental."""
+    """RMS of the force harmonics H + 1 to 2 H + 1 that the motion would cause, over the fundamental [n]."""
     flags: NDArray[np.int64]
-    """`simulators.layout.Flag` bits [n]: site out of its range, sensor or output clipped (neither clips here)."""
+    """`simulators.layout.Flag` bits [n] that a run would raise: site out of its range, sensor or output clipped.
+
+    The harmonic balance itself does not clip."""
     stable: NDArray[np.bool_] | None = None
     """Stable at constant frequency and constant held level, judged by the folds of the curve [n]."""
     stable_under_voltage: NDArray[np.bool_] | None = None
     """Stable at constant frequency and voltage [n]; None where the force itself was imposed."""
     level_slope: Real | None = None
-    """``d ln(level) / d ln(U)`` [n] of the level held, at the lag or frequency held; None where the force was imposed.
+    """``d ln(level) / d ln(U)`` [n] of the held level, at the held lag or frequency; None where the force was imposed.
 
-    A loop that adjusts the voltage by the level sees this slope: where it is negative, no gain of the usual sign holds."""
+    It is the static gain for a loop that adjusts the voltage by the level; if it is negative, no gain of the usual sign is
+    stable."""
 
     @property
     def frequency_shift(self) -> float:
-        """Modal frequency at the largest amplitude over that at the smallest, minus one."""
+        """Modal frequency at the largest amplitude divided by that at the smallest amplitude, minus one."""
         smallest, largest = int(np.argmin(self.amplitude_m)), int(np.argmax(self.amplitude_m))
         return float(self.modal_frequency_hz[largest] / self.modal_frequency_hz[smallest] - 1.0)
 
@@ -74,7 +77,7 @@ class PeriodicResponses:
         return np.asarray(np.sqrt(0.5 * np.sum(np.abs(self.force_harmonics_n[:, 1:]) ** 2, axis=1)))
 
     def force_harmonic_ratio(self, harmonic: int) -> Real:
-        """``|F_h / F_1|`` [n]; `ValueError` beyond the harmonics there are."""
+        """Return ``|F_h / F_1|`` [n]; raise `ValueError` if the harmonic was not computed."""
         highest = self.force_harmonics_n.shape[1] - 1
         if not 0 <= harmonic <= highest:
             raise ValueError(f"harmonic = {harmonic}: allowed is 0 to {highest}")
@@ -88,18 +91,18 @@ class HysteresisLoop:
     coordinate: Real
     """Coordinate of the joint [N + 1]: m, or modal (kg^1/2 m) where the joint is relative to mode 1."""
     force: Real
-    """Sum of the forces of its elements [N + 1], linear part included: N, or the force that belongs to the coordinate."""
+    """Sum of the forces of the joint's elements [N + 1], linear part included: N, or the force conjugate to the coordinate."""
 
     @property
     def dissipated_j(self) -> float:
-        """Energy lost per period (J): the area of the loop."""
+        """Energy dissipated per period (J): the area of the loop."""
         return float(np.sum(0.5 * (self.force[1:] + self.force[:-1]) * np.diff(self.coordinate)))
 
 
 class NotConvergedError(ArithmeticError):
-    """No periodic vibration was found at a point asked for: the level is out of reach, or the path ends.
+    """No periodic vibration was found at a requested point: the level cannot be reached, or the path ends.
 
-    The message names the point. ``found`` holds the points found before, in the order asked for; None if there are none.
+    The message names the point. ``found`` holds the points found before, in the requested order; None if there are none.
     """
 
     def __init__(self, message: str, found: "PeriodicResponses | None" = None) -> None:

@@ -1,6 +1,6 @@
 """Forces of all nonlinear sites under a periodic motion: alternating frequency-time (Cameron & Griffin 1989).
 
-The file also holds the Fourier series that this method needs and the hysteresis loops of friction joints that it gives.
+The module also contains the Fourier series of this method, and the hysteresis loops of friction joints that follow from it.
 """
 
 from functools import cached_property
@@ -20,7 +20,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _RELATIVE_STEP = 6e-6
-"""Half step of the central differences over the size of the motion, near the cube root of the rounding error."""
+"""Half step of the central differences relative to the motion's amplitude, near the cube root of the rounding error."""
 _SMALLEST_STEP = 1e-15
 
 
@@ -38,29 +38,29 @@ class Series:
 
     @cached_property
     def basis(self) -> Real:
-        """Samples from coefficients [N, P]."""
+        """Matrix [N, P] from coefficients to samples."""
         angles = np.outer(2.0 * np.pi * np.arange(self.samples) / self.samples, self.orders[1:])
         return np.ascontiguousarray(np.hstack([np.ones((self.samples, 1)), np.cos(angles), -np.sin(angles)]))
 
     @cached_property
     def projection(self) -> Real:
-        """Coefficients from samples [P, N]."""
+        """Matrix [P, N] from samples to coefficients."""
         projection = self.basis.T * (2.0 / self.samples)
         projection[0] *= 0.5
         return np.ascontiguousarray(projection)
 
     def to_complex(self, coefficients: Real) -> Complex:
-        """Harmonics [n, H + 1, ...] from coefficients [n, P, ...]."""
+        """Return harmonics [n, H + 1, ...] from coefficients [n, P, ...]."""
         packed = coefficients[:, : self.harmonics + 1].astype(np.complex128)
         packed[:, 1:] += 1j * coefficients[:, self.harmonics + 1 :]
         return packed
 
     def to_real(self, harmonics: Complex) -> Real:
-        """Coefficients [n, P, ...] from harmonics [n, H + 1, ...]."""
+        """Return coefficients [n, P, ...] from harmonics [n, H + 1, ...]."""
         return np.concatenate([harmonics.real, harmonics[:, 1:].imag], axis=1)
 
     def waveforms(self, harmonics: Complex) -> Real:
-        """Samples [n, N] from harmonics [n, H + 1]."""
+        """Return samples [n, N] from harmonics [n, H + 1]."""
         return np.asarray(self.to_real(harmonics) @ self.basis.T)
 
 
@@ -68,7 +68,7 @@ class SiteWaves(NamedTuple):
     """Forces of the sites over one period, and their derivatives by the coefficients of the motion."""
 
     forces: Real
-    """Forces on the structure [n_site, N], minus the linear parts that the linear plant holds."""
+    """Forces on the structure [n_site, N], without the linear parts that belong to the linear plant."""
     jacobian: Real
     """Derivative of the force coefficients by the coefficients of the coordinates [n_site, P, n_site, P]."""
     beyond: bool
@@ -88,7 +88,7 @@ class SiteForces:
         ]
 
     def __call__(self, series: Series, coefficients: Real) -> SiteWaves:
-        """Forces under coordinates with the given coefficients [n_site, P]."""
+        """Return the forces for site coordinates with the given coefficients [n_site, P]."""
         motion = np.ascontiguousarray(coefficients @ series.basis.T)
         forces = np.zeros((self.n_site, series.samples))
         jacobian = np.zeros((self.n_site, series.size, self.n_site, series.size))
@@ -102,7 +102,7 @@ class SiteForces:
         return SiteWaves(forces, jacobian, beyond)
 
     def _local(self, series: Series, motion: Real, forces: Real, jacobian: Real) -> bool:
-        """Sites without memory, which may act on each other."""
+        """Fill forces and Jacobian of the sites without memory, which may act on each other; return whether one is beyond."""
         n = self.n_local
         if n == 0:
             return False
@@ -119,7 +119,7 @@ class SiteForces:
 def hysteresis_loops(
     rig: VirtualRig, responses: PeriodicResponses, point: int, *, samples: int = 512
 ) -> tuple[HysteresisLoop, ...]:
-    """Loops of all friction joints of ``rig`` at one point of its responses, in the order of ``rig.friction``."""
+    """Return the loops of all friction joints of ``rig`` at one point of its responses, in the order of ``rig.friction``."""
     n_point, _, n_harmonic = responses.site_harmonics.shape
     if not -n_point <= point < n_point:
         raise ValueError(f"point = {point}: allowed is {-n_point} to {n_point - 1}")

@@ -1,8 +1,8 @@
 """Assembly of the coupled plant (linear part, site coordinates, outputs), and checks that it is physical and integrable.
 
 State ``x = [q, q', x_a, v_a, i]``: modal coordinates of the structure, armature, coil current; n = 2 n_mode + 3. Inputs:
-the voltage u and the nonlinear site forces f. The linear stiffness of local elements is part of the linear plant: left in the
-site force it would cost 8 % of the force and 0.18 percentage points of damping at a step of 0.2 ms.
+the voltage u and the nonlinear site forces f. The linear stiffness of local elements belongs to the linear plant. As part of
+the site force it would cause errors of 8 % of the force and 0.18 percentage points of damping at a step of 0.2 ms.
 """
 
 import math
@@ -23,17 +23,17 @@ __all__ = ["LinearPlant", "assemble", "check_elements", "check_plant", "check_st
 
 Matrix = NDArray[np.float64]
 LARGEST_STEP = 0.5
-"""Integration step times angular frequency of the stiffest element on the structure's modes. A contact then lasts at
-least six steps, and a hard bounce changes its energy by at most 8 % (1 % at 0.2, 0.3 % at 0.1)."""
+"""Largest product of the integration step and the angular frequency of the stiffest element on the structure's modes. A contact
+then lasts at least six steps, and a hard bounce changes the energy by at most 8 % (1 % at 0.2, 0.3 % at 0.1)."""
 GROWTH = 1e-6
-"""Real part of a pole over the size of the largest one that still counts as rounding."""
+"""Largest real part of a pole, relative to the modulus of the largest pole, that counts as rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
     """The coupled plant ``x' = A x + b_u u + B_f f`` with site coordinates ``C_s x``.
 
-    Sites are elements, the exciter's own, joints, in this order.
+    The order of the sites is: elements, the exciter's own sites, joints.
     """
 
     dynamics: Matrix
@@ -45,9 +45,9 @@ class LinearPlant:
     site_rows: Matrix
     """C_s [n_site, n]; of an element (m, m/s), of the exciter (m, m/s, A), of a joint."""
     n_local: int
-    """Number of sites without memory, which come first: elements, then the exciter's own."""
+    """Number of sites without memory, which come first: elements, then the exciter's own sites."""
     modal_stiffness: Matrix
-    """Stiffness of the structure in its modal coordinates [n_mode, n_mode], that of the elements included (s^-2)."""
+    """Stiffness of the structure in modal coordinates [n_mode, n_mode], including the elements' linear stiffness (s^-2)."""
     modal_damping: Matrix
     """Damping ``2 zeta_i w_i`` [n_mode] (1/s)."""
     stinger_row: Matrix
@@ -63,17 +63,17 @@ class LinearPlant:
         return self.drive_shape.size
 
     def force_row(self) -> Matrix:
-        """Row [n + 1 + n_site] that reads the stinger force (N) off ``[x, u, f]``."""
+        """Return the row [n + 1 + n_site] that gives the stinger force (N) from ``[x, u, f]``."""
         return np.concatenate([self.stinger_row, np.zeros(1 + self.site_rows.shape[0])])
 
     def acceleration_row(self, shape: Matrix) -> Matrix:
-        """Row that reads the acceleration (m/s^2) of a point with the given mode shapes off ``[x, u, f]``."""
+        """Return the row that gives the acceleration (m/s^2) of a point with the given mode shapes from ``[x, u, f]``."""
         accelerations = slice(self.n_mode, 2 * self.n_mode)
         forces = shape @ self.site_columns[accelerations]
         return np.concatenate([shape @ self.dynamics[accelerations], [0.0], forces])
 
     def displacement_row(self, shape: Matrix) -> Matrix:
-        """Row that reads the displacement (m) of a point with the given mode shapes off ``[x, u, f]``."""
+        """Return the row that gives the displacement (m) of a point with the given mode shapes from ``[x, u, f]``."""
         row = np.zeros(self.dynamics.shape[0] + 1 + self.site_rows.shape[0])
         row[: self.n_mode] = shape
         return row
@@ -86,7 +86,7 @@ def assemble(
     exciter: Exciter,
     stinger: Stinger,
 ) -> LinearPlant:
-    """The linear part of the coupled plant, with every mode turned so that the drive point moves forward in it."""
+    """Return the linear part of the coupled plant; the sign of every mode is chosen so that the drive point moves forward."""
     omega = structure.omega_rad_s
     signs = np.where(structure.shape(stinger.at) < 0.0, -1.0, 1.0)
     drive = signs * structure.shape(stinger.at)
@@ -129,7 +129,7 @@ def assemble(
 
 
 def _dynamics(stiffness: Matrix, damping: Matrix, drive: Matrix, exciter: Exciter, force: Matrix) -> Matrix:
-    """A of the structure, the exciter and the stinger between them."""
+    """Return the matrix A of structure, exciter and the stinger between them."""
     m = drive.size
     q, v = slice(0, m), slice(m, 2 * m)
     x_a, v_a, i = 2 * m, 2 * m + 1, 2 * m + 2
@@ -153,7 +153,7 @@ def _dynamics(stiffness: Matrix, damping: Matrix, drive: Matrix, exciter: Excite
 
 
 def _corner(exciter: Exciter) -> float:
-    """Corner of the loop of a current amplifier (rad/s)."""
+    """Return the corner of a current amplifier's loop (rad/s)."""
     return 2.0 * np.pi * exciter.bandwidth_hz
 
 
@@ -171,7 +171,7 @@ def computable(parts: str) -> Iterator[None]:
 
 
 def check_elements(elements: Sequence[Element], plant: LinearPlant) -> None:
-    """Raise `ValueError` if an element's coordinate does not move or a stop stands behind a magnet."""
+    """Raise `ValueError` if an element's coordinate does not move or a stop lies beyond a magnet."""
     for i, element in enumerate(elements):
         if element.at == element.to:
             raise ValueError(f"elements[{i}].to = {element.to!r}: allowed is another point than at")
@@ -211,10 +211,10 @@ def check_plant(plant: LinearPlant) -> None:
 
 
 def check_step(elements: Sequence[Element], plant: LinearPlant, rate_hz: float, substeps: int) -> None:
-    """Raise `ValueError`, with a sufficient step, if the slope of an element is too steep for the integration step.
+    """Raise `ValueError`, naming a sufficient step, if the slope of an element is too steep for the integration step.
 
-    Only the linear plant is integrated exactly. The force of an element takes a second-order predictor-corrector, whose step h
-    must resolve ``w_e^2 = k_e sum_i row_i^2``, or ``c_e sum_i row_i^2`` for an element of velocity.
+    Only the linear plant is integrated exactly. The force of an element is integrated by a second-order predictor-corrector,
+    whose step h must resolve ``w_e^2 = k_e sum_i row_i^2``, or the rate ``c_e sum_i row_i^2`` of an element of velocity.
     """
     for i, element in enumerate(elements):
         mobility = float(plant.site_rows[i] @ plant.site_rows[i])

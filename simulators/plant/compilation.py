@@ -1,4 +1,4 @@
-"""The arrays on which the compiled integrator runs, from the parts of a virtual rig; discretisation of the linear plant."""
+"""Building of the compiled integrator's arrays from the parts of a virtual rig, and discretisation of the linear plant."""
 
 import math
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ Matrix = NDArray[np.float64]
 
 
 class PhiMatrices(NamedTuple):
-    """The exact linear sub-step."""
+    """Matrices of the exact linear sub-step."""
 
     transition: Matrix
     """``e^{hA}`` [n, n]."""
@@ -47,9 +47,9 @@ class PhiMatrices(NamedTuple):
 
 
 def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrices:
-    """Matrix exponential, phi_1 and phi_2 by one exponential of an augmented matrix (Van Loan 1978).
+    """Return matrix exponential, phi_1 and phi_2 from one exponential of an augmented matrix (Van Loan 1978).
 
-    ``phi_1(z) = (e^z - 1)/z``, ``phi_2(z) = (e^z - 1 - z)/z^2``, formed without dividing.
+    ``phi_1(z) = (e^z - 1)/z`` and ``phi_2(z) = (e^z - 1 - z)/z^2`` are formed without a division.
     """
     n, k = columns.shape
     augmented = np.zeros((n + 2 * k, n + 2 * k))
@@ -61,7 +61,7 @@ def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrice
 
 
 class StepColumns(NamedTuple):
-    """The sub-step as the kernels run it, padded; rows are ``[joint coordinates, element coordinates, x]``."""
+    """Padded matrices of the sub-step for the kernels; rows are ``[joint coordinates, element coordinates, x]``."""
 
     predictor: Matrix
     """[n_input, n_row]."""
@@ -70,9 +70,9 @@ class StepColumns(NamedTuple):
 
 
 def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> StepColumns:
-    """Predictor and corrector, site coordinates folded in as rows of their own.
+    """Return predictor and corrector, extended by rows that give the site coordinates.
 
-    Joints are the last ``n_joint`` sites; their coordinates begin at row 0, where whole vectors can be loaded.
+    Joints are the last ``n_joint`` sites. Their coordinates begin at row 0, where aligned vectors can be loaded.
     """
     columns = np.column_stack([plant.voltage_column, plant.site_columns])
     phi = phi_matrices(plant.dynamics, columns, step_s)
@@ -83,7 +83,7 @@ def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> StepColumns
 
 
 def pad(matrix: Matrix, *, rows: bool = True) -> Matrix:
-    """Zeros added until both sizes (or the last alone) are multiples of the vector length."""
+    """Return the matrix padded with zeros until both sizes (or only the last) are multiples of the vector length."""
     n_row, n_column = matrix.shape
     padded = aligned((round_up(n_row) if rows else n_row, round_up(n_column)))
     padded[:n_row, :n_column] = matrix
@@ -91,7 +91,7 @@ def pad(matrix: Matrix, *, rows: bool = True) -> Matrix:
 
 
 def aligned(shape: int | tuple[int, ...]) -> Matrix:
-    """Zeros that begin where a cache line does, so that no vector of a compiled loop straddles two."""
+    """Return zeros aligned to a cache line, so that no vector of a compiled loop straddles two lines."""
     size = int(np.prod(shape))
     line = WIDTH
     whole = np.zeros(size + line)
@@ -100,7 +100,7 @@ def aligned(shape: int | tuple[int, ...]) -> Matrix:
 
 
 def round_up(size: int) -> int:
-    """The next multiple of the vector length."""
+    """Return ``size`` rounded up to a multiple of the vector length."""
     return -(-size // WIDTH) * WIDTH
 
 
@@ -143,18 +143,18 @@ def rig_arrays(
 def rediscretised(
     rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Matrix], converter: Converter
 ) -> RigArrays:
-    """The arrays of a rig with another plant of the same coordinates and sites; ``outputs``: one row per sensor, of it."""
+    """Return a rig's arrays for another plant with the same coordinates and sites; ``outputs``: one row per sensor."""
     step = step_columns(plant, n_joint, _step_s(converter))
     return rig._replace(step=step.predictor, correct=step.corrector, sense=pad(np.array(outputs).T))
 
 
 def _step_s(converter: Converter) -> float:
-    """Integration step (s)."""
+    """Return the integration step (s)."""
     return 1.0 / (converter.sample_rate_hz * converter.substeps)
 
 
 def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:
-    """Stiffness and slip force of every element [2, n_element, n_joint], padded with elements without stiffness."""
+    """Return stiffness and slip force of every element [2, n_element, n_joint], padded with elements of zero stiffness."""
     n_element = max((len(joint.stiffness) for joint in joints), default=0)
     table = aligned((2, n_element, round_up(len(joints))))
     for s, joint in enumerate(joints):
@@ -165,7 +165,7 @@ def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:
 
 
 def at_rest(rig: RigArrays) -> RigState:
-    """The state of a rig at rest at sample 0."""
+    """Return the state of a rig at rest at sample 0."""
     n_input, n_row = rig.step.shape
     return RigState(
         inputs=aligned(n_input),
@@ -188,7 +188,11 @@ def at_rest(rig: RigArrays) -> RigState:
 def _channel(
     sensor: Sensor, delay: int, converter: Converter, noise_scale: float
 ) -> tuple[float, float, float, float, float, float, int]:
-    """Low-pass ``y' = w_c (value - y)``, exact for a value that changes linearly from one internal instant to the next."""
+    """Return the record of a sensor's channel.
+
+    The sensor's high-pass subtracts the low-pass ``y' = w_c (value - y)``, exact for a value that changes linearly from one
+    internal instant to the next.
+    """
     x = 2.0 * np.pi * sensor.high_pass_hz / converter.internal_rate_hz
     hold = float(np.exp(-x))
     held_1 = -float(np.expm1(-x))
@@ -198,7 +202,7 @@ def _channel(
 
 
 def _converter(converter: Converter) -> NDArray[Any]:
-    """The one record of the converter."""
+    """Return the record of the converter."""
     return np.array(
         [
             (

@@ -1,12 +1,12 @@
 """Compiled plant: exact linear part, nonlinear site forces by a second-order exponential predictor-corrector (ETD2-PC).
 
-Over a sub-step of length h the linear part ``x' = A x + B_u u + B_f f`` is solved exactly for a held voltage u and a
-force f that changes linearly (Cox & Matthews 2002, exponential time differencing):
+Over a sub-step of length h the linear part ``x' = A x + B_u u + B_f f`` is solved exactly for a held voltage u and a force f
+that changes linearly (exponential time differencing, Cox & Matthews 2002):
 
     x_1 = e^{hA} x_0 + h phi_1(hA) (B_u u + B_f f_0) + h phi_2(hA) B_f (f_1 - f_0)
 
-The predictor takes f_1 = f_0, the corrector f_1 from the predicted site coordinates; the force is evaluated once more
-from the corrected ones and kept. Friction forces of the predictor are provisional: Jenkins elements are committed once.
+The predictor takes f_1 = f_0. The corrector takes f_1 from the predicted site coordinates. The force is then evaluated from the
+corrected coordinates and kept. Friction forces of the predictor are provisional: Jenkins elements are committed once.
 """
 
 from typing import Any
@@ -33,7 +33,7 @@ from vibrolock.lanes import WIDTH, greatest, least, load, spread, store
 
 
 def _call_at(typing: Any, address: Any, z: Any, parameters: Any) -> Any:
-    """``double (*)(double, const double *)`` at an address, called without any Python, for the user's own functions."""
+    """Call a user's function ``double (*)(double, const double *)`` at an address, without Python."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         double = ir.DoubleType()
@@ -49,7 +49,7 @@ call_at: Any = intrinsic(_call_at)
 
 @kernel
 def combine(columns: NDArray[np.float64], weights: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """``out = sum_j weights[j] columns[j]``; their number is even, their length a multiple of `WIDTH`."""
+    """Compute ``out = sum_j weights[j] columns[j]``; the number of columns is even, their length a multiple of `WIDTH`."""
     n_column, n_row = columns.shape
     for i in range(0, n_row, WIDTH):
         even, odd = spread(0.0), spread(0.0)
@@ -61,7 +61,7 @@ def combine(columns: NDArray[np.float64], weights: NDArray[np.float64], out: NDA
 
 @kernel
 def add_columns(columns: NDArray[np.float64], weights: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """``out += sum_j weights[j] columns[j]``, for any number of columns."""
+    """Compute ``out += sum_j weights[j] columns[j]``, for any number of columns."""
     n_column, n_row = columns.shape
     for i in range(0, n_row, WIDTH):
         total = load(out, i)
@@ -72,10 +72,10 @@ def add_columns(columns: NDArray[np.float64], weights: NDArray[np.float64], out:
 
 @kernel
 def magnet_force(site: Record, z: float) -> float:
-    """Force (N) of a magnet at deflection ``z`` (m).
+    """Return the force (N) of a magnet at deflection ``z`` (m).
 
     Scheel et al.: ``-K0/(d0-z)^4 + K0/d0^4`` one-sided, ``-K0/(d0-z)^4 + K0/(d0+z)^4`` symmetric. Beyond the limit of
-    validity the force goes on along its tangent, so that it stays finite; the sample is flagged.
+    validity the force continues along its tangent, so that it stays finite; the sample is flagged.
     """
     held = min(max(z, -site.limit), site.limit)
     near = 1.0 / (site.gap - held)
@@ -94,7 +94,7 @@ def magnet_force(site: Record, z: float) -> float:
 
 @kernel
 def local_force(site: Record, z: float) -> float:
-    """Force (N) of one site without memory at coordinate ``z`` (m or m/s), minus its linear part.
+    """Return the force (N) of one site without memory at coordinate ``z`` (m or m/s), minus its linear part.
 
     The laws are those of `simulators.sites.elements`.
     """
@@ -113,9 +113,10 @@ def local_force(site: Record, z: float) -> float:
 def local_forces(
     sites: NDArray[Any], coordinates: NDArray[np.float64], first: int, forces: NDArray[np.float64]
 ) -> bool:
-    """Forces of the sites without memory, whose coordinates begin at ``first``; True where a magnet is beyond its limit.
+    """Fill ``forces`` of the sites without memory; return whether the coordinate of a site is beyond its limit.
 
-    The droop of the force factor is a product of two coordinates, its own and one that stands before it.
+    ``first`` is the index of the sites' first coordinate in ``coordinates``. The force by droop of the force factor depends on
+    two coordinates: the site's own, and the one that is ``partner`` places before it.
     """
     beyond = False
     for s in range(sites.size):
@@ -131,10 +132,10 @@ def local_forces(
 
 @kernel
 def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
-    """Forces of the friction joints into ``state.joints``, minus their stuck linear part: ``k delta - sum_j f_j``.
+    """Write the forces of the friction joints, without the stuck linear part, to ``state.joints``: ``k delta - sum_j f_j``.
 
-    Each element slips at its limit, ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)`` from its committed force. Joints lie
-    side by side: a vector holds one element of eight joints. Where there are fewer, elements have no stiffness.
+    Starting from its committed force, each element slips at its limit: ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)``.
+    A vector holds the same element of eight joints. Missing joints are padded with elements of zero stiffness.
     """
     elements, rows, deflection, friction = rig.elements, state.rows, state.deflection, state.friction
     _, n_element, n_joint = elements.shape
@@ -156,7 +157,7 @@ def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
 
 @inner_kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
-    """Advance the plant by one sample with ``voltage`` (V) held; returns LAW_RANGE, AMPLIFIER_CLIPPED or 0, or-ed."""
+    """Advance the plant by one sample with ``voltage`` (V) held; return the bits LAW_RANGE and AMPLIFIER_CLIPPED, or 0."""
     inputs, rows, forces, joints, changes = state.inputs, state.rows, state.forces, state.joints, state.changes
     n, n_local, n_joint = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_joint
     first_state, first_local, first_joint = n_joint + n_local, n + 1, n + 1 + n_local
@@ -175,7 +176,7 @@ def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
         add_columns(rig.correct, changes, rows)
         joint_forces(rig, state, True)
         beyond |= local_forces(rig.sites, rows, n_joint, forces)
-        for i in range(0, n, WIDTH):  # what is carried beyond x is overwritten at once
+        for i in range(0, n, WIDTH):  # values copied beyond x are overwritten at once
             store(inputs, i, load(rows, first_state + i))
         inputs[n] = held
         for s in range(n_local):

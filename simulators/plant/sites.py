@@ -1,4 +1,4 @@
-"""Where the sites without memory sit in the plant, and their records for the kernels: elements, then the exciter's own."""
+"""Positions of the sites without memory in the plant, and their records for the kernels: elements, then the exciter's own."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -21,15 +21,15 @@ class Place(NamedTuple):
     """A site in the plant ``x' = A x + B f`` with ``x = [q, q', x_a, v_a, i]``."""
 
     row: Matrix
-    """Its coordinate as a row over the state [n]."""
+    """The site's coordinate as a row over the state [n]."""
     column: Matrix
-    """What its force does to the rates of the state [n]."""
+    """Effect of the site's force on the rates of the state [n]."""
     stiffness_n_m: float = 0.0
-    """Linear stiffness on its coordinate that the linear plant takes over."""
+    """Linear stiffness on the site's coordinate that is part of the linear plant."""
 
 
 def element_places(structure: Structure, elements: Sequence[Element], signs: Matrix) -> list[Place]:
-    """One place per element; ``signs`` [n_mode] turn the shapes."""
+    """Return one place per element; ``signs`` [n_mode] multiply the mode shapes."""
     return [_element_place(structure, element, signs) for element in elements]
 
 
@@ -46,7 +46,7 @@ def _element_place(structure: Structure, element: Element, signs: Matrix) -> Pla
 
 
 def exciter_places(exciter: Exciter, n: int) -> list[Place]:
-    """Places of the exciter's own nonlinearities, as many as `_exciter_records` has; ``n`` states."""
+    """Return the places of the exciter's own nonlinearities, one per record of `_exciter_records`; ``n``: number of states."""
     x_a, v_a, i = np.eye(n)[n - 3 :]
     force, emf = v_a / exciter.armature_mass_kg, -i / exciter.inductance_h
     places = [Place(x_a, force), Place(i, force), Place(v_a, emf)]
@@ -54,7 +54,11 @@ def exciter_places(exciter: Exciter, n: int) -> list[Place]:
 
 
 def _exciter_records(exciter: Exciter) -> list[dict[str, Any]]:
-    """Suspension on the armature; where the force factor droops, its force on it and its back-EMF on the coil."""
+    """Return the records of the exciter's nonlinearities.
+
+    They are the suspension on the armature and, if the force factor droops, the force on the armature and, for a voltage
+    amplifier, the back-EMF in the coil.
+    """
     suspension = {"kind": SiteKind.CUBIC, "strength": exciter.suspension_cubic_n_m3, "limit": exciter.droop_limit_m}
     if not exciter.droops:
         return [suspension] if exciter.suspension_cubic_n_m3 else []
@@ -65,7 +69,7 @@ def _exciter_records(exciter: Exciter) -> list[dict[str, Any]]:
 
 
 def local_sites(elements: Sequence[Element], exciter: Exciter) -> NDArray[Any]:
-    """Table for the kernels, one `simulators.layout.SITE` record per site."""
+    """Return the table for the kernels, one `simulators.layout.SITE` record per site."""
     records = [*(_record(element) for element in elements), *_exciter_records(exciter)]
     table = np.zeros(len(records), SITE)
     table["limit"] = np.inf

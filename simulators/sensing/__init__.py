@@ -1,1 +1,1 @@
-"""What stands between the physics and the samples: sensors, converters, noise."""
+"""Sensors, converters and noise: the chain from physical quantities to samples."""

@@ -1,4 +1,4 @@
-"""Filters and fractional delays of sensors and converters, as the arrays that their kernels run on."""
+"""Filters and fractional delays of sensors and converters, as arrays for the kernels."""
 
 from collections.abc import Sequence
 
@@ -24,10 +24,11 @@ _IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
 
 
 def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Matrix:
-    """Butterworth low-pass as sections [n_section, 5] (b_0 b_1 b_2 a_1 a_2); none where the corner is 0.
+    """Return a Butterworth low-pass as sections [n_section, 5] (b_0 b_1 b_2 a_1 a_2); none if the corner is 0.
 
-    Bilinear transform, warped so that the corner is where the analogue filter has it. Below the corner it is the analogue
-    filter at a frequency that differs by less than ``(pi corner / rate)^2 / 3``, 0.5 % where the rate is 25 times the corner.
+    The bilinear transform is prewarped to the corner of the analogue filter. Below the corner the response is that of the
+    analogue filter at a frequency that differs by less than ``(pi corner / rate)^2 / 3``: 0.5 % if the rate is 25 times the
+    corner.
     """
     if corner_hz == 0.0:
         return np.zeros((0, 5))
@@ -38,7 +39,7 @@ def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Matrix:
 
 
 def channel_sections(sensors: Sequence[Sensor], converter: Converter) -> Matrix:
-    """Sections [n_section, 5, n_channel]: the anti-alias filter, then the low-passes of the sensors that have one."""
+    """Return sections [n_section, 5, n_channel]: the anti-alias filter, then the low-passes of the sensors that have one."""
     rate_hz = converter.internal_rate_hz
     shared = low_pass_sections(converter.anti_alias_order, converter.anti_alias_hz, rate_hz)
     own = [low_pass_sections(1, sensor.low_pass_hz, rate_hz) for sensor in sensors]
@@ -49,7 +50,7 @@ def channel_sections(sensors: Sequence[Sensor], converter: Converter) -> Matrix:
 
 
 def output_sections(converter: Converter) -> Matrix:
-    """Sections [n_section, 5, 1] of the reconstruction filter."""
+    """Return the sections [n_section, 5, 1] of the reconstruction filter."""
     sections = low_pass_sections(
         converter.reconstruction_order, converter.reconstruction_hz, converter.internal_rate_hz
     )
@@ -57,9 +58,9 @@ def output_sections(converter: Converter) -> Matrix:
 
 
 def dc_delay(sections: Matrix) -> NDArray[np.float64]:
-    """Group delay at low frequency [n_channel], in samples of the filters' rate, of sections [n_section, 5, n_channel].
+    """Return the low-frequency group delay [n_channel] of sections [n_section, 5, n_channel], in samples at the filters' rate.
 
-    Of ``H = B/A`` it is ``sum k b_k / sum b_k - sum k a_k / sum a_k``, summed over the sections.
+    For ``H = B/A`` it is ``sum k b_k / sum b_k - sum k a_k / sum a_k``, summed over the sections.
     """
     b_0, b_1, b_2, a_1, a_2 = np.moveaxis(sections, 1, 0)
     delays = (b_1 + 2.0 * b_2) / (b_0 + b_1 + b_2) - (a_1 + 2.0 * a_2) / (1.0 + a_1 + a_2)
@@ -68,7 +69,7 @@ def dc_delay(sections: Matrix) -> NDArray[np.float64]:
 
 
 def channel_delays(sensors: Sequence[Sensor], converter: Converter) -> NDArray[np.float64]:
-    """What each channel is late behind an ideal one [n_channel], in samples at low frequency: its low-pass and its skew."""
+    """Return the delay of each channel [n_channel] by its own low-pass and skew, in samples at low frequency."""
     all_filters, shared = dc_delay(channel_sections(sensors, converter)), _anti_alias_delay(converter)
     skews = np.array([sensor.skew_samples for sensor in sensors])
     own: NDArray[np.float64] = (all_filters - shared) / converter.oversampling + skews
@@ -76,7 +77,7 @@ def channel_delays(sensors: Sequence[Sensor], converter: Converter) -> NDArray[n
 
 
 def filter_delay(converter: Converter) -> float:
-    """What anti-alias and reconstruction filter delay every channel by, in samples at low frequency."""
+    """Return the delay of every channel by anti-alias and reconstruction filter, in samples at low frequency."""
     internal = _anti_alias_delay(converter) + float(dc_delay(output_sections(converter))[0])
     return internal / converter.oversampling
 
@@ -87,10 +88,10 @@ def _anti_alias_delay(converter: Converter) -> float:
 
 
 def lagrange_taps(delay: float) -> tuple[int, Matrix]:
-    """Whole delay of the first tap, and the weights [TAPS] that interpolate ``delay`` (at least 0) samples back.
+    """Return the whole delay of the first tap, and the weights [TAPS] that interpolate ``delay`` (at least 0) samples back.
 
-    Lagrange's polynomial through six values, as far as there are any on either side of the wanted instant. A sine of
-    ``w`` rad per sample is wrong by up to ``0.024 w^6`` of itself, from a delay of two samples on by ``0.005 w^6``.
+    Lagrange's polynomial passes through six values, three on either side of the wanted instant where there are so many. The
+    relative error of a sine of ``w`` rad per sample is up to ``0.024 w^6``, or ``0.005 w^6`` from a delay of two samples on.
     """
     first = max(0, int(delay) - (TAPS // 2 - 1))
     nodes = np.arange(first, first + TAPS)
@@ -102,13 +103,13 @@ def lagrange_taps(delay: float) -> tuple[int, Matrix]:
 
 
 def skew_taps(sensors: Sequence[Sensor], converter: Converter) -> tuple[list[int], Matrix]:
-    """Whole delays and weights [n_channel, TAPS] of every channel, at the internal rate."""
+    """Return the whole delays and the weights [n_channel, TAPS] of all channels, at the internal rate."""
     taps = [lagrange_taps(sensor.skew_samples * converter.oversampling) for sensor in sensors]
     return [first for first, _ in taps], np.array([weights for _, weights in taps])
 
 
 def ring_size(delays: NDArray[np.int64], taps: Matrix) -> int:
-    """Length of the ring of past values: a power of two that holds every tap, or 0 where no channel is skewed."""
+    """Return the length of the ring of past values: a power of two that holds every tap, or 0 if no channel is skewed."""
     if np.all(delays == 0) and np.all(taps[:, 1:] == 0.0):
         return 0
     return 1 << int(np.max(delays, initial=0) + taps.shape[1] - 1).bit_length()

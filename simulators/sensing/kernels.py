@@ -1,7 +1,7 @@
 """Compiled sensors and converters: from SI values to the volts that a converter reads, and back.
 
-Sensors and filters run at the internal rate, ``oversampling`` times that of the converter; every so many instants one
-of them is converted. Noise is drawn by counter (`simulators.sensing.noise`).
+Sensors and filters run at the internal rate, ``oversampling`` times the rate of the converter; one in ``oversampling`` instants
+is converted. Noise is drawn by counter (`simulators.sensing.noise`).
 """
 
 import math
@@ -17,7 +17,7 @@ from vibrolock.compiled import Record, inner_kernel, kernel
 
 @kernel
 def quantise(volts: float, step_v: float, range_v: float) -> float:
-    """The nearest code of a two's-complement converter, in volts, within ``[-range, range - step]``."""
+    """Return the nearest code of a two's-complement converter, in volts, within ``[-range, range - step]``."""
     if step_v > 0.0:
         volts = step_v * np.rint(volts / step_v)
     return min(max(volts, -range_v), range_v - step_v)
@@ -40,9 +40,10 @@ def filter_channels(sections: NDArray[np.float64], memory: NDArray[np.float64], 
 
 @inner_kernel
 def sense(columns: NDArray[np.float64], weights: NDArray[np.float64], values: NDArray[np.float64]) -> bool:
-    """``values = sum_j weights[j] columns[j]``, what every sensor senses (SI); False where one of them is not finite.
+    """Compute the sensed quantities (SI) ``values = sum_j weights[j] columns[j]``; return False if one is not finite.
 
-    Both lengths are multiples of four. Four channels and two columns at a time, so that the sums stay in registers.
+    Both lengths are multiples of four. The loop takes four channels and two columns at a time, so that the sums stay in
+    registers.
     """
     finite = True
     for c in range(0, columns.shape[1], 4):
@@ -83,7 +84,7 @@ def condition(channels: NDArray[Any], filters: NDArray[np.float64], values: NDAr
 def anti_alias(
     channels: NDArray[Any], sections: NDArray[np.float64], memory: NDArray[np.float64], values: NDArray[np.float64]
 ) -> int:
-    """Clip the conditioned volts at each sensor's range and filter them, in place; returns SENSOR_CLIPPED or 0."""
+    """Clip the conditioned volts at each sensor's range and filter them, in place; return SENSOR_CLIPPED or 0."""
     flags = 0
     for c in range(channels.size):
         range_v = channels[c].range_v
@@ -102,7 +103,7 @@ def delay(
     instant: int,
     values: NDArray[np.float64],
 ) -> None:
-    """Replace each channel's volts by those of as many internal instants ago as its skew says, by Lagrange's polynomial."""
+    """Delay each channel's volts by its skew, with Lagrange interpolation between internal instants."""
     mask = history.shape[0] - 1
     for c in range(channels.size):
         first = instant - channels[c].delay
@@ -123,7 +124,7 @@ def convert(
 ) -> int:
     """Convert the conditioned volts into ``out_v`` [n_channel].
 
-    Noise of sensor and converter is added, the sensor's range, then the converter's range and step are kept. Returns
+    The noise of sensor and converter is added; then the sensor's range, and the converter's range and step, are applied. Return
     SENSOR_CLIPPED or 0.
     """
     step_v, range_v, codes_per_v = converter.adc_step_v, converter.adc_range_v, converter.adc_codes_per_v
@@ -144,7 +145,7 @@ def convert(
 
 @inner_kernel
 def hold(converter: Record, noise_key: np.uint64, voltage: float, sample: int) -> tuple[float, int]:
-    """What the digital-to-analogue converter makes of a voltage, noise included, and DAC_CLIPPED or 0."""
+    """Return the output of the digital-to-analogue converter for a voltage, including noise, and DAC_CLIPPED or 0."""
     flags = 0 if abs(voltage) <= converter.dac_range_v else DAC_CLIPPED
     held_v = 0.0 if math.isnan(voltage) else quantise(voltage, converter.dac_step_v, converter.dac_range_v)
     if converter.dac_noise_v > 0.0:

@@ -1,4 +1,4 @@
-"""Sensors and converters as they are configured."""
+"""Configuration of sensors and converters."""
 
 import math
 from typing import Annotated, Literal
@@ -10,11 +10,11 @@ from simulators.part import Part, Positive
 __all__ = ["LOWEST_INTERNAL_RATE_HZ", "TAPS", "Converter", "Sensor"]
 
 TAPS = 6
-"""Values that a skewed channel is interpolated from."""
+"""Number of values from which a skewed channel is interpolated."""
 LOWEST_INTERNAL_RATE_HZ = 4000.0
-"""What an anti-alias or reconstruction filter needs: below, the stairs of the held output alias into what it reads."""
+"""Lowest internal rate for an anti-alias or reconstruction filter; below, the held output's stairs alias into the readings."""
 LOWEST_CORNER = 0.001
-"""Lowest corner of a filter of the converter over the sample rate: it delays by about six hundred samples there."""
+"""Lowest corner of a converter's filter over the sample rate; such a filter delays by about six hundred samples."""
 
 NotNegative = Annotated[float, Field(ge=0.0)]
 Bits = Annotated[int, Field(ge=0, le=32)]

@@ -1,4 +1,4 @@
-"""Compiled functions of the user's own, by name or as objects: where they are found, checked and kept."""
+"""Compiled functions of the user, given by name or as objects: lookup, check and storage."""
 
 import ctypes
 import importlib
@@ -14,28 +14,28 @@ __all__ = ["Loaded", "loaded", "named", "portable"]
 
 _ARGUMENTS = (ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 _PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, *_ARGUMENTS)
-_FUNCTION_POINTER: Any = _PROTOTYPE.__base__ or object  # what every C function object derives from
+_FUNCTION_POINTER: Any = _PROTOTYPE.__base__ or object  # base class of every C function object
 _ALLOWED = "allowed is a numba cfunc or C function float64(float64, CPointer(float64))"
 
 _LOG = logging.getLogger(__name__)
 
 _kept: dict[int, Any] = {}
-"""Objects behind the addresses that were given out: machine code must not be freed while a rig may call it."""
+"""Function objects whose addresses are in use: their machine code must not be freed while a rig may call it."""
 
 
 @dataclass(frozen=True)
 class Loaded:
-    """A function in memory; its address holds in this process only."""
+    """A function in memory; its address is valid in this process only."""
 
     address: int
 
     def __call__(self, z: float, parameters: tuple[float, ...]) -> float:
-        """Force for one deflection or velocity."""
+        """Return the force for one deflection or velocity."""
         return float(_PROTOTYPE(self.address)(z, (ctypes.c_double * len(parameters))(*parameters)))
 
 
 def named(function: Any) -> str:
-    """``module:name`` of a function object; a name is returned as it is."""
+    """Return ``module:name`` of a function object; return a name unchanged."""
     if isinstance(function, str):
         return function
     made_from = getattr(function, "__wrapped__", function)
@@ -44,7 +44,7 @@ def named(function: Any) -> str:
 
 
 def portable(function: Any) -> Any:
-    """Its name where a function object can be imported under it, so that other processes find it; else as it is."""
+    """Return the name of a function object if other processes can import it by this name; otherwise return it unchanged."""
     if isinstance(function, str):
         return function
     name = named(function)
@@ -54,7 +54,7 @@ def portable(function: Any) -> Any:
 
 
 def loaded(function: Any) -> Loaded:
-    """The function behind a name or an object; `ValueError` where there is none or it has another signature."""
+    """Return the function of a name or an object; raise `ValueError` if it is missing or has another signature."""
     what = f"function = {named(function)!r}"
     found = _imported(function) if isinstance(function, str) else function
     pointer: Any = found.ctypes if isinstance(found, CFunc) else found
@@ -87,7 +87,7 @@ def _imported(name: str) -> Any:
 
 
 def _shown(file: str | None) -> str:
-    """The file of a module, from the working directory where it is in there."""
+    """Return the file of a module, relative to the working directory if it lies inside."""
     if file is None:
         return "no file"
     path, here = Path(file).absolute(), Path.cwd()

@@ -1,1 +1,1 @@
-"""What vibrates: beams by finite elements, lap joints, modes that are given."""
+"""Vibrating structures: beams and lap joints by finite elements, and structures given by their modes."""

@@ -67,12 +67,12 @@ class BeamModes:
     """Deflection and slope of every node [2 (n_element + 1), n_mode]: kg^-1/2 and kg^-1/2 / m."""
 
     def shape(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
-        """Mode shapes [n_mode] at a position: deflection (kg^-1/2), slope (per m) or curvature (per m^2)."""
+        """Return mode shapes [n_mode] at a position: deflection (kg^-1/2), slope (per m) or curvature (per m^2)."""
         return _row(position_m, self.length_m, self.dofs.shape[0], quantity) @ self.dofs
 
 
 def hermite(s: float, size_m: float, quantity: Quantity = "deflection") -> Matrix:
-    """Cubic Hermite shapes [4] of an element at ``s`` in [0, 1]: deflection and slope of its left, then its right node."""
+    """Return the cubic Hermite shapes [4] of an element at ``s`` in [0, 1]: left deflection and slope, then right."""
     shapes = {
         "deflection": [1 - 3 * s**2 + 2 * s**3, size_m * s * (1 - s) ** 2, s**2 * (3 - 2 * s), size_m * s**2 * (s - 1)],
         "slope": [6 * s * (s - 1), size_m * (1 - 4 * s + 3 * s**2), 6 * s * (1 - s), size_m * s * (3 * s - 2)],
@@ -92,7 +92,7 @@ def beam_modes(
     lumps: Sequence[Lump] = (),
     springs: Sequence[Spring] = (),
 ) -> BeamModes:
-    """Lowest modes of a uniform beam with bodies and springs on it."""
+    """Return the lowest modes of a uniform beam with lumped masses and springs."""
     n_dof = 2 * n_element + 2
     stiffness, mass = _assemble(n_element, length_m / n_element, bending_stiffness_n_m2, mass_per_length_kg_m)
     for lump in lumps:
@@ -112,10 +112,10 @@ def beam_modes(
 
 
 def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> tuple[Matrix, Matrix]:
-    """Lowest ``omega^2`` [n_mode] (not negative) and mass-normalised vectors [n, n_mode] of ``K v = omega^2 M v``.
+    """Return the lowest ``omega^2`` [n_mode] (not negative) and mass-normalised vectors [n, n_mode] of ``K v = omega^2 M v``.
 
-    Solved as ``M v = mu (K + shift M) v``: the wanted modes are then the largest eigenvalues and lose no digits to the
-    highest, and a stiffness without ground does no harm. ``shift`` (rad/s)^2 is about that of the lowest mode.
+    The problem is solved as ``M v = mu (K + shift M) v``. The wanted modes are then the largest eigenvalues and lose no digits
+    to the highest modes, and K may be singular (rigid-body modes). ``shift`` (rad/s)^2 is about ``omega^2`` of the lowest mode.
     """
     n = mass.shape[0]
     mu, vectors = eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
@@ -123,7 +123,7 @@ def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> t
 
 
 def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[Matrix, Matrix]:
-    """Stiffness and consistent mass matrix [4, 4] of one element over deflection and slope of its two nodes."""
+    """Return stiffness and consistent mass matrix [4, 4] of one element over deflection and slope of its two nodes."""
     h = size_m
     stiffness = (ei_n_m2 / h**3) * np.array(
         [
@@ -145,7 +145,7 @@ def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[M
 
 
 def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[Matrix, Matrix]:
-    """Stiffness and mass of ``n`` equal elements, both [2 (n + 1), 2 (n + 1)]."""
+    """Return stiffness and mass of ``n`` equal elements, both [2 (n + 1), 2 (n + 1)]."""
     element_stiffness, element_mass = bending_element(size, ei, rho_a)
     stiffness, mass = np.zeros((2, 2 * n + 2, 2 * n + 2))
     for element in range(n):
@@ -156,7 +156,7 @@ def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[Matrix, Mat
 
 
 def _row(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> Matrix:
-    """The row [n_dof] that reads a quantity at a position off the nodes."""
+    """Return the row [n_dof] that gives a quantity at a position from the nodal coordinates."""
     n_element = n_dof // 2 - 1
     size = length_m / n_element
     element = min(int(position_m / size), n_element - 1)
@@ -171,7 +171,7 @@ def _square(position_m: float, length_m: float, n_dof: int, quantity: Quantity) 
 
 
 def _n_rigid(length_m: float, left: str, right: str, springs: Sequence[Spring]) -> int:
-    """Number of rigid motions ``a + b x/L`` that neither the ends nor the springs resist."""
+    """Return the number of rigid motions ``a + b x/L`` that neither the ends nor the springs resist."""
     held = [(*_HELD[left], 0.0), (*_HELD[right], 1.0)]
     resisted = [np.array([1.0, at]) for deflection, _, at in held if deflection]
     resisted += [np.array([0.0, 1.0]) for _, slope, _ in held if slope]

@@ -3,13 +3,13 @@
 The mesh has two full-thickness arms and, in the lap, two half-thickness legs. Every node has three coordinates
 ``(u, w, theta)`` on the mid-plane of the whole beam, which in the lap is the interface: axial displacement, deflection,
 rotation ``w'``. A leg's own axis lies a quarter of the thickness above or below, so that ``u_axis = u - e theta``: bending
-drags the legs' interfaces against each other. The upper leg grows out of the arm at position 0, the lower one out of the
-other arm; each shares a node with it and is free at its other end.
+shears the legs' interfaces against each other. The upper leg continues the arm at position 0, the lower leg the other arm. Each
+leg shares a node with its arm and is free at its other end.
 
 The legs are coupled by springs between their interfaces, tangential ``u_upper - u_lower`` and normal ``w_upper -
-w_lower``, peaked at the bolts. Linear axial and cubic Hermite bending elements, consistent mass, rotary inertia (Rayleigh
-beam): glued by an infinitely stiff interface the joint is the full-thickness beam. Shear of the sections and contact
-(opening, pressure that changes with vibration) are not modelled.
+w_lower``, peaked at the bolts. The elements are linear in the axial and cubic (Hermite) in the bending direction, with
+consistent mass and rotary inertia (Rayleigh beam). With an infinitely stiff interface the joint becomes the full-thickness
+beam. Shear of the sections and contact (opening, pressure that changes with vibration) are not modelled.
 """
 
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ class LapMesh:
 
     @cached_property
     def positions_m(self) -> Matrix:
-        """Ends of all elements [2 n_arm + n_lap + 1], from end to end."""
+        """Positions of all element ends [2 n_arm + n_lap + 1], along the beam."""
         first, last = (self.length_m - self.lap_length_m) / 2.0, (self.length_m + self.lap_length_m) / 2.0
         arms = np.linspace(0.0, first, self.n_arm + 1), np.linspace(last, self.length_m, self.n_arm + 1)
         return np.concatenate([arms[0], np.linspace(first, last, self.n_lap + 1)[1:-1], arms[1]])
@@ -63,7 +63,7 @@ class LapMesh:
         return self.positions_m[self.n_arm : self.n_arm + self.n_lap + 1]
 
     def members(self, element: int) -> list[tuple[int, int, float]]:
-        """Left node, right node and eccentricity (m) of the arm, or of upper and lower leg, in one element."""
+        """Return left node, right node and eccentricity (m) of the arm, or of upper and lower leg, in one element."""
         if self.n_arm <= element < self.n_arm + self.n_lap:
             i = element - self.n_arm
             return [(leg[i], leg[i + 1], e) for leg, e in zip(self.legs, self._eccentricities, strict=True)]
@@ -71,7 +71,7 @@ class LapMesh:
         return [(left, left + 1, 0.0)]
 
     def row(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
-        """Row [n_dof] that reads deflection, slope or curvature; in the lap the mean of both legs, at its edge the arm."""
+        """Return the row [n_dof] for deflection, slope or curvature: in the lap the legs' mean, at its edge the arm."""
         element, s, size = self._locate(position_m)
         members = self.members(element)
         row = np.zeros(self.n_dof)
@@ -80,7 +80,7 @@ class LapMesh:
         return row
 
     def axial_row(self, position_m: float) -> Matrix:
-        """Row [n_dof] that reads the axial displacement of the mid-plane; in the lap the mean of both legs."""
+        """Return the row [n_dof] for the axial displacement of the mid-plane; in the lap the mean of both legs."""
         element, s, _ = self._locate(position_m)
         members = self.members(element)
         row = np.zeros(self.n_dof)
@@ -89,10 +89,10 @@ class LapMesh:
         return row
 
     def slip_row(self, position_m: float) -> Matrix:
-        """Row [n_dof] that reads the tangential displacement of the upper leg's interface relative to the lower leg's.
+        """Return the row [n_dof] for the tangential displacement of the upper leg's interface relative to the lower leg's.
 
-        Each interface moves with ``u_axis + e w'``: the axial displacement of the leg's axis is linear in an element, the
-        slope quadratic. ``position_m`` lies in the lap.
+        Each interface moves by ``u_axis + e w'``. In an element, the axial displacement of the leg's axis is linear and the
+        slope is quadratic. ``position_m`` lies in the lap.
         """
         element, s, size = self._locate(position_m, inwards=True)
         row = np.zeros(self.n_dof)
@@ -107,7 +107,10 @@ class LapMesh:
         return self.thickness_m / 4.0, -self.thickness_m / 4.0
 
     def _locate(self, position_m: float, *, inwards: bool = False) -> tuple[int, float, float]:
-        """Element (at a node the outer, or the inner one), place in it from 0 to 1, and its size (m)."""
+        """Return the element at a position, the place in it from 0 to 1, and its size (m).
+
+        At a node it is the element away from the middle of the beam or, with ``inwards``, towards the middle.
+        """
         towards = 1.0 if (position_m < self.length_m / 2.0) == inwards else -1.0
         nodes = self.positions_m
         element = int(np.searchsorted(nodes, position_m + towards * 1e-9 * self.length_m)) - 1
@@ -117,7 +120,7 @@ class LapMesh:
 
 
 def bending_dofs(left: int, right: int) -> list[int]:
-    """Coordinates of deflection and rotation of two nodes, in the order of the Hermite shapes."""
+    """Return the indices of deflection and rotation of two nodes, in the order of the Hermite shapes."""
     return [3 * left + 1, 3 * left + 2, 3 * right + 1, 3 * right + 2]
 
 
@@ -156,7 +159,7 @@ class LapJointModes:
         return self.mesh.row(position_m, quantity) @ self.dofs
 
     def slip(self, position_m: float) -> Matrix:
-        """Tangential displacement [n_mode] (kg^-1/2) of the upper leg's interface relative to the lower leg's."""
+        """Return the tangential displacement [n_mode] (kg^-1/2) of the upper leg's interface relative to the lower leg's."""
         return self.mesh.slip_row(position_m) @ self.dofs
 
 
@@ -168,7 +171,7 @@ def lap_joint_modes(
     lumps: Sequence[Lump] = (),
     springs: Sequence[Spring] = (),
 ) -> LapJointModes:
-    """Lowest modes of the jointed beam, free but for its springs; the rigid axial motion, which nothing sees, is left out."""
+    """Return the lowest modes of the jointed beam on its springs; the rigid axial motion is not observable and is left out."""
     stiffness, mass = _members(mesh, section)
     _add_interface(stiffness, mesh, interface)
     for lump in lumps:
@@ -182,7 +185,7 @@ def lap_joint_modes(
         stiffness += spring.rotational_stiffness_n_m_rad * np.outer(slope, slope)
     e, rho, _, h = section
     typical = e * h**2 / (12.0 * rho * mesh.length_m**4)
-    # The rigid axial motion is an exact mode of frequency zero: it is lifted far above the others, which do not change.
+    # The rigid axial motion is an exact mode of zero frequency. Added stiffness moves it far above the other modes, unchanged.
     motion = np.zeros(mesh.n_dof)
     motion[0::3] = 1.0
     momentum = mass @ motion
@@ -193,7 +196,7 @@ def lap_joint_modes(
 
 
 def _members(mesh: LapMesh, section: Section) -> tuple[Matrix, Matrix]:
-    """Stiffness and mass [n_dof, n_dof] of arms and legs, not yet coupled."""
+    """Return stiffness and mass [n_dof, n_dof] of arms and legs, not yet coupled."""
     stiffness, mass = np.zeros((2, mesh.n_dof, mesh.n_dof))
     for element, size in enumerate(np.diff(mesh.positions_m)):
         for left, right, e in mesh.members(element):
@@ -208,7 +211,7 @@ def _members(mesh: LapMesh, section: Section) -> tuple[Matrix, Matrix]:
 
 
 def _element(size: float, section: Section) -> tuple[Matrix, Matrix]:
-    """Stiffness and mass [6, 6] over the two axial displacements, then deflection and slope of both nodes."""
+    """Return stiffness and mass [6, 6] over the two axial displacements, then deflection and slope of both nodes."""
     area = section.width_m * section.thickness_m
     inertia = area * section.thickness_m**2 / 12.0
     stiffness, mass = np.zeros((2, 6, 6))
@@ -231,7 +234,7 @@ def _element(size: float, section: Section) -> tuple[Matrix, Matrix]:
 
 
 def _add_interface(stiffness: Matrix, mesh: LapMesh, interface: Interface) -> None:
-    """Springs between the legs' nodes; end nodes stand for half an element."""
+    """Add the springs between the legs' nodes to ``stiffness``; end nodes represent half an element."""
     offsets = mesh.lap_positions_m[:, None] - np.array(interface.bolts_m)[None, :]
     weight = interface.floor + np.sum(np.exp(-(offsets**2) / (2.0 * interface.bolt_width_m**2)), axis=1)
     weight[[0, -1]] *= 0.5

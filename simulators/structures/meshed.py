@@ -109,24 +109,24 @@ class MeshedBeam(Part):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names that a shape may be asked for at."""
+        """Names of the points with a mode shape."""
         return tuple(self.points_m)
 
     @property
     def lumps(self) -> list[Lump]:
-        """Lumped masses with their positions."""
+        """Return the lumped masses with their positions."""
         return [Lump(self.points_m[one.at], one.mass_kg, one.inertia_kg_m2) for one in self.lumped_masses]
 
     @property
     def springs(self) -> list[Spring]:
-        """Supports with their positions."""
+        """Return the supports with their positions."""
         return [
             Spring(self.points_m[one.at], one.stiffness_n_m, one.rotational_stiffness_n_m_rad) for one in self.supports
         ]
 
     @property
     def omega_rad_s(self) -> Matrix:
-        """Angular natural frequencies [n_mode]: the measured ones where they are given."""
+        """Angular natural frequencies [n_mode]; the measured ones if given."""
         return self.modes.omega_rad_s if self.frequency_hz is None else 2.0 * np.pi * np.array(self.frequency_hz)
 
     def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
@@ -135,11 +135,11 @@ class MeshedBeam(Part):
 
     @abstractmethod
     def _most_modes(self) -> int:
-        """Largest number of modes that the mesh has."""
+        """Return the largest number of modes of the mesh."""
 
 
 def check_rising(frequencies_hz: Sequence[float]) -> None:
-    """Raise `ValueError` if frequencies do not rise: shapes and damping would belong to another mode."""
+    """Raise `ValueError` if frequencies do not rise, because shapes and damping would then belong to other modes."""
     for index, (before_hz, next_hz) in enumerate(pairwise(frequencies_hz), start=1):
         if next_hz < before_hz:
             raise ValueError(f"frequency_hz[{index}] = {next_hz:g}: allowed is from {before_hz:g} on, lowest first")

@@ -1,4 +1,4 @@
-"""The vibrating structure: a beam or a jointed beam from its geometry, or modes that are given."""
+"""The vibrating structure: a beam or a jointed beam from its geometry, or a structure given by its modes."""
 
 from functools import cached_property
 from typing import Annotated, Literal
@@ -111,7 +111,7 @@ class LapJointedBeam(MeshedBeam):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names that a shape may be asked for at: points and friction sites."""
+        """Names with a mode shape: points and friction sites."""
         return (*self.points_m, *self.sites_m)
 
     def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
@@ -159,7 +159,7 @@ class ModalStructure(Part):
         return 2.0 * np.pi * np.array(self.frequency_hz)
 
     def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
-        """The shape [n_mode] given under a name; slopes and curvatures are given as shapes of their own."""
+        """Return the shape [n_mode] given under a name; slopes and curvatures are given as separate shapes."""
         if quantity != "deflection":
             raise ValueError(f"quantity = {quantity!r}: allowed is 'deflection' where the modes are given")
         return np.array(self.shapes[at])

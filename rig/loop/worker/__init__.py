@@ -1,1 +1,1 @@
-"""The wall-clock loop: a process of its own behind a block of shared memory."""
+"""The wall-clock loop: a separate process connected by a block of shared memory."""

@@ -38,16 +38,16 @@ class Histogram:
 
     @property
     def count(self) -> int:
-        """Number of times."""
+        """Number of times counted."""
         return sum(self._words[:BINS])
 
     @property
     def largest_us(self) -> float:
-        """The largest, us."""
+        """Largest time counted, us."""
         return 1e-3 * self._words[LARGEST]
 
     def quantile_us(self, share: float) -> float:
-        """Time that a ``share`` (0 to 1) of all does not exceed, us: the upper edge of its bin; 0 without any."""
+        """Return the time (us) that a ``share`` (0 to 1) of all times does not exceed, as upper edge of its bin; 0 if empty."""
         wanted = share * self.count
         seen = 0
         for index in range(BINS):
@@ -57,13 +57,13 @@ class Histogram:
         return 0.0
 
     def report(self) -> dict[str, float]:
-        """p50, p99, p99.9 and the largest, us."""
+        """Return the quantiles p50, p99 and p99.9, and the largest time, us."""
         shares = {"p50": 0.5, "p99": 0.99, "p99_9": 0.999}
         out = {name: round(self.quantile_us(share), 2) for name, share in shares.items()}
         return out | {"largest": round(self.largest_us, 2)}
 
     def bins(self) -> dict[str, list[float]]:
-        """Upper edge (us) and count of every bin that is not empty."""
+        """Return upper edge (us) and count of every bin that is not empty."""
         held = [index for index in range(BINS) if self._words[index]]
         edges = [round(min(upper_edge_us(index), max(self.largest_us, 1.0)), 3) for index in held]
         return {"upper_edge_us": edges, "count": [self._words[index] for index in held]}

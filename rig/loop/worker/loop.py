@@ -1,4 +1,4 @@
-"""The loop by the wall clock: block after block, late ones are counted, and every end brings the output to 0 V."""
+"""The loop by the wall clock: it runs block after block, counts late blocks, and brings the output to 0 V at every end."""
 
 import os
 import struct
@@ -31,7 +31,7 @@ _now = time.monotonic_ns
 
 
 def suspended_s() -> float:
-    """Seconds that the computer was suspended since its start; 0 if the system does not count them."""
+    """Return the seconds that the computer was suspended since its start; 0 if the system does not count them."""
     clock = getattr(time, "CLOCK_BOOTTIME", None)
     return 0.0 if clock is None else time.clock_gettime(clock) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
@@ -39,12 +39,12 @@ def suspended_s() -> float:
 class WallClockLoop(DrivenLoop):
     """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
 
-    ``tick`` must have its state in ``state`` (`rig.loop.worker.memory.packed`). ``asked`` returns in a sentence who has
-    asked the process itself to end, or an empty text.
+    ``tick`` must have its state in ``state`` (`rig.loop.worker.memory.packed`). ``asked`` returns a sentence on who has asked
+    the process itself to end, or an empty text.
 
-    Whatever asks for the end of it (the campaign, a signal, a full ring, a campaign that is gone, a computer that has
-    slept) gets the tick's ramp to 0 V. ``cause`` says who, unless it was the campaign; ``failure`` is the driver's error.
-    ``disturbances``: what may have held it up, counted.
+    Every request to end the loop (by the campaign, a signal, a full ring, a campaign process that is gone, a suspended
+    computer) starts the tick's ramp to 0 V. ``cause`` says who requested it, unless it was the campaign. ``failure`` is the
+    driver's error. ``disturbances`` counts events that may have delayed the loop.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class WallClockLoop(DrivenLoop):
         self.times = BlockTimes(self._pace, memory, self._deadline_ns)
         self._stall_ns = int(max(1e9 * LONGEST_STALL_S, 10 * period_ns))
         self._unsaid = False
-        # Spread over the blocks of a chunk, for each costs as much as a block does; a chunk of one block does both in one.
+        # Spread over the blocks of a chunk, as each chore costs as much time as a block; a one-block chunk does both at once.
         chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
         self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
         self._samples = 0
@@ -71,7 +71,7 @@ class WallClockLoop(DrivenLoop):
 
     @property
     def deadline_s(self) -> float:
-        """Longest time from the release of a block to the handing over of its outputs."""
+        """Longest allowed time from the release of a block to the output of its voltages (s)."""
         return 1e-9 * self._deadline_ns
 
     def run(self) -> None:
@@ -101,7 +101,7 @@ class WallClockLoop(DrivenLoop):
                 tick.request_stop()
             if first in chores:
                 chores[first]()
-                if self.failure is not None:  # there may be no room for anything
+                if self.failure is not None:  # the ring may be full
                     return first
             self._account()
             pace.wait()
@@ -120,7 +120,7 @@ class WallClockLoop(DrivenLoop):
         return self._memory.layout.chunk
 
     def _account(self) -> None:
-        """Count the times of the block before, whose outputs are handed over now."""
+        """Count the times of the previous block, whose outputs are sent now."""
         response = self.times.done()
         if response > self._stall_ns and not self._pace.by_device:
             self._end(f"the loop stood still for {1e-9 * response:.1f} s")
@@ -130,7 +130,7 @@ class WallClockLoop(DrivenLoop):
 
         If the campaign is gone, the same slot is filled again. If the ring is full, the campaign may still read that slot.
         """
-        self._announce()  # the chunk before, where this one ended before it came to it
+        self._announce()  # the previous chunk, if this one ended before it was announced
         if self._alone or self._memory.free < 1:
             return
         slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns
@@ -141,7 +141,7 @@ class WallClockLoop(DrivenLoop):
         self._unsaid = True
 
     def _announce(self) -> None:
-        """Tell the campaign of a chunk that was not announced yet."""
+        """Announce a completed chunk to the campaign unless that was done."""
         if not self._unsaid:
             return
         self._unsaid = False
@@ -155,7 +155,7 @@ class WallClockLoop(DrivenLoop):
         self._announce()
 
     def _look_round(self) -> None:
-        """Check everything that may ask for the end of the loop."""
+        """Check all conditions that may end the loop."""
         if os.getppid() != self._parent:
             self._alone = True
         if self._alone:
@@ -183,7 +183,7 @@ class WallClockLoop(DrivenLoop):
         return True
 
     def _end(self, cause: str) -> None:
-        """Ask for the ramp, with a cause; the first cause is kept."""
+        """Request the ramp, with a cause; the first cause is kept."""
         if not self.cause and not self._memory.words[STOP] and int(self.tick.guard["mode"][0]) == GuardMode.ARMED:
             self.cause = cause
         self.tick.request_stop()

@@ -1,7 +1,8 @@
 """The memory that the loop process and the campaign share: control words, histograms and a ring of chunks.
 
-It has no name in the file system, only descriptors in two processes: nothing is left of it whatever is killed. Each side
-writes words of its own. A chunk is announced by a byte through a pipe after it is complete, which also orders the memory.
+The memory has no name in the file system, only descriptors in two processes, so that nothing remains if a process is killed.
+Each side writes different words. A completed chunk is announced by a message through a pipe, which also orders the memory
+accesses.
 """
 
 import math
@@ -24,14 +25,14 @@ ALIGNMENT = 64
 STOP, TAKEN, PUBLISHED = range(3)
 CONTROL_WORDS = 8
 TIMES = ("wake_up", "execution", "response")
-"""Times counted for every block: delay of its beginning, duration, and the sum of both."""
+"""Times counted for every block: delay of the block's start, duration, and the sum of both."""
 CONSTANTS = 7  # of the fields of `TickArrays`, the first are constants of the run
 SNAPSHOT = tuple(name for name in TickArrays._fields[CONSTANTS:] if name != "history")
 HEAD = ("rows", "samples", "overruns", "busy_ns", "wall_ns")
 
 
 def anonymous_file() -> int:
-    """Descriptor of an empty file in memory that has no name; on systems without such, of a file already removed."""
+    """Return the descriptor of an empty nameless file in memory or, where not supported, of a file already removed."""
     if hasattr(os, "memfd_create"):
         return os.memfd_create("vibrolock-loop")
     descriptor, path = tempfile.mkstemp(prefix="vibrolock-")
@@ -44,7 +45,7 @@ def _aligned(size: int) -> int:
 
 
 def packed(arrays: TickArrays) -> tuple[TickArrays, np.ndarray]:
-    """The arrays with their changing state in one piece of memory, and that piece (uint8): a snapshot is one copy."""
+    """Return the arrays with their state moved to one block of memory, and this block (uint8): a snapshot is one copy."""
     sizes = [_aligned(getattr(arrays, name).nbytes) for name in SNAPSHOT]
     memory = np.zeros(sum(sizes) + ALIGNMENT, np.uint8)
     memory = memory[-memory.ctypes.data % ALIGNMENT :][: sum(sizes)]
@@ -60,7 +61,7 @@ def packed(arrays: TickArrays) -> tuple[TickArrays, np.ndarray]:
 
 @dataclass(frozen=True)
 class Layout:
-    """Places in the shared memory; both sides compute them from the same numbers."""
+    """Layout of the shared memory; both sides compute it from the same numbers."""
 
     chunk: int
     """Samples of a chunk: about 20 ms, whole blocks."""
@@ -74,7 +75,7 @@ class Layout:
 
     @classmethod
     def of(cls, bench: Bench, arrays: TickArrays, n_counters: int, ring_s: float) -> "Layout":
-        """Layout for a bench and the arrays of its tick; a campaign may be late by ``ring_s`` before a ramp begins."""
+        """Return the layout for a bench and its tick's arrays; a campaign may be late by ``ring_s`` before a ramp begins."""
         chunk = max(1, round(CHUNK_S * bench.sample_rate_hz / bench.block)) * bench.block
         chunk_s = chunk / bench.sample_rate_hz
         lead = int(arrays.loop["lead_whole"][0])
@@ -95,7 +96,7 @@ class Layout:
 
     @property
     def first_slot(self) -> int:
-        """Where the ring begins."""
+        """Offset of the ring, in bytes."""
         return _aligned(8 * (CONTROL_WORDS + len(TIMES) * WORDS))
 
     @property
@@ -118,13 +119,13 @@ class Slot:
         self.counters = numbers[len(HEAD) :]
         """The driver's counters."""
         self.state = state
-        """Of the tick, as `packed` has it."""
+        """State of the tick, as packed by `packed`."""
         self.readings = readings.view(np.float32).reshape(layout.chunk, layout.n_channels)
         self.rows = rows.view(ROW)
 
 
 class SharedMemory:
-    """The shared block, seen from either side."""
+    """The shared block of memory, for either side."""
 
     def __init__(self, descriptor: int, layout: Layout, *, create: bool = False) -> None:
         if create:
@@ -163,7 +164,7 @@ class SharedMemory:
         return self._slots[self.words[PUBLISHED] % self.layout.slots]
 
     def publish(self) -> None:
-        """Mark the slot to fill as complete."""
+        """Mark the slot `to_fill` as complete."""
         self.words[PUBLISHED] += 1
 
     def to_take(self) -> Slot:
@@ -171,9 +172,9 @@ class SharedMemory:
         return self._slots[self.words[TAKEN] % self.layout.slots]
 
     def take(self) -> None:
-        """Release the slot to take, so that it can be filled again."""
+        """Release the slot `to_take`, so that it can be filled again."""
         self.words[TAKEN] += 1
 
     def request_stop(self) -> None:
-        """Ask the loop for the ramp; it looks at every block."""
+        """Request the ramp; the loop checks the request at every block."""
         self.words[STOP] = 1

@@ -1,4 +1,4 @@
-"""When a block of the loop is due: by the host's clock, by the device's clock, or without any clock."""
+"""Due times of the loop's blocks: by the host's clock, by the device's clock, or without any clock."""
 
 import math
 import time
@@ -10,7 +10,7 @@ from rig.daq import DAQ
 __all__ = ["DevicePace", "HostPace", "Lockstep", "Pace", "pace_of", "pacing_of"]
 
 DRIFT = 2e-4  # the clocks of host and device differ by less
-WINDOW_S = 0.2  # without a block on time, after which the device's clock is taken to have stopped for a while
+WINDOW_S = 0.2  # if no block is on time for so long, the device's clock counts as stopped for a while
 WINDOW_BLOCKS = 20
 
 _now = time.monotonic_ns
@@ -26,23 +26,23 @@ class Pace(Protocol):
     """Whether time goes on without the loop, so that it can be late."""
 
     def wait(self) -> None:
-        """Until the next block is due; at once where `DAQ.exchange` waits."""
+        """Wait until the next block is due; return at once if `DAQ.exchange` waits."""
 
     def release(self, begun_ns: int) -> int:
-        """When the block that has begun at a time was due (monotonic clock, ns)."""
+        """Return when the block that began at ``begun_ns`` was due (monotonic clock, ns)."""
 
     def begin(self) -> None:
         """Start the clock."""
 
     @property
     def skipped(self) -> int:
-        """Periods that were left out so far because the loop came too late for them altogether."""
+        """Number of whole periods skipped so far because the loop was late by more than a period."""
 
 
 class HostPace:
-    """Absolute deadlines of the host's monotonic clock: block j is due j + 1 periods after the beginning. It never spins.
+    """Absolute deadlines of the host's monotonic clock: block j is due j + 1 periods after the start. Waiting never spins.
 
-    Whole periods that have been missed are skipped and counted, because a burst of blocks would sample at wrong times.
+    Missed whole periods are skipped and counted, because a burst of blocks would sample at wrong times.
     """
 
     by_device = False
@@ -59,7 +59,7 @@ class HostPace:
         return self._skipped
 
     def begin(self) -> None:
-        """The clock runs from now on."""
+        """Start the clock now."""
         self._began, self._number = _now(), 0
 
     def wait(self) -> None:
@@ -76,16 +76,17 @@ class HostPace:
             self._due = self._began + int(self._number * self._period_ns)
 
     def release(self, begun_ns: int) -> int:
-        """The deadline that was waited for."""
+        """Return the deadline of the present block."""
         return self._due
 
 
 class DevicePace:
     """The device's clock: block j was due j periods after the earliest arrival that any block so far allows.
 
-    The earliest is renewed by every block that comes earlier still, and grows by 200 ppm of the time to follow a device whose
-    clock is slower than its nominal rate. So what is late is what came late over the wire or was picked up late. Where every
-    block of a fifth of a second came later by half a period, the device's own clock has stood still: it counts anew.
+    Every block that arrives still earlier renews the earliest arrival. The earliest arrival also grows by 200 ppm of the time,
+    to follow a device whose clock is slower than its nominal rate. A block therefore counts as late if the transfer was late or
+    the host took the block late. If all blocks of a fifth of a second are late by more than half a period, the device's own
+    clock has paused, and the reference is set anew.
     """
 
     by_device = True
@@ -99,7 +100,7 @@ class DevicePace:
         self._number = 0
 
     def begin(self) -> None:
-        """The next block is the first."""
+        """Take the next block as the first."""
         self._earliest = self._lately = math.inf
         self._number = 0
 
@@ -107,7 +108,7 @@ class DevicePace:
         """Do nothing: the exchange waits."""
 
     def release(self, begun_ns: int) -> int:
-        """When the block that arrived at this time was due."""
+        """Return when the block that arrived at ``begun_ns`` was due."""
         since = begun_ns - self._number * self._period_ns
         self._earliest = min(self._earliest + DRIFT * self._period_ns, since)
         self._lately = min(self._lately, since)
@@ -128,27 +129,27 @@ class Lockstep:
     skipped = 0
 
     def begin(self) -> None:
-        """Nothing."""
+        """Do nothing: there is no clock."""
 
     def wait(self) -> None:
-        """Nothing: the exchange waits."""
+        """Do nothing, because the exchange waits."""
 
     def release(self, begun_ns: int) -> int:
-        """The time of its arrival."""
+        """Return the block's arrival time."""
         return begun_ns
 
 
 def pacing_of(daq: DAQ) -> str:
-    """What paces an open device: ``host``, ``device``, or neither (``lockstep``).
+    """Return what paces an open device: ``host``, ``device``, or neither (``lockstep``).
 
-    One that paces and is repeatable must wait for the host: with a clock of its own, no two runs would be alike.
+    A device that paces and is repeatable must wait for the host: with its own clock, no two runs would be identical.
     """
     capabilities = daq.capabilities
     return "host" if not capabilities.paced else "lockstep" if capabilities.repeatable else "device"
 
 
 def pace_of(daq: DAQ) -> Pace:
-    """The pace of a started device."""
+    """Return the pace of a started device."""
     period_s = daq.block / daq.sample_rate_hz
     paces: dict[str, Callable[[], Pace]] = {
         "host": lambda: HostPace(period_s),

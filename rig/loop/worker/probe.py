@@ -19,7 +19,7 @@ SETTLE_BLOCKS = 10
 
 
 def probe(rate_hz: float, seconds: float, privileged: bool) -> dict[str, Any]:
-    """Lateness of wake-ups at a rate (Hz), and what the process was permitted."""
+    """Measure the lateness of wake-ups at a rate (Hz); return it with the privileges that were granted."""
     said = prepare(privileged=privileged)
     histogram = Histogram()
     pace = HostPace(1.0 / rate_hz)
@@ -33,12 +33,12 @@ def probe(rate_hz: float, seconds: float, privileged: bool) -> dict[str, Any]:
 
 
 def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
-    """Open a bench's device and swap blocks of 0 V with it for a while.
+    """Open a bench's device, exchange blocks of 0 V with it for some seconds, and return the timing.
 
-    ``block_us``: time between two blocks; ``rate_hz``: samples a second that came; what the driver measured itself, in
-    ``statistics``. A device that has something ``latched`` is left as it is, without any blocks.
+    ``block_us``: time between two blocks; ``rate_hz``: samples received per second; ``statistics``: measurements of the driver
+    itself. No blocks are exchanged with a device that has something ``latched``.
 
-    Raises `rig.errors.DaqError`, `rig.errors.ConfigurationError`.
+    Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """
     with make_daq(bench, seed) as daq:
         capabilities = daq.capabilities

@@ -27,7 +27,7 @@ SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
 
 
 def main() -> None:
-    """Descriptors of the two pipes and of the shared memory are the arguments; see `rig.loop.worker.spawn`."""
+    """Run the loop process; its arguments are the descriptors of two pipes and the memory, see `rig.loop.worker.spawn`."""
     commands = Connection(int(sys.argv[1]), writable=False)
     facts = Connection(int(sys.argv[2]), readable=False)
     memory = int(sys.argv[3])
@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def _told(commands: Connection) -> Any:
-    """The next order; `ConfigurationError` where it holds an object of a class that only the campaign's process has."""
+    """Return the next order; raise `ConfigurationError` if it holds an object whose class cannot be imported here."""
     try:
         return commands.recv()
     except (AttributeError, ImportError) as error:
@@ -60,7 +60,7 @@ def _told(commands: Connection) -> Any:
 
 
 def described(error: RigError) -> tuple[tuple[str, ...], str]:
-    """An error for the other process: names of its classes, the closest first, and its message."""
+    """Return an error in a form for the other process: names of its classes, most specific first, and its message."""
     return tuple(kind.__name__ for kind in type(error).__mro__), str(error)
 
 
@@ -92,7 +92,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
 
 
 def _presumed_latency(daq: DAQ, bench: Bench) -> float:
-    """Latency in samples as far as it is known before the device is started: queue, hold and filters."""
+    """Return the latency in samples as far as known before the device is started: queue, hold and filters."""
     queue = bench.driver.options.get("queue_blocks", 1)
     queue = queue if isinstance(queue, int) else 1
     return queue * bench.block + 1.0 + daq.filter_delay_samples
@@ -101,7 +101,7 @@ def _presumed_latency(daq: DAQ, bench: Bench) -> float:
 def _shared(
     daq: DAQ, settings: TickSettings, latency_samples: float, ring_s: float, descriptor: int
 ) -> tuple[Layout, SharedMemory]:
-    """The shared block, with room for a ramp and all that is under way in the device behind it."""
+    """Return layout and shared memory, with room for a ramp and for the samples then still in the device's queue."""
     arrays = settings.build(latency_samples).arrays
     layout = Layout.of(settings.bench, arrays, len(daq.counters), ring_s)
     return layout, SharedMemory(descriptor, layout, create=True)
@@ -116,7 +116,7 @@ def _begin(
 
 
 def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
-    """Compile, or load from the cache, what the loop calls, before any device runs."""
+    """Compile the loop's kernels, or load them from the cache, before any device runs."""
     tick = settings.build(0.0)
     arrays, _ = packed(tick.arrays)
     readings, rows = tick.buffers(0)
@@ -130,7 +130,7 @@ def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
 
 
 def _listen() -> list[str]:
-    """From here on signals only ask for the ramp; return a list that collects their names."""
+    """Let signals only request the ramp from now on; return a list that collects their names."""
     came: list[str] = []
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -143,14 +143,14 @@ def _listen() -> list[str]:
 
 
 def _asked(came: list[str], commands: Connection) -> str:
-    """What has asked this process to end, in one sentence: a signal, or a campaign that is gone."""
+    """Return one sentence on what has asked this process to end (a signal, a campaign that is gone), or an empty text."""
     if came:
         return f"the loop's process was asked to end ({came[0]})"
     return "the campaign has let go of the loop" if commands.poll() else ""  # readable: it was closed
 
 
 def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
-    """Statistics that only the loop process knows, as plain data for the record."""
+    """Return the statistics that only the loop process knows, as plain data for the recording."""
     counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
     real_time = {**said, **{name: str(value) for name, value in counted.items()}}
     return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}

@@ -1,4 +1,4 @@
-"""A bench whose driver and loop run in another process, as the campaign sees it."""
+"""The campaign's side of a bench whose driver and loop run in another process."""
 
 import pickle
 import warnings
@@ -28,7 +28,7 @@ PATIENCE_S = 5.0
 
 
 class WorkerLoop:
-    """A loop in another process: its rows, and a copy of its state at the last of them."""
+    """A loop in another process: its rows, and a copy of its state at the last row."""
 
     failure: DaqError | None
 
@@ -70,16 +70,16 @@ class WorkerLoop:
 
     @property
     def waits(self) -> bool:
-        """False: the other process goes on."""
+        """False, because the other process continues."""
         return False
 
     def request_stop(self, cause: str = "") -> None:
-        """Ask for the ramp to 0 V; the loop looks at every block."""
+        """Request the ramp to 0 V; the loop checks the request at every block."""
         self.cause = self.cause or cause
         self._memory.request_stop()
 
     def bring_down(self) -> None:
-        """Ramp to 0 V if it still runs, and wait for the end; the rows are dropped."""
+        """Ramp to 0 V if the loop still runs, and wait for its end; the rows are dropped."""
         self.request_stop()
         for _ in self.run():
             pass
@@ -94,7 +94,7 @@ class WorkerLoop:
         return out | {"histograms": {name: histograms[name].bins() for name in TIMES}}
 
     def _wait(self) -> Callable[[], None] | None:
-        """Until a chunk has come; returns what is to be done at the end of the loop once nothing more will come."""
+        """Wait for a chunk; if the loop has ended instead, return the function to call after the last chunk."""
         facts = self._worker.facts
         try:
             if not facts.poll(self._silence_s):
@@ -145,12 +145,12 @@ def _daq_error(described: tuple[tuple[str, ...], str]) -> DaqError:
 
 
 class WorkerSession:
-    """Opens the driver in a process of its own; a context manager, at whose end the output is at 0 V.
+    """Context manager that opens the driver in a separate process and ends with the output at 0 V.
 
-    ``privileged`` false does without real-time scheduling and locked memory. ``ring_s``: rows of how many seconds the loop
-    keeps for a campaign that is late.
+    With ``privileged = False`` the process runs without real-time scheduling and locked memory. ``ring_s``: seconds of rows
+    that the loop keeps for a campaign that is late.
 
-    Raises what the driver does when it is opened: `rig.errors.DaqError`, `rig.errors.ConfigurationError`.
+    Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError` if the driver cannot be opened.
     """
 
     capabilities: Capabilities
@@ -175,7 +175,7 @@ class WorkerSession:
         return self._worker.pid
 
     def start(self, settings: TickSettings) -> RunningLoop:
-        """Start the device and the loop, which runs from here on; its rows wait in the ring until they are asked for."""
+        """Start the device and the loop, which runs from now on; its rows wait in the ring until they are taken."""
         self._worker.send("start", settings, self._ring_s)
         latency_samples, layout, remarks = self._worker.receive("started")
         self._loop = WorkerLoop(self._worker, settings, latency_samples, layout, self._counters, remarks)
@@ -187,7 +187,7 @@ class WorkerSession:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Ramp down if it still runs, and wait for the end."""
+        """Ramp down if the loop still runs, and wait for its end."""
         patience_s = PATIENCE_S + self._bench.limits.ramp_down_s  # it may run although its answer was lost
         if self._loop is not None and not self._loop.ended:
             self._loop.request_stop()

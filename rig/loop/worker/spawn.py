@@ -25,8 +25,8 @@ def supported() -> bool:
 class Worker:
     """A loop process.
 
-    It has a session of its own, so that a terminal's Ctrl-C and hang-up reach the campaign alone, and inherits two pipes and
-    the memory; it is a program of its own, so that a user's script needs no guard around its main part.
+    The process has its own session, so that a terminal's Ctrl-C and hang-up reach only the campaign. It inherits two pipes and
+    the memory. It is a separate program, so that a user's script needs no ``__main__`` guard.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class Worker:
             self._commands.send(command)
 
     def receive(self, expected: str) -> tuple[Any, ...]:
-        """The next answer of the process; raises the error that it sent, or `DaqError` if it has ended."""
+        """Return the next answer of the process; raise the error that it sent, or `DaqError` if it has ended."""
         try:
             name, *facts = self.facts.recv()
         except (EOFError, OSError):
@@ -73,7 +73,7 @@ class Worker:
         return tuple(facts)
 
     def ended(self) -> DaqError:
-        """The error for a process that has ended."""
+        """Return the error for a process that has ended."""
         try:
             status = self._process.wait(2.0)
         except subprocess.TimeoutExpired:
@@ -105,7 +105,7 @@ class Worker:
 
 
 def rebuilt(names: tuple[str, ...], message: str) -> RigError:
-    """An error of the other process, as the closest class that this process knows."""
+    """Return an error of the other process, as the most specific class that this process knows."""
     for name in names:
         kind = getattr(rig.errors, name, None)
         if isinstance(kind, type) and issubclass(kind, RigError):
@@ -114,7 +114,7 @@ def rebuilt(names: tuple[str, ...], message: str) -> RigError:
 
 
 def ask(*command: Any) -> Any:
-    """A loop process for one question: ``probe`` or ``round trips``."""
+    """Run a loop process for one order, ``probe`` or ``round trips``, and return its answer."""
     worker = Worker()
     try:
         worker.send(*command)

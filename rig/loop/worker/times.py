@@ -1,4 +1,4 @@
-"""The times of the blocks of a loop: how late each began, how long it took, and what held it up."""
+"""Times of a loop's blocks: how late each block began, how long it took, and what delayed it."""
 
 import gc
 import importlib.util
@@ -12,9 +12,9 @@ __all__ = ["STALL_NS", "BlockTimes", "disturbances", "since"]
 
 
 def disturbances() -> dict[str, int]:
-    """Counts so far of what may delay a thread: modules imported, runs of the garbage collector.
+    """Return counts of events so far that may delay a thread: modules imported, runs of the garbage collector.
 
-    Where the system counts them, also this thread's involuntary context switches and its major and minor page faults.
+    If the system counts them, involuntary context switches and major and minor page faults of this thread are included.
     """
     system = _of_the_system()  # first, because it may import a module itself
     collections = sum(int(generation["collections"]) for generation in gc.get_stats())
@@ -22,7 +22,7 @@ def disturbances() -> dict[str, int]:
 
 
 def since(before: dict[str, int]) -> dict[str, int]:
-    """Increase of the counts since ``before``."""
+    """Return the increase of the counts since ``before``."""
     now = disturbances()
     return {name: now[name] - count for name, count in before.items()}
 
@@ -39,7 +39,7 @@ def _of_the_system() -> dict[str, int]:
 
 
 STALL_NS = 1_000_000
-"""A block that is handed over later than this after its release has been held up."""
+"""Time from the release of a block to the sending of its outputs, above which the block counts as a stall."""
 
 _now = time.monotonic_ns
 _computed = time.thread_time_ns
@@ -48,9 +48,9 @@ _computed = time.thread_time_ns
 class BlockTimes:
     """Counts the times of blocks into the histograms of the shared memory, and how many blocks were late.
 
-    A *stall* is a block handed over more than 1 ms after its release. For ``own_stalls`` the thread's own computing time since
-    the block before explains the delay; in the other stalls the thread was not running. Without a clock
-    (`rig.loop.worker.pace.Lockstep`) nothing can be late, and only the time that a block took is counted.
+    A *stall* is a block whose outputs are sent more than 1 ms after the block's release. In ``own_stalls`` the thread's own
+    computing time since the previous block explains the delay; in the other stalls the thread was not running. Without a clock
+    (`rig.loop.worker.pace.Lockstep`) no block can be late, and only the duration of a block is counted.
     """
 
     def __init__(self, pace: Pace, memory: SharedMemory, deadline_ns: int) -> None:
@@ -71,11 +71,11 @@ class BlockTimes:
         return self.late + self._pace.skipped
 
     def begun(self, begun_ns: int) -> None:
-        """Note that work on a block began at this time (monotonic clock, ns)."""
+        """Record that work on a block began at this time (monotonic clock, ns)."""
         self._begun_ns, self._release_ns = begun_ns, self._pace.release(begun_ns)
 
     def done(self) -> int:
-        """Note that the outputs of the block are handed over now; return the time since its release, ns."""
+        """Record that the outputs of the block are sent now; return the time since the block's release, ns."""
         begun, release = self._begun_ns, self._release_ns
         if not begun:
             return 0

@@ -1,4 +1,4 @@
-"""What is known before a run of the output that force and motion need: the record that the watch reads."""
+"""Knowledge before a run about the output that force and motion need, as the record that the supervision reads."""
 
 import math
 
@@ -10,19 +10,20 @@ from rig.tick.safety.following import EXPECTED, VISIBLE
 
 __all__ = ["expected_record"]
 
-JUDGED = 16.0  # times that smallest amplitude, and
-NOISES = 8.0  # times the noise that the bench states for a channel (RMS), from which on the exciter is judged
+# Only amplitudes above JUDGED times the smallest readable amplitude plus NOISES times the channel's RMS noise are judged.
+JUDGED = 16.0
+NOISES = 8.0
 TOLD_APART = 3.0
-FLOOR_PART = 0.025  # of the largest voltage: where the output may always be
+FLOOR_PART = 0.025  # of the largest voltage: an output that is always allowed
 
 
 def expected_record(
     bench: Bench, smallest_n: float, smallest_m_s2: float, exciter: PlantModel | None = None
 ) -> np.ndarray:
-    """One record of `rig.tick.safety.following.EXPECTED`.
+    """Return one record of `rig.tick.safety.following.EXPECTED`.
 
-    ``smallest_n`` and ``smallest_m_s2`` are the smallest amplitudes of which a phase can be read. Of the plant only the
-    ``exciter`` counts: it is the part that a nonlinear structure leaves as it is.
+    ``smallest_n`` and ``smallest_m_s2`` are the smallest amplitudes whose phase can be read. Only the exciter's part of the
+    plant model ``exciter`` is used, because a nonlinear structure does not change it.
     """
     force, drive = (bench.channels[bench.index_of(role)] for role in ("force", "drive"))
     out = np.zeros(1, EXPECTED)
@@ -41,11 +42,12 @@ def expected_record(
 
 
 def known_band_rad_s(plant: PlantModel) -> tuple[float, float]:
-    """Lowest and highest frequency (rad/s) at which a linear test has told alpha from beta.
+    """Return the lowest and highest frequency (rad/s) at which a linear test can distinguish alpha from beta.
 
-    Of ``u = (alpha + beta Y) F`` it has seen the sum. Beta stands out where the structure resonates, and is extrapolated
-    elsewhere: on the magnet beam, 3 % above the resonance, it is off by a factor of three. So the band is that in which
-    ``|beta Y|`` is `TOLD_APART` times ``|alpha|``, and half a bandwidth on each side of the resonance at the least.
+    The test measures only the sum in ``u = (alpha + beta Y) F``. Beta dominates near the resonance of the structure and is
+    extrapolated elsewhere: on the magnet beam, 3 % above the resonance, beta is wrong by a factor of three. The band is
+    therefore where ``|beta Y|`` is at least `TOLD_APART` times ``|alpha|``, and at least half a bandwidth to each side of the
+    resonance.
     """
     lock, half = plant.lock_frequency_rad_s(), plant.damping_ratio * plant.frequency_rad_s
     omega = lock + half * np.linspace(-50.0, 50.0, 2001)

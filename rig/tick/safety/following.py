@@ -1,9 +1,9 @@
-"""Compiled watch whether force and motion follow the output, as the plant, known or just measured, says.
+"""Compiled check whether force and motion follow the output.
 
-There are two witnesses. A linear exciter obeys ``u = alpha(s) F + beta(s) A`` whatever the structure does. Where alpha and beta
-are known, every fundamental is held against them (`contradicts_exciter`). Where they are not, the output that sufficed a
-moment ago is what was just measured. A law that holds a force or a response may not raise its output beyond `LARGEST_RISE`
-times that while what it holds does not follow (`follow_level`).
+There are two checks. A linear exciter obeys ``u = alpha(s) F + beta(s) A`` whatever the structure does. If alpha and beta are
+known, the fundamentals of every sample are compared with this equation (`contradicts_exciter`). In any case the output that
+last sufficed serves as reference: a law that holds a force or a response may not raise its output beyond `LARGEST_RISE` times
+this reference while the held quantity does not follow (`follow_level`).
 """
 
 import math
@@ -16,25 +16,29 @@ from vibrolock.compiled import Record, kernel
 
 __all__ = ["EXPECTED", "FOLLOWING"]
 
-LARGEST_RISE = 2.0  # of the output above what last sufficed, and so also within one period
-CREEP = 1.05  # a period: so fast may an output rise by which a held quantity stays at its level
-ASTRAY_RISE = 1.5  # from here on a level that does not follow is astray, or with less than half of what there was
-ASTRAY_PART = 0.5
+LARGEST_RISE = 2.0  # largest output over the output that last sufficed; this also bounds the rise within one period
+CREEP = 1.05  # a period: largest rise of the reference output while the held quantity stays at its level
+ASTRAY_RISE = 1.5  # rise of the output from which a held quantity that does not follow counts as astray
+ASTRAY_PART = 0.5  # of its reference; a held quantity below it is astray from a rise of RISEN on
 ASTRAY_PERIODS = 10
-RISEN = 1.2  # from here on an output has risen; a force that sags while a vibration builds up needs no more output
-IN_ORDER = 0.9  # of its level: a held quantity that has so much follows
-SAGGED = 0.75  # of its level: a force may be so far behind while the vibration builds up
-TOO_MUCH = 1.5  # times its level: a law that raises its output then holds something else than it reads
-FAR_TOO_MUCH = 3.0  # and so much of a force is not what a vibration takes that builds up
-GROWN = 1.1  # times what there was: it follows, although it is far from its level
-JUMPED = 1.3  # a force may fall where the vibration grows by so much more than the output: a jump past a turning point
-VANISHED = 0.15  # of its level: a force that low is not what such a jump leaves
-VISIBLE = 8.0  # times the smallest amplitude of which a phase can be read: about three bits of the converter
+RISEN = 1.2  # rise from which the output counts as risen; a force that sags during build-up needs no more output
+IN_ORDER = 0.9  # of its level; a held quantity above it follows
+SAGGED = 0.75  # of its level; a force may sag to it while the vibration builds up
+TOO_MUCH = 1.5  # times its level; a law that raises its output above it does not hold the quantity that it reads
+FAR_TOO_MUCH = 3.0  # times its level; the build-up of a vibration does not take a force as large as this
+GROWN = 1.1  # times its reference; a quantity that has grown so much follows, even if far from its level
+JUMPED = (
+    1.3  # growth of the vibration over the rise of the output from which a force may fall: a jump past a turning point
+)
+VANISHED = 0.15  # of its level; a jump past a turning point leaves more force than this
+VISIBLE = 8.0  # times the smallest amplitude whose phase can be read: about three bits of the converter
 SILENT_PERIODS = 40
-UNLIKE = 0.6  # of the largest of output sent and terms of the known exciter
-TOO_STRONG = 4.0  # times the output: what an amplifier of another gain makes of it, also while the vibration grows
-WIDE = 3.0  # times its band, in which the known exciter tells an amplifier of another gain
-UNLIKE_PERIODS = 1.0  # of the mode under test, for which it must last
+UNLIKE = (
+    0.6  # deviation of sent from needed output, over the largest of the output sent and the terms of the known exciter
+)
+TOO_STRONG = 4.0  # needed over sent output; shows an amplifier of another gain, even while the vibration grows
+WIDE = 3.0  # times its band; within it the known exciter can still show an amplifier of another gain
+UNLIKE_PERIODS = 1.0  # duration of a contradiction that trips, in periods at the centre frequency of the known exciter
 
 EXPECTED = np.dtype(
     [
@@ -53,10 +57,10 @@ EXPECTED = np.dtype(
         ("drive_skew_s", "f8"),
     ]
 )
-"""What is known beforehand (one record). ``known``: whether there is an exciter ``u = alpha F + beta A``, with its
-coefficients as in `controller.tuning.PlantModel` and the band in which they hold. ``noise_``: amplitudes below which it is
-not judged by. ``visible_``: amplitudes from which on a force or acceleration is told from noise. ``floor_v``: output that is
-never too much. ``_skew_s``: delays of the two channels."""
+"""Knowledge before the run (one record). ``known``: whether the exciter ``u = alpha F + beta A`` is known; its coefficients are
+as in `controller.tuning.PlantModel`, and ``lowest_rad_s``, ``highest_rad_s`` are the band in which they hold. ``noise_``:
+amplitudes below which the exciter is not judged. ``visible_``: amplitudes above which a force or acceleration is distinguished
+from noise. ``floor_v``: output that is always allowed. ``_skew_s``: delays of the two channels."""
 
 FOLLOWING = np.dtype(
     [
@@ -81,29 +85,32 @@ FOLLOWING = np.dtype(
         ("most_periods", "i8"),
     ]
 )
-"""State of the watch (one record). ``alpha``, ``beta``: exciter at this period's frequency, ``_rate`` their derivatives by s,
-``told``: whether they are known apart there. ``sent``: complex output as the detector's filter would show it, ``late_`` what
-has passed that filter once more, ``needed``: output that the known exciter needs for it. ``unlike_s``: time without a break in
-which the two contradict each other, ``most_unlike_s`` the longest. ``silent_periods`` in which one of force and motion showed
-nothing and the other much. ``reference_``: output (V), held quantity and the other of
-force and motion when the held quantity last followed. ``astray_periods`` since in which it did not, ``most_periods`` of these
-there ever were, ``largest_rise`` of the output above its reference in them."""
+"""State of the supervision (one record).
+
+``alpha``, ``beta``: exciter at this period's frequency; ``_rate``: their derivatives by s; ``told``: whether alpha and beta are
+individually known at this frequency. ``sent``: complex output after the detector's low-pass; ``late_``: quantities after the
+same low-pass once more; ``needed``: output that the known exciter needs for force and motion. ``unlike_s``: present
+uninterrupted time in which ``late_sent`` and ``needed`` contradict each other; ``most_unlike_s``: the longest such time.
+``silent_periods``: periods in a row in which either force or motion showed nothing while the other was large. ``reference_``:
+output (V), held quantity, and the other of force and motion, when the held quantity last followed. ``astray_periods``: count of
+periods since then in which the held quantity did not follow; ``most_periods``: the highest count so far; ``largest_rise``: the
+largest ratio of output to reference output in these periods."""
 
 
 @kernel
 def polynomial(coefficients: np.ndarray, z: complex) -> tuple[complex, complex]:
-    """``c_0 + c_1 z + c_2 z^2 + c_3 z^3`` and its derivative."""
+    """Return ``c_0 + c_1 z + c_2 z^2 + c_3 z^3`` and its derivative."""
     c0, c1, c2, c3 = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
     return complex(c0 + z * (c1 + z * (c2 + z * c3))), complex(c1 + z * (2.0 * c2 + z * 3.0 * c3))
 
 
 @kernel
 def see_frequency(expected: Record, following: Record, omega: float) -> None:
-    """Once a period: the known exciter at the frequency of the moment (rad/s), zero where it says nothing.
+    """Evaluate the known exciter at the present frequency (rad/s), once a period; set it to zero outside its range.
 
-    It is told within its band, and tells an amplifier of another gain `WIDE` times as far around it.
-
-    ``alpha``, ``beta`` and their derivatives by s, from polynomials in ``z = s/centre``, beta's divided by z^2.
+    Alpha and beta are individually known (``told``) within the exciter's band. Within `WIDE` times the band they can still show
+    an amplifier of another gain. ``alpha``, ``beta`` and their derivatives by s come from polynomials in ``z = s/centre``; the
+    polynomial of beta is divided by z^2.
     """
     following.alpha = following.beta = following.alpha_rate = following.beta_rate = 0.0
     following.told = 1 if expected.lowest_rad_s <= omega <= expected.highest_rad_s else 0
@@ -129,11 +136,11 @@ def see_frequency(expected: Record, following: Record, omega: float) -> None:
 def contradicts_exciter(
     expected: Record, following: Record, sent: complex, force: complex, drive: complex, gain: float, dt_s: float
 ) -> bool:
-    """Once a sample: whether the known exciter has contradicted the output for the time of a period.
+    """Return whether force and motion have contradicted the output, by the known exciter, for `UNLIKE_PERIODS`; once a sample.
 
-    ``sent`` is the complex output (V) whose effect ``force`` (N) and ``drive`` (m/s^2) show. It passes the low-pass of their
-    detector, of step ``gain``; all three pass one more, for amplitudes that change: ``U = alpha F + alpha' dF/dt + beta A +
-    beta' dA/dt``. What is below the noise is not judged.
+    ``sent`` is the complex output (V) whose effect ``force`` (N) and ``drive`` (m/s^2) show. ``sent`` passes the detector's
+    low-pass of step ``gain``. Then all three pass one more low-pass, which gives the derivatives for changing amplitudes:
+    ``U = alpha F + alpha' dF/dt + beta A + beta' dA/dt``. Amplitudes below the noise are not judged.
     """
     following.sent += gain * (sent - following.sent)
     following.late_sent += gain * (following.sent - following.late_sent)
@@ -155,9 +162,10 @@ def contradicts_exciter(
 
 @kernel
 def silent_side(expected: Record, following: Record, force: float, response: float) -> int:
-    """Once a period without a lock: 1 if the force (N), 2 if the motion (m/s^2) has shown nothing for `SILENT_PERIODS`.
+    """Return 1 if the force (N), 2 if the motion (m/s^2) has shown nothing for `SILENT_PERIODS`, else 0.
 
-    The other one must stand out clearly: a level may also be too low for both.
+    Called once a period while no lock was ever gained. The other signal must be clearly visible, because a level may be too
+    low for both.
     """
     no_force = force < expected.visible_n / VISIBLE and response > VISIBLE * expected.visible_m_s2
     no_motion = response < expected.visible_m_s2 / VISIBLE and force > VISIBLE * expected.visible_n
@@ -167,7 +175,7 @@ def silent_side(expected: Record, following: Record, force: float, response: flo
 
 @kernel
 def begin_to_follow(expected: Record, following: Record, amplitude_v: float, level: float, other: float) -> None:
-    """A law begins to hold a level: what there is now is what the output (V) has sufficed for so far."""
+    """Take the present output (V), held quantity and other quantity as the reference of the supervision."""
     following.reference_v = max(amplitude_v, expected.floor_v)
     following.reference_level = level
     following.reference_other = other
@@ -184,16 +192,16 @@ def follow_level(
     slipping: bool,
     may_jump: bool,
 ) -> bool:
-    """Once a period: take in what is held; returns whether it has been astray for `ASTRAY_PERIODS`.
+    """Check once a period whether the held quantity follows the output; return whether it was astray for `ASTRAY_PERIODS`.
 
-    Of the ``period`` (of `controller.period.PERIOD`) count the output, the fundamentals, and what is held; it should be
-    ``wanted`` (N or m). ``slipping``: a lock is about to be lost, so that nothing may be learned.
+    ``period`` (of `controller.period.PERIOD`) gives the output, the fundamentals and the held quantity, which should be
+    ``wanted`` (N or m). ``slipping``: a lock is about to be lost, so that the reference is not updated.
 
-    What is held follows where it has grown towards its level, or is near it while the output creeps. A force may also be too
-    large while the vibration builds up, and sag by less than a quarter, with an output that creeps, where the vibration has
-    grown by more than the output has risen. At a frequency that the plan gives (``may_jump``) it may then drop further: so a
-    structure jumps past a turning point. It is astray where the output has risen and it has stayed, has fallen to a half
-    without any such growth, or is too much.
+    The held quantity follows if it has grown towards its level, or is near its level while the output rises slowly. While the
+    vibration builds up, a force may be too large. If the vibration has grown more than the output has risen, a force may also
+    sag by up to a quarter while the output rises slowly. At a frequency given by the plan (``may_jump``) the force may then
+    drop further, because a structure can jump past a turning point. The held quantity is astray if the output has risen and the
+    quantity has not followed, has fallen to half its reference without such growth, or is too large.
     """
     amplitude_v, held, force, response = period.output_v, period.held, period.force_n, period.drive_m_s2
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
@@ -228,5 +236,5 @@ def follow_level(
 
 @kernel
 def permitted_level(following: Record, demanded_v: float) -> float:
-    """Output amplitude (V) that a law which holds a level may ask for."""
+    """Return the output amplitude (V), limited to `LARGEST_RISE` times the reference, that a law holding a level may use."""
     return float(min(demanded_v, LARGEST_RISE * following.reference_v))

@@ -1,4 +1,4 @@
-"""Compiled decisions of the safety room: pure functions of readings, limits and the guard's own state."""
+"""Compiled safety decisions: pure functions of readings, limits and the guard's own state."""
 
 import math
 
@@ -43,13 +43,13 @@ def shut_down(guard: Record, reason: int, channel: int, value: float, sample: in
 
 @kernel
 def is_over(guard: Record, lead: int) -> bool:
-    """Whether nothing is left to do: dropped, or ramped down and the ramp's last sample through the device's queue."""
+    """Return whether the output was dropped, or was ramped down and the ramp's last sample has left the device's queue."""
     return bool(guard.mode == OFF and (guard.dropped == 1 or guard.off_samples > lead))
 
 
 @kernel
 def watch_switch(guard: Record, channel: Record, index: int, volts: float, sample: int) -> None:
-    """Drop to 0 V where the emergency stop is pressed; its reading standing still is in order, its being no number is not."""
+    """Drop to 0 V if the emergency stop is pressed or its reading is not a number; a constant reading is allowed."""
     if not channel.stop_below_v <= volts <= channel.stop_above_v:
         shut_down(guard, EMERGENCY_STOP, index, volts * channel.unit_per_volt, sample, True)
 
@@ -58,7 +58,7 @@ def watch_switch(guard: Record, channel: Record, index: int, volts: float, sampl
 def watch_input(
     guard: Record, limits: Record, channel: Record, watch: Record, index: int, volts: float, sample: int, driven: bool
 ) -> bool:
-    """Check one raw reading (V) before it is used; False where it must not be (not a number)."""
+    """Check one raw reading (V) before it is used; return False if it is not a finite number and must not be used."""
     if channel.emergency_stop == 1:
         watch_switch(guard, channel, index, volts, sample)
         return math.isfinite(volts)
@@ -79,7 +79,7 @@ def watch_input(
 
 @kernel
 def watch_limit(guard: Record, channel: Record, index: int, value: float, sample: int) -> None:
-    """Check a force or acceleration: beyond its limit it trips, and once a trip's ramp does not help the output drops."""
+    """Check a force or acceleration: trip beyond its limit; drop the output if it grows far beyond during a trip's ramp."""
     if abs(value) > channel.limit:
         reason = FORCE_LIMIT if channel.role == FORCE else RESPONSE_LIMIT
         if guard.mode == ARMED:
@@ -90,7 +90,7 @@ def watch_limit(guard: Record, channel: Record, index: int, value: float, sample
 
 @kernel
 def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: float, index: int, sample: int) -> None:
-    """Integrate an acceleration (m/s^2) twice, with a leak that forgets its mean, and check the displacement (m)."""
+    """Integrate an acceleration (m/s^2) twice, with a leak that removes offsets, and check the displacement (m)."""
     gain, keep = limits.integrator_gain, 1.0 - limits.integrator_leak
     velocity = keep * watch.velocity + gain * acceleration
     displacement = keep * watch.displacement + gain * velocity
@@ -105,11 +105,11 @@ def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: flo
 
 @kernel
 def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float, omega: float) -> float:
-    """Go on with a motion that is not seen for a sample, as the vibration at ``omega`` (rad/s) that it was.
+    """Extrapolate the motion over one lost sample, as a harmonic vibration at ``omega`` (rad/s).
 
-    Integrated with a hole in it, an acceleration would leave a velocity behind and pass for travel. With the leak l (1/s),
-    ``x' = v - l x``; of ``x'' = -w^2 x`` follows ``v' = l v - (w^2 + l^2) x``, a turn by w dt for any l.
-    Returns the acceleration (m/s^2) that goes with it, ``v' + l v``.
+    Integrating an acceleration with a gap would leave a velocity offset and feign a displacement. With the leak l (1/s),
+    ``x' = v - l x``. From ``x'' = -w^2 x`` follows ``v' = l v - (w^2 + l^2) x``, a rotation by w dt for any l. Return the
+    corresponding acceleration (m/s^2), ``v' + l v``.
     """
     leak = limits.integrator_leak / limits.integrator_gain
     velocity, displacement = watch.velocity, watch.displacement
@@ -121,24 +121,24 @@ def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float
 
 @kernel
 def watch_gap(guard: Record, limits: Record, lost: int, sample: int, dt_s: float) -> None:
-    """Check for how many samples, but for those seen since, nothing has been seen of the rig."""
+    """Trip if the count of lost samples, minus those received since, reaches its limit."""
     if lost >= limits.lost_samples:
         shut_down(guard, SAMPLES_LOST, -1, lost * dt_s, sample, False)
 
 
 @kernel
 def watch_frequency(guard: Record, limits: Record, omega: float, sample: int) -> None:
-    """Check the frequency (rad/s) of what is put out."""
+    """Trip if the frequency (rad/s) of the output is outside its limits."""
     if guard.mode == ARMED and (omega < limits.lowest_rad_s or omega > limits.highest_rad_s):
         shut_down(guard, FREQUENCY_LIMIT, -1, omega / (2.0 * math.pi), sample, False)
 
 
 @kernel
 def permitted_turn(limits: Record, turn: float, demanded: float, before_v: float, after_v: float) -> float:
-    """Angle (rad) of the complex command that may follow ``turn`` while its amplitude goes from ``before_v`` to ``after_v``.
+    """Return the next angle (rad) of the complex command after ``turn``; its amplitude goes from ``before_v`` to ``after_v``.
 
-    The command's whole change keeps the slew limit s: ``|dU|^2 = da^2 + 4 a_0 a_1 sin^2(d/2) <= da^2 + a_0 a_1 d^2 <= s^2``.
-    The amplitude goes first, the angle d has what is left. It takes the shorter way round.
+    The command's total change keeps the slew limit s: ``|dU|^2 = da^2 + 4 a_0 a_1 sin^2(d/2) <= da^2 + a_0 a_1 d^2 <= s^2``.
+    The amplitude has priority; the angle's change d uses the remainder and takes the shorter way round.
     """
     product = before_v * after_v
     if demanded == turn or not product > 0.0:
@@ -153,7 +153,7 @@ def permitted_turn(limits: Record, turn: float, demanded: float, before_v: float
 
 @kernel
 def permitted_amplitude(guard: Record, limits: Record, demanded_v: float, sample: int) -> float:
-    """Output amplitude (V) that may go out for the ``demanded_v`` of the law: clamped, slew-limited, ramped or zero."""
+    """Return the permitted output amplitude (V) for the law's ``demanded_v``: clamped, slew-limited, ramped down or zero."""
     if not math.isfinite(demanded_v):
         shut_down(guard, NON_FINITE_OUTPUT, -1, demanded_v, sample, True)
     if guard.mode == ARMED:

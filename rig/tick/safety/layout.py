@@ -1,4 +1,4 @@
-"""Codes and records of the safety room, shared by its kernels and its shell."""
+"""Codes and records of the safety functions, shared by kernels and Python code."""
 
 from enum import IntEnum
 
@@ -8,12 +8,12 @@ __all__ = ["GUARD", "INPUT", "INPUT_WATCH", "LIMITS", "POLARITY_HINT", "TEXT", "
 
 
 class GuardMode(IntEnum):
-    """What the guard lets through."""
+    """Output that the guard permits."""
 
     DISARMED = 0
-    """0 V until somebody arms."""
+    """0 V until a person arms."""
     ARMED = 1
-    """The law's output."""
+    """The law's output within the limits."""
     RAMPING = 2
     """A half-cosine ramp to 0 V at frozen frequency."""
     OFF = 3
@@ -100,7 +100,7 @@ LIMITS = np.dtype(
         ("resonance_rad_s", "f8"),
     ]
 )
-"""Limits of a bench in samples and SI units (one record), and the resonance that its motion is mostly made of."""
+"""Limits of a bench in samples and SI units (one record), and the resonance frequency that dominates the motion."""
 
 INPUT = np.dtype(
     [
@@ -116,8 +116,8 @@ INPUT = np.dtype(
         ("stop_above_v", "f8"),
     ]
 )
-"""What the tick needs to know of an input channel (one record a channel). One with ``emergency_stop`` is a switch: it drops the
-output outside ``stop_below_v`` to ``stop_above_v`` and may stand still otherwise."""
+"""Parameters of an input channel (one record a channel). A channel with ``emergency_stop`` is a switch: a reading outside
+``stop_below_v`` to ``stop_above_v`` drops the output. Otherwise its reading may stay constant."""
 
 INPUT_WATCH = np.dtype(
     [
@@ -149,6 +149,6 @@ GUARD = np.dtype(
         ("lock", "i8"),
     ]
 )
-"""State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once: the first
-cause stays. ``off_samples`` counts since the output is off; ``dropped``: it was not ramped but dropped; ``lock``: the
-lock state when a segment was cut short."""
+"""State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once, for the first cause.
+``off_samples``: samples since the output went off; ``dropped``: the output was dropped instead of ramped; ``lock``: lock state
+when a segment was cut short."""

@@ -1,4 +1,4 @@
-"""The limits of a bench as the records that the kernels read, and a trip as a sentence."""
+"""Conversion of a bench's limits to the records that the kernels read, and of a trip to a sentence."""
 
 import math
 
@@ -14,7 +14,7 @@ __all__ = ["describe_end", "end_reason_of", "guard_record", "input_records", "li
 
 
 def limits_record(bench: Bench) -> np.ndarray:
-    """Limits in samples and SI units."""
+    """Return the limits in samples and SI units (one record of `LIMITS`)."""
     limits, rate = bench.limits, bench.sample_rate_hz
     out = np.zeros(1, LIMITS)
     out["voltage_v"] = limits.voltage_v
@@ -32,7 +32,7 @@ def limits_record(bench: Bench) -> np.ndarray:
 
 
 def input_records(bench: Bench) -> np.ndarray:
-    """One record a channel: scaling, range, limit, skew."""
+    """Return one record of `INPUT` for each channel: scaling, range, limit, skew."""
     out = np.zeros(len(bench.channels), INPUT)
     for record, channel in zip(out, bench.channels, strict=True):
         accelerates = channel.role in ("drive", "response")
@@ -54,19 +54,19 @@ def input_records(bench: Bench) -> np.ndarray:
             record["emergency_stop"] = 1
             record["stop_below_v"] = -math.inf if stop.below_v is None else stop.below_v
             record["stop_above_v"] = math.inf if stop.above_v is None else stop.above_v
-            record["alarm_v"] = 0.0  # every reading is looked at, none passes as plainly in order
+            record["alarm_v"] = 0.0  # examine every reading
     return out
 
 
 def watch_records(n_channels: int) -> np.ndarray:
-    """Fresh running state of the inputs."""
+    """Return the initial running state of the inputs."""
     out = np.zeros(n_channels, INPUT_WATCH)
     out["last_v"] = np.nan
     return out
 
 
 def guard_record(armed: bool) -> np.ndarray:
-    """A fresh guard, armed or not."""
+    """Return the initial record of a guard, armed or disarmed."""
     out = np.zeros(1, GUARD)
     out["mode"] = GuardMode.ARMED if armed else GuardMode.DISARMED
     out["channel"] = -1
@@ -74,15 +74,15 @@ def guard_record(armed: bool) -> np.ndarray:
 
 
 def end_reason_of(error: DaqError) -> EndReason:
-    """What a run ends with when its driver raises this error."""
+    """Return the reason with which a run ends if its driver raises this error."""
     return EndReason.EMERGENCY_STOP if isinstance(error, DaqEmergencyStop) else EndReason.DRIVER_FAILED
 
 
 def describe_end(guard: np.ndarray, bench: Bench) -> str:
-    """One sentence on why the output was brought down: reason, channel, value, sample.
+    """Return one sentence on why the output was brought down: reason, channel, value, sample.
 
-    What to look for is said only where no lock was gained at the start; the likely cause of a trip needs what was measured
-    before it (`rig.campaigns.running.trip_advice`).
+    A hint on the cause is given only if no lock was gained at the start. The likely cause of a trip must be judged from the
+    measurement before the trip (`rig.campaigns.running.trip_advice`).
     """
     reason = EndReason(int(guard["reason"][0]))
     text = TEXT[reason]

@@ -1,1 +1,1 @@
-"""The sequencer: segments of a plan, executed by the sample beside the tick."""
+"""The sequencer: executes the segments of a plan sample by sample, as part of the tick."""

@@ -21,7 +21,9 @@ NOT_LOCKED = int(Outcome.NOT_LOCKED)
 
 SATURATED_PERIODS = 20
 CLAMPED_PERIODS = 20
-FAR_PERIODS = 100  # a lock that swings at plain voltage comes near within the memory of a lightly damped mode
+FAR_PERIODS = (
+    100  # longer than a lightly damped mode decays; a lock that swings at constant voltage comes near within that
+)
 LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
 
 SETTLE_RULE = np.dtype([("phase_rad", "f8"), ("amplitude", "f8"), ("average_periods", "i8"), ("settled_periods", "i8")])
@@ -45,13 +47,13 @@ SETTLING = np.dtype(
         ("drift", "f8"),
     ]
 )
-"""Period means of the last periods, as a ring, and what the settle rule made of them (one record).
-``clamped_in_row`` counts at any time, ``clamped_periods`` since the present settling."""
+"""Means of the last periods, as rings, and the state of the settle rule (one record). ``clamped_in_row`` counts the present run
+of periods with clamped frequency; ``clamped_periods`` counts all such periods of the present settling."""
 
 
 @kernel
 def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
-    """Mean of the ``periods`` entries of a ring that end with entry number ``last`` (counted from 0 since the start)."""
+    """Return the mean over ``periods`` entries of a ring up to entry number ``last`` (counted from 0 since the start)."""
     total = 0.0
     for back in range(periods):
         total += ring[(last - back) % (2 * LONGEST_AVERAGE)]
@@ -62,12 +64,13 @@ def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
 def judge_period(
     settling: Record, rule: Record, period: Record, wanted: float, locked: bool, watch_force: bool
 ) -> None:
-    """Take in the means of a ``period`` (of `controller.period.PERIOD`) and apply the settle rule.
+    """Store the means of a ``period`` (of `controller.period.PERIOD`) and apply the settle rule.
 
-    Settled is: the loop is locked, the phase error averaged over ``average_periods`` stays within ``phase_rad``, and the
-    averaged response amplitude within ``amplitude`` (relative) of what it was that many periods before, for
-    ``settled_periods`` in a row. Where a loop holds the level, what it holds must on average be within ``amplitude`` of
-    what is ``wanted`` (0: there is no loop). With ``watch_force`` (open loop, held response) the force must keep still too.
+    The vibration is settled if the following holds for ``settled_periods`` in a row. The loop is locked. The phase error
+    averaged over ``average_periods`` is within ``phase_rad``. The averaged response amplitude is within ``amplitude``
+    (relative) of its average ``average_periods`` before. If a loop holds the level, the average of the held quantity is within
+    ``amplitude`` of ``wanted`` (0: no loop). With ``watch_force`` (open loop, held response) the averaged force must not change
+    by more than ``amplitude`` either.
     """
     n = rule.average_periods
     slot = settling.count % (2 * LONGEST_AVERAGE)
@@ -91,7 +94,7 @@ def judge_period(
         moved = (new - mean_of(settling.forces, last - n, n)) / new if new > 0.0 else math.inf
         drift = moved if abs(moved) > abs(drift) else drift
     settling.drift = drift
-    off = math.inf  # where a phase could not be read, too
+    off = math.inf  # also if no phase could be read
     if math.isfinite(settling.mean_error_rad):
         off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
     settling.good_periods = settling.good_periods + 1 if locked and off <= 1.0 else 0
@@ -103,7 +106,7 @@ def judge_period(
 
 @kernel
 def forget_periods(settling: Record) -> None:
-    """Begin a new settling: periods before the level was reached do not count."""
+    """Reset the settle rule: periods before the level was reached do not count."""
     settling.count = 0
     settling.good_periods = 0
     settling.bad_periods = 0
@@ -115,13 +118,16 @@ def forget_periods(settling: Record) -> None:
 
 @kernel
 def is_slipping(lock: Record) -> bool:
-    """Whether a lock is about to be lost: far off, but not for long enough. What fails meanwhile fails for that."""
+    """Return whether a lock is about to be lost: the error is large, but not yet for long enough.
+
+    Any other failure of a segment is then put down to the loss of the lock.
+    """
     return bool(lock.state == LOCKED and lock.far_periods > 0)
 
 
 @kernel
 def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed: float, periods: float) -> int:
-    """Outcome code of a held segment that has failed, or RUNNING."""
+    """Return the outcome code of a held segment that has failed, or RUNNING."""
     if lock.state == LOST:
         return LOST_LOCK
     if settling.saturated_periods >= SATURATED_PERIODS:
@@ -139,17 +145,17 @@ def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed:
 
 @kernel
 def was_always_far(lock: Record, elapsed: float) -> bool:
-    """Whether the phase was that of a lost lock in every period of a segment, and in 100 at the least."""
+    """Return whether the phase error was that of a lost lock in every period of a segment, and in at least 100 periods."""
     return bool(lock.far_periods >= max(FAR_PERIODS, math.floor(elapsed) - 1))
 
 
 @kernel
 def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
-    """Whether the time at the start voltage, over by its length, ends: DONE, a failure's code, or RUNNING while in doubt.
+    """Judge the start segment after its time has run out: return DONE, the code of a failure, or RUNNING while in doubt.
 
-    No lock is needed, for one may swing in and out at plain voltage. Refused is a force or motion too small to be read, a
-    frequency that stands at an end of its window for 20 periods, or a phase error that was that of a lost lock in every
-    period so far, for 100 at the least.
+    A lock is not required, because a lock may swing in and out at constant voltage. The start fails if force or motion is too
+    small to be read, if the frequency is at an end of its window for 20 periods, or if the phase error was that of a lost lock
+    in every period so far and in at least 100 periods.
     """
     if lock.state == LOCKED:
         return DONE

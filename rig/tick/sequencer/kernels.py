@@ -1,4 +1,4 @@
-"""Compiled sequencer: steps through the segments and gives level, lag and frequency of the moment."""
+"""Compiled sequencer: steps through the segments and gives the present level, lag and frequency."""
 
 import math
 
@@ -47,12 +47,12 @@ SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
 STOP = int(OnFailure.STOP)
 
-ARRIVED = 1e-3  # the output within this part of the larger of a ramp's levels is at its end
+ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
 
 
 @kernel
 def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outcome: int) -> None:
-    """Write down how the present segment ended and move to the next."""
+    """Record how the present segment ended and move to the next segment."""
     entry = outcomes[progress.segment]
     entry.outcome = outcome
     entry.end_sample = progress.sample
@@ -65,7 +65,7 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
 
 @kernel
 def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray) -> None:
-    """Pass over what is left of a failed point."""
+    """Skip the remaining segments of a failed point."""
     point = segments[progress.segment - 1].point
     while progress.segment < progress.segments and segments[progress.segment].point == point:
         entry = outcomes[progress.segment]
@@ -77,7 +77,7 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray) -> 
 
 @kernel
 def is_ramp(kind: int) -> bool:
-    """Whether a segment changes the level."""
+    """Return whether a segment of this kind changes the level."""
     return kind in (RAMP, LEVEL_SWEEP)
 
 
@@ -91,9 +91,10 @@ def give_up(
     guard: Record,
     failure: int,
 ) -> None:
-    """The present segment has failed: on to the next point, or end the run, as its plan wants it.
+    """Close a failed segment, then skip to the next point or end the run, as the plan demands.
 
-    A loop that never had a lock and is as far off as one that feeds back the wrong way ends it, before the level rises.
+    The run also ends if the start segment fails, or if the loop has never locked and its phase or frequency is as far off as
+    with reversed feedback; the level is then not raised.
     """
     segment = segments[progress.segment]
     elapsed = progress.cycle - progress.start_cycle
@@ -111,7 +112,10 @@ def give_up(
 
 @kernel
 def swept(segment: Record, start_omega: float, samples: int) -> float:
-    """Frequency (rad/s) of a sweep in the middle of a sampling interval: held over it, a linear one has its exact phase."""
+    """Return the frequency (rad/s) of a sweep in the middle of a sampling interval.
+
+    Holding it over the interval gives the exact phase of a linear sweep.
+    """
     way = segment.rate * (samples + 0.5)
     omega = start_omega * math.exp(way) if segment.logarithmic else start_omega + way
     return float(min(omega, segment.omega) if segment.rate > 0.0 else max(omega, segment.omega))
@@ -119,13 +123,16 @@ def swept(segment: Record, start_omega: float, samples: int) -> float:
 
 @kernel
 def between(start: float, end: float, rise: float) -> float:
-    """Value at ``rise`` (0 to 1) of the way; never beyond either end, where a limit may be: rounding would go there."""
+    """Return the value at ``rise`` (0 to 1) from start to end, clamped so that rounding never exceeds either end.
+
+    An end may coincide with a limit.
+    """
     return float(min(max(start + (end - start) * rise, min(start, end)), max(start, end)))
 
 
 @kernel
 def ramped(start: float, end: float, rise: float, geometric: bool) -> float:
-    """Level at ``rise`` (0 to 1) of a ramp, by its value or its logarithm."""
+    """Return the level at ``rise`` (0 to 1) of a ramp, interpolated linearly or, if ``geometric``, by the logarithm."""
     if geometric and start > 0.0 and end > 0.0:
         return float(min(max(start * (end / start) ** rise, min(start, end)), max(start, end)))
     return between(start, end, rise)
@@ -133,15 +140,18 @@ def ramped(start: float, end: float, rise: float, geometric: bool) -> float:
 
 @kernel
 def has_arrived(segment: Record, start_level: float, amplitude_v: float) -> bool:
-    """Whether the output (V) is where a ramp of tone or waveform ends: the slew limit may have held it back."""
+    """Return whether the output (V) has reached the end of a ramp; the slew limit may have held it back.
+
+    Only ramps of the voltage of a tone or waveform wait for the output.
+    """
     if segment.drive == LOOP_DRIVE or segment.amplitude_law != VOLTAGE:
-        return True  # its settle rule waits for the output
+        return True  # the settle rule waits for the output
     return bool(abs(amplitude_v - segment.level) <= ARRIVED * max(start_level, segment.level))
 
 
 @kernel
 def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, settling: Record, lock: Record) -> None:
-    """The first sample of a segment: note where it begins."""
+    """Store the start values of a segment at its first sample."""
     segment, entry = segments[progress.segment], outcomes[progress.segment]
     progress.entered = 1
     progress.start_cycle = progress.cycle
@@ -169,9 +179,9 @@ def advance(
     lock: Record,
     guard: Record,
 ) -> None:
-    """One sample of the sequencer: sets level, lag and frequency, moves on when a segment is over, ends the run after the last.
+    """Run the sequencer for one sample: set level, lag and frequency, move on after a segment, end the run after the last.
 
-    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``; where a level is unreached, a ramp that goes up
+    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached, an upward ramp
     waits.
     """
     if progress.finished:

@@ -1,6 +1,6 @@
 """Codes and records of the sequencer.
 
-A plan compiles to a table of segments. Durations count periods of the oscillator as seen by the inputs.
+A plan compiles to a table of segments. Durations are in periods of the oscillator, counted at the inputs.
 """
 
 from enum import IntEnum
@@ -11,58 +11,58 @@ __all__ = ["OUTCOME", "PROGRESS", "SEGMENT", "Drive", "OnFailure", "Outcome", "S
 
 
 class SegmentKind(IntEnum):
-    """What a segment does with the level."""
+    """Action of a segment on level or frequency."""
 
     RAMP = 0
     """Half-cosine from the present level to ``level`` in ``periods``."""
     SETTLE = 1
-    """Hold until settled, at the most ``periods``."""
+    """Hold until settled, for at most ``periods``."""
     RECORD = 2
-    """Hold for ``periods``, watched all the time; these rows are evaluated."""
+    """Hold for ``periods`` under the settle rule; these rows are evaluated."""
     HOLD = 3
-    """Hold for ``periods``, watched by nobody."""
+    """Hold for ``periods`` without applying the settle rule."""
     SWEEP = 4
     """Hold the level and sweep the frequency of a tone to ``omega``; these rows are evaluated."""
     LEVEL_SWEEP = 5
     """A ramp of the level whose rows are evaluated."""
     START = 6
-    """Hold for ``periods``, and as long as a lock is in doubt; without any the run ends before a loop takes the level over."""
+    """Hold for ``periods``, and longer while a lock is in doubt. If the start fails, the run ends before the level rises."""
 
 
 class Drive(IntEnum):
-    """Where the output's frequency comes from."""
+    """Source of the output's frequency."""
 
     LOOP = 0
     """The phase-locked loop."""
     TONE = 1
     """The plan: one frequency, ramped, stepped or swept."""
     WAVEFORM = 2
-    """The plan: a periodic waveform of unit peak is played; the level is its peak, one oscillator period its period."""
+    """The plan: a periodic waveform of unit peak is played. The level is its peak; its period is the oscillator period."""
 
 
 class Outcome(IntEnum):
-    """How a segment ended."""
+    """Result of a segment."""
 
     PENDING = 0
     RUNNING = 1
     DONE = 2
     NOT_SETTLED = 3
-    """The time to settle ran out."""
+    """The time for settling ran out."""
     DISTURBED = 4
     """The settle rule was broken while recording."""
     LOST_LOCK = 5
     UNREACHABLE = 6
-    """The output stood at its voltage limit and the level was not reached."""
+    """The output was at its voltage limit and the level was not reached."""
     SKIPPED = 7
     INTERRUPTED = 8
     OUTSIDE_WINDOW = 9
-    """The loop's frequency stood at an end of its window."""
+    """The loop's frequency was at an end of its window."""
     NOT_LOCKED = 10
-    """The phase error stayed beyond that of a lost lock for all the time at the start voltage."""
+    """The phase error was that of a lost lock during the whole time at the start voltage."""
 
 
 class OnFailure(IntEnum):
-    """What a failed point does to the rest of the plan."""
+    """Action after a failed point: skip the point or stop the plan."""
 
     SKIP = 0
     STOP = 1
@@ -92,9 +92,9 @@ SEGMENT = np.dtype(
 )
 """One segment of a plan, ``periods`` long, or ``samples`` where these are not 0.
 
-``level`` in the unit of its amplitude law (V, N, m), where ``geometric`` ramped by its logarithm, ``lag_rad`` the wanted phase
-lag, ``omega`` (rad/s) that a tone ends with, ``rate`` of a sweep in rad/s per sample, of a logarithmic one in 1 per sample,
-``waveform`` the number of the one that is played."""
+``level``: in the unit of the amplitude law (V, N, m); ``geometric``: ramped by the logarithm. ``lag_rad``: wanted phase lag.
+``omega``: final frequency of a tone (rad/s). ``rate``: of a sweep, in rad/s per sample, or in 1 per sample if ``logarithmic``.
+``waveform``: number of the waveform that is played."""
 
 OUTCOME = np.dtype(
     [
@@ -106,7 +106,7 @@ OUTCOME = np.dtype(
         ("drift", "f8"),
     ]
 )
-"""How each segment went: samples [first, end), periods used, last averaged phase error, last relative amplitude drift."""
+"""Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift."""
 
 PROGRESS = np.dtype(
     [
@@ -130,6 +130,6 @@ PROGRESS = np.dtype(
         ("unlocked", "i8"),
     ]
 )
-"""Where in the plan the run stands (one record). ``cycle``: oscillator periods that the inputs have seen so far, with the
-fraction; ``unreached``: the output stands at its limit and the level of the moment is not reached; ``frozen_cycles`` of a ramp
-that its level could not follow; ``unlocked``: no lock was ever gained."""
+"""Position of the run in the plan (one record). ``cycle``: oscillator periods at the inputs so far, with the fraction;
+``unreached``: the output is at its limit and the present level is not reached; ``frozen_cycles``: periods for which a ramp
+waited because its level was not reached; ``unlocked``: no lock was ever gained."""

@@ -1,4 +1,4 @@
-"""From a list of steps to the table of segments that the compiled sequencer executes, and the settle rule."""
+"""Settings of the settle rule, and conversion of a plan's steps to the table of segments of the compiled sequencer."""
 
 import math
 from collections.abc import Sequence
@@ -46,7 +46,7 @@ class SettleRule(Configured):
         return 2 * self.average_periods + self.settled_periods - 1
 
     def build(self) -> np.ndarray:
-        """The record that the kernels read."""
+        """Return the record that the kernels read."""
         out = np.zeros(1, SETTLE_RULE)
         out["phase_rad"] = math.radians(self.phase_deg)
         out["amplitude"] = self.amplitude
@@ -57,10 +57,10 @@ class SettleRule(Configured):
 
 @dataclass(frozen=True)
 class Excitation:
-    """What is sent out where the loop does not choose the frequency.
+    """Output of a segment whose frequency is not chosen by the loop.
 
-    A tone of ``frequency_hz``, with which the segment ends; a sweep goes there at ``rate``, in Hz/s, or in octaves/s where it
-    is ``logarithmic``. Or the ``waveform`` of that number, whose fundamental is ``frequency_hz``.
+    Without ``waveform``: a tone that ends at ``frequency_hz``; a sweep goes there at ``rate``, in Hz/s, or in octaves/s if
+    ``logarithmic``. With ``waveform``: the waveform of this number, whose fundamental is ``frequency_hz``.
     """
 
     frequency_hz: float
@@ -73,10 +73,10 @@ class Excitation:
 class Segment:
     """One step of a plan: its kind, the point it belongs to (-1: none), the level (V, N or m) and its length in periods.
 
-    Without an ``excitation`` the phase-locked loop chooses the frequency, for the lag ``lag_deg`` (if not given, the law's).
-    ``amplitude_law`` says what the level is (if not given, the plan's); where it changes, the level begins at what is
-    measured, without a bump. A ``geometric`` ramp goes by the level's logarithm. A held segment with ``duration_s`` lasts so
-    long, whatever its ``periods``; a sweep is over at its last frequency, whatever its ``periods``.
+    Without an ``excitation`` the phase-locked loop chooses the frequency for the lag ``lag_deg`` (by default the law's).
+    ``amplitude_law`` says what the level prescribes (by default as in the plan). If the amplitude law changes, the level starts
+    at the measured value, without a bump. A ``geometric`` ramp interpolates the logarithm of the level. A held segment with
+    ``duration_s`` ignores its ``periods``; a sweep also ignores them and ends at its last frequency.
     """
 
     kind: SegmentKind
@@ -98,9 +98,9 @@ def segment_table(
     amplitude_law: AmplitudeLaw = AmplitudeLaw.VOLTAGE,
     lag_rad: float = -0.5 * math.pi,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The table of segments, and the table of outcomes that goes with it, all pending.
+    """Return the table of segments and the matching table of outcomes, all pending.
 
-    ``amplitude_law`` and ``lag_rad`` are those of segments that name none.
+    ``amplitude_law`` and ``lag_rad`` apply to segments that do not give their own.
     """
     table = np.zeros(len(segments), SEGMENT)
     for row, segment in zip(table, segments, strict=True):

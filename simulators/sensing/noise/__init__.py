@@ -1,1 +1,1 @@
-"""Random numbers by counter."""
+"""Counter-based random numbers."""

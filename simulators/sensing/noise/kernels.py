@@ -1,8 +1,9 @@
-"""Compiled normal random numbers by counter: a function of key and sample index alone.
+"""Compiled counter-based normal random numbers: each number depends only on key and sample index.
 
-A run therefore gives the same samples however it is cut into blocks, and one channel knows nothing of another. The
-numbers come from a ziggurat of 256 layers (Marsaglia & Tsang 2000, with 53 bits that do not serve as layer number too,
-as Doornik 2005 asks for): exact, and 99 % of them cost one hash, one table look-up and one comparison.
+A run therefore gives the same samples however it is cut into blocks, and channels are independent of each other. The method is
+a ziggurat of 256 layers (Marsaglia & Tsang 2000). The 53 bits of the number are separate from the bits of the layer index, as
+recommended by Doornik (2005). The distribution is exact, and 99 % of the numbers cost one hash, one table look-up and one
+comparison.
 """
 
 import math
@@ -20,11 +21,11 @@ _LAYER = np.uint64(255)
 
 LAYERS = 256
 TAIL = 3.6541528853610088
-"""Where the tail begins: with it, all layers have the same area and the last one ends at the top of the density."""
+"""Start of the tail, chosen so that all layers have the same area and the last layer ends at the maximum of the density."""
 
 
 def _edges() -> NDArray[np.float64]:
-    """Right edges of the layers [LAYERS + 1], the base first, for the density ``exp(-x^2 / 2)``."""
+    """Return the right edges of the layers [LAYERS + 1], the base first, for the density ``exp(-x^2 / 2)``."""
     area = TAIL * math.exp(-0.5 * TAIL**2) + math.sqrt(0.5 * math.pi) * math.erfc(TAIL / math.sqrt(2.0))
     edges = np.zeros(LAYERS + 1)
     edges[0] = area * math.exp(0.5 * TAIL**2)  # a rectangle with the area of the base and its tail
@@ -36,12 +37,12 @@ def _edges() -> NDArray[np.float64]:
 
 EDGES = _edges()
 HEIGHTS = np.exp(-0.5 * EDGES**2)
-"""Density at the edges; the heights between which a layer lies."""
+"""Density at the edges; a layer lies between two neighbouring heights."""
 
 
 @kernel
 def mix(value: np.uint64) -> np.uint64:
-    """A well-mixed 64-bit hash: the output function of SplitMix64 (Steele, Lea & Flood 2014)."""
+    """Return a 64-bit hash by the output function of SplitMix64 (Steele, Lea & Flood 2014)."""
     value = (value ^ (value >> _30)) * _MIX_1
     value = (value ^ (value >> _27)) * _MIX_2
     return value ^ (value >> _31)
@@ -49,16 +50,16 @@ def mix(value: np.uint64) -> np.uint64:
 
 @kernel
 def unit(bits: np.uint64) -> float:
-    """A number within (0, 1) from the upper 53 bits."""
+    """Return a number within (0, 1) from the upper 53 bits."""
     return float((float(bits >> _11) + 0.5) * 2.0**-53)
 
 
 @kernel
 def rejected(bits: np.uint64, layer: np.int64, x: float) -> tuple[float, np.uint64, bool]:
-    """What becomes of a number beyond the part of its layer that lies wholly under the density.
+    """Accept or reject a number outside the part of its layer that lies wholly under the density.
 
-    Returns the number, the last bits used, and whether it is to be taken: in the tail by Marsaglia's exponential method,
-    elsewhere where a height drawn within the layer is under the density.
+    In the base layer, draw a number from the tail by Marsaglia's exponential method. In other layers, accept the number if a
+    height drawn within the layer is under the density. Return the number, the last bits used, and whether to accept it.
     """
     bits = mix(bits + _GOLDEN)
     if layer > 0:
@@ -74,7 +75,7 @@ def rejected(bits: np.uint64, layer: np.int64, x: float) -> tuple[float, np.uint
 
 @kernel
 def normal_beyond(bits: np.uint64, layer: np.int64, x: float) -> float:
-    """The number that comes of a first one which `rejected` has to judge."""
+    """Return a normal number, starting from a first candidate that `rejected` has to judge."""
     while True:
         x, bits, taken = rejected(bits, layer, x)
         if taken:
@@ -88,7 +89,7 @@ def normal_beyond(bits: np.uint64, layer: np.int64, x: float) -> float:
 
 @inner_kernel
 def normal(key: np.uint64, sample: int) -> float:
-    """A standard normal number for a key and a sample index."""
+    """Return the standard normal number of a key and a sample index."""
     bits = mix(key + np.uint64(sample) * _GOLDEN)
     layer = np.int64(bits & _LAYER)
     x = float(np.int64(bits) >> 11) * 2.0**-52 * EDGES[layer]
