@@ -1,4 +1,4 @@
-"""From a record to slowly varying amplitudes that keep a linear equation of motion.
+"""Convert a record to slowly varying amplitudes that preserve a linear equation of motion.
 
 Any linear filter that force, acceleration, velocity and displacement share keeps ``phi_d^2 F = a + c v + k x``. Two are
 applied here: a zero-phase high-pass below the fundamental, without which velocity and displacement could not be had from
@@ -16,7 +16,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 WINDOW_PERIODS = 3.0
-"""Length of the Blackman window: its zeros lie on all other multiples of the fundamental's frequency, the mean included."""
+"""Length of the Blackman window: its zeros lie at all other multiples of the fundamental frequency, including zero."""
 
 _STOP, _PASS = 0.25, 0.6  # edges of the high-pass over the fundamental frequency
 _END_FIT_PERIODS = 3.0
