@@ -172,7 +172,7 @@ def pooled(covariance: Complex) -> Complex:
 
 
 def _rank(covariance: Complex) -> int:
-    """Median rank of the covariance of a single line, from at most a few lines."""
+    """Median rank of the covariance of a single line, from a few of the lines."""
     some = covariance[:: max(1, covariance.shape[0] // 16)]
     unit = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", some).real, 1e-300))
     values = np.linalg.eigvalsh(some * unit[:, :, None] * unit[:, None, :])

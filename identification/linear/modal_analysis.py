@@ -218,7 +218,7 @@ def _without_spurious(
     normal: bool,
     modes: int | Sequence[float] | None,
 ) -> tuple[ModalFit, list[str]]:
-    """Fit, drop poles that are no modes (or the least prominent if a number was asked for), and repeat until all are modes."""
+    """Fit, drop poles that are not modes (or the least prominent if a number was requested), and repeat until all are modes."""
     notes: list[str] = []
     drive, whole = find_role(band.outputs, "drive"), np.inf
     while True:

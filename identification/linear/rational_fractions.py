@@ -104,7 +104,7 @@ class _State:
     terms: Float
     cost: float
     matrix: Float
-    gradient: Float  # of half the cost by the poles
+    gradient: Float  # of half the cost with respect to the poles
 
 
 class _Problem:

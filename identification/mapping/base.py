@@ -35,7 +35,7 @@ Complex = NDArray[np.complex128]
 def value_at(data: Any, path: str, where: str) -> Any:
     """Return the value at ``path`` (``a.b[2].c``) in ``data``.
 
-    Raises `IdentificationError` that names ``where`` and what is there instead.
+    If the path does not exist, raises `IdentificationError` with ``where`` and the names that exist.
     """
     if isinstance(data, Mapping) and path in data:
         return data[path]  # a name that itself contains dots or brackets

@@ -23,7 +23,7 @@ __all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_LOW_DEGREE = 3  # what a weak nonlinearity mostly makes
+_LOW_DEGREE = 3  # highest degree of the products that a weak nonlinearity mainly generates
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ _FURTHEST = 0.1  # largest relative distance in frequency of the tested mode fro
 _CLEARLY = 3.0  # the next mode must be this many times farther away
 _SAME = 0.005  # modes closer than this, relative, cannot be distinguished by frequency
 _LARGEST_GAIN = 5.0  # largest amplification of errors by modes with similar shapes
-_UNLIKE = 0.9  # MAC at the lowest level below which something is wrong with the channels
+_UNLIKE = 0.9  # MAC at the lowest level below which the channels are suspect
 
 
 def shapes_for(
@@ -35,7 +35,7 @@ def shapes_for(
 ) -> tuple[ModeShapes, int, tuple[str, ...]]:
     """Return the shapes at the common channels of backbone and modal model, the index of the tested mode, and notes.
 
-    ``mode`` says which mode is tested; None takes the one nearest to the frequency of the lowest level.
+    ``mode`` is the index of the tested mode; if None, the mode nearest to the frequency of the lowest level.
 
     Raises
     ------

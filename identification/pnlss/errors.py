@@ -228,7 +228,7 @@ def _seen_alike(model: PnlssModel, outputs: Float, samples: int) -> Float:
         seen = np.fmax(seen, np.max(np.abs(row), axis=0))
         row = row @ (model.a + by_state)
         if not np.max(np.abs(row)) < _ENOUGH * np.max(seen, initial=1e-300):
-            break  # unstable at rest: what a state does later is the growth's, not its own
+            break  # unstable at rest: later effects of a state come from the growth, not from the state itself
     known = np.isfinite(model.state_range) & (model.state_range > 0.0)
     unseen = np.where(known, model.state_range, 1.0 / np.max(seen, initial=1e-300) if np.any(seen) else 1.0)
     return np.divide(1.0, seen, out=unseen, where=seen > 0.0)

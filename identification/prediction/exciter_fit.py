@@ -265,7 +265,7 @@ def _fit(data: _Lines, start: Float, free: list[int], back_emf_per_square: float
 
     scale = np.abs(start)
     top = 2.0 * np.pi * data.frequency_hz[-1]
-    # Scales with an effect of 1 %: of the inertia of the mass or of a radian at the highest line, or of the lowest line.
+    # Each scale has an effect of 1 %: of the mass's inertia, or of a radian, at the highest line, or of the lowest frequency.
     scale[_COMPLIANCE:] = 0.01 / (scale[2] * top**2), 0.01 / top, 0.01 / top, 0.01 / top**3, 0.01 * data.frequency_hz[0]
     scale = np.maximum(scale, 1e-300)
 

@@ -8,7 +8,7 @@ are often a thousand times smaller, and would count as noise in the residual. Th
 
 The ripple of a detector modulates the phase of the oscillator within every period. A periodic vibration is a Fourier series
 in time, that is, in a uniformly advancing phase; with a modulated phase, harmonics leak into each other (a modulation of one
-milliradian turns 0.1 % of F_1 into F_2). The part of the phase that repeats within every period is therefore removed first;
+milliradian assigns 0.1 % of F_2 to F_1). The part of the phase that repeats within every period is therefore removed first;
 slow variations remain.
 """
 

@@ -169,12 +169,15 @@ def sensitivities(
     """Process a block of inputs and measured outputs (float[n, n_inputs], float[n, n_outputs]), with the state in ``r``.
 
     The columns of the sensitivities are first the ``linear`` entries of [A B E] (row by row; 0 for none), then, unless linear
-    is 0, the weights in the state features (row by row), then the initial states. If the block is ``counted``, the function
-    writes  - to ``errors`` (float[n, n_outputs]) the weighted errors, simulated minus measured; - to ``r`` the sums of the
-    products of errors and derivatives; - to ``jacobian`` (float[n_outputs, n_kept, n_columns + n_output_weights]), at the
-    samples ``kept`` (int[n_kept], rising), the   derivatives of the weighted outputs, with the weights in the output features
-    last; - to ``rows`` (float[n_kept, n_output_columns]) q, at the same samples: the derivative of output l with respect to
-    its row of   [C D F] is ``weight[l] q``.
+    is 0, the weights in the state features (row by row), then the initial states. If the block is ``counted``, these arrays
+    are written:
+
+    - ``errors`` (float[n, n_outputs]): the weighted errors, simulated minus measured.
+    - ``r``: the sums of the products of errors and derivatives.
+    - ``jacobian`` (float[n_outputs, n_kept, n_columns + n_output_weights]): the derivatives of the weighted outputs at the
+      samples ``kept`` (int[n_kept], rising), with the weights in the output features last.
+    - ``rows`` (float[n_kept, n_output_columns]): q at the same samples. The derivative of output l with respect to its row of
+      [C D F] is ``weight[l] q``.
 
     Returns n, or the sample at which a state is beyond ``bound`` or not a number.
     """
