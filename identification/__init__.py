@@ -1,4 +1,4 @@
-"""Measurements in memory, models of nonlinear modes, and their scores.
+"""Identify models of nonlinear modes from measurements, predict responses with them and score the predictions.
 
 The names below are imported on first use, so that importing the package costs nothing.
 """

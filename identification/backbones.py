@@ -35,7 +35,7 @@ class Backbone:
     Raises
     ------
     IdentificationError
-        Without points, on unequal channels or harmonics, on labels that do not match the points.
+        If there are no points, if their channels or numbers of harmonics differ, or if the labels do not match the points.
     """
 
     points: tuple[PeriodicVibration, ...]
@@ -82,11 +82,11 @@ class Backbone:
 
     @property
     def phase_error_deg(self) -> Float:
-        """float[n_points]: lag asked for minus the measured one, degrees."""
+        """float[n_points]: target phase lag minus measured phase lag, degrees."""
         return np.array([point.phase_error_deg for point in self.points])
 
     def select(self, keep: Sequence[bool]) -> "Backbone":
-        """Backbone of the points where ``keep`` is true, with their labels."""
+        """Return the backbone of the points where ``keep`` is true, with their labels."""
         if len(keep) != len(self.points):
             raise IdentificationError(f"keep: {len(keep)} given for {len(self.points)} points")
         chosen = [index for index, kept in enumerate(keep) if kept]
@@ -98,11 +98,11 @@ class Backbone:
         )
 
     def settled(self) -> "Backbone":
-        """Backbone of the settled points alone."""
+        """Return the backbone of the settled points alone."""
         return self.select([point.settled for point in self.points])
 
     def passes(self) -> tuple["Backbone", ...]:
-        """One backbone per pass through the levels, by direction and repeat, in the order of their first points."""
+        """Split into one backbone per pass (direction and repeat), in the order of their first points."""
         count = len(self.points)
         labels = list(zip(self.directions or ("",) * count, self.repeats or (0,) * count, strict=True))
         return tuple(self.select([label == one for label in labels]) for one in dict.fromkeys(labels))

@@ -12,7 +12,7 @@ Role = Literal["force", "drive", "response", "monitor"]
 Motion = Literal["displacement", "velocity", "acceleration"]
 
 MOTION_ORDER: dict[Motion, int] = {"displacement": 0, "velocity": 1, "acceleration": 2}
-"""How many times displacement was differentiated."""
+"""How many times the displacement has been differentiated with respect to time."""
 
 MOTION_UNIT: dict[Motion, str] = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}
 
@@ -34,8 +34,8 @@ class Channel:
     name
         Name of the channel, unique within a measurement.
     role
-        ``force`` (at the drive point), ``drive`` (motion at the drive point), ``response`` (motion elsewhere) or
-        ``monitor`` (anything that is only looked at, in any unit).
+        ``force`` (at the drive point), ``drive`` (motion at the drive point), ``response`` (motion elsewhere) or ``monitor``
+        (recorded for display only, in any unit).
     unit
         SI unit: ``N`` for a force; ``m``, ``m/s`` or ``m/s2`` for a motion.
     """
@@ -65,7 +65,7 @@ class Channel:
 
 
 def find_role(channels: Sequence[Channel], role: Role) -> int:
-    """Index of the only channel with ``role``; raises `IdentificationError` if there is none or more than one."""
+    """Return the index of the only channel with ``role``; raise `IdentificationError` if there is none or more than one."""
     found = [index for index, channel in enumerate(channels) if channel.role == role]
     if len(found) != 1:
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in channels) or "none"
@@ -76,7 +76,7 @@ def find_role(channels: Sequence[Channel], role: Role) -> int:
 
 
 def find_name(channels: Sequence[Channel], name: str) -> int:
-    """Index of the channel called ``name``; raises `IdentificationError` if there is none."""
+    """Return the index of the channel called ``name``; raise `IdentificationError` if there is none."""
     for index, channel in enumerate(channels):
         if channel.name == name:
             return index

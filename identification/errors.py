@@ -1,4 +1,4 @@
-"""What this package raises when measurements or models cannot be used as given."""
+"""The error that this package raises if measurements or models cannot be used as given."""
 
 __all__ = ["IdentificationError"]
 

@@ -27,9 +27,9 @@ class FrequencyResponse:
     frequency_hz
         float[n], in the order of measurement.
     force
-        complex[n], fundamental of the force, peak, N; the reference of the phase is free.
+        complex[n], fundamental of the force, peak, N; against any phase reference.
     response
-        complex[n], fundamental of the response, peak, in SI units of ``kind``, against the same phase reference.
+        complex[n], fundamental of the response, peak, in SI units of ``kind``, against the phase reference of ``force``.
     kind
         What was measured: ``displacement``, ``velocity`` or ``acceleration``.
     controlled
@@ -44,7 +44,7 @@ class FrequencyResponse:
     Raises
     ------
     IdentificationError
-        On NaN or inf, unequal shapes, no points, unknown kinds, a force or response that is zero.
+        If values are NaN or infinite, shapes differ, there are no points, a kind is unknown, or a force or response is zero.
     """
 
     frequency_hz: Float
@@ -105,7 +105,10 @@ class FrequencyResponse:
 
 
 def pack_frequency_responses(responses: Sequence[FrequencyResponse]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Arrays (levels one after another, ``points_per_level`` says where they part) and JSON-able attributes of them."""
+    """Return the responses as arrays and JSON-able attributes.
+
+    The arrays hold the levels one after another; ``points_per_level`` gives the number of points of each.
+    """
     if not responses:
         raise IdentificationError("responses: is empty, needs at least one level")
     arrays: dict[str, NDArray[Any]] = {
@@ -121,7 +124,7 @@ def pack_frequency_responses(responses: Sequence[FrequencyResponse]) -> tuple[di
 def unpack_frequency_responses(
     arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]
 ) -> tuple[FrequencyResponse, ...]:
-    """Inverse of `pack_frequency_responses`; raises `IdentificationError` on anything else."""
+    """Invert `pack_frequency_responses`; raise `IdentificationError` if something is missing or unknown."""
     try:
         ends = np.cumsum(arrays["points_per_level"])[:-1]
         columns = [np.split(arrays[name], ends) for name in ("frequency_hz", "force", "response")]

@@ -1,7 +1,8 @@
-"""Measured periodic vibrations: one settled state.
+"""Measured periodic vibrations: one settled state each.
 
-Conventions, everywhere: ``y(t) = Re sum_h Y_h exp(i h theta)``, amplitudes are peak values in SI units, the phase lag
-is ``arg F_1 - arg Q_1`` with the force F and the displacement Q at the drive point, +90 degrees at phase resonance.
+Conventions used throughout the package: ``y(t) = Re sum_h Y_h exp(i h theta)``; amplitudes are peak values in SI units; the
+phase lag is ``arg F_1 - arg Q_1`` with the force F and the displacement Q at the drive point, and it is +90 degrees at phase
+resonance.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ Float = NDArray[np.float64]
 
 
 def wrapped_deg(angle_deg: float) -> float:
-    """``angle_deg`` brought into (-180, 180]."""
+    """Return ``angle_deg`` wrapped into (-180, 180]."""
     return 180.0 - (180.0 - angle_deg) % 360.0
 
 
@@ -37,25 +38,25 @@ class PeriodicVibration:
     harmonics
         complex[n_channels, H + 1], peak, in the unit of each channel; column h belongs to ``exp(i h theta)``, H >= 1.
     periods
-        Whole periods that the coefficients were taken from.
+        Number of whole periods from which the coefficients were computed.
     residual_rms
-        float[n_channels], what the harmonics leave over, in the unit of each channel.
+        float[n_channels], RMS of the signal minus its harmonics, in the unit of each channel.
     harmonics_std
-        float[n_channels, H + 1], standard error of the real part and of the imaginary part alike; None if unknown.
+        float[n_channels, H + 1], standard error of the real part, equal to that of the imaginary part; None if unknown.
     drift
-        complex[n_channels], change of the fundamental over the periods used, relative to it: real part
-        amplitude, imaginary part phase in rad; None if unknown.
+        complex[n_channels], change of the fundamental over the periods used, relative to the fundamental: the real part is
+        that of the amplitude, the imaginary part that of the phase in rad; None if unknown.
     phase_lag_target_deg
-        Lag of the displacement that was asked for; 90 is phase resonance.
+        Target phase lag of the displacement, degrees; 90 is phase resonance.
     settled
         Whether the controller had settled before the record began.
     warnings
-        What a user should know about the record, one line each.
+        Warnings about the record, one line each.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, shapes that do not agree, missing roles, no whole period.
+        If values are NaN or infinite, shapes do not agree, roles are missing, or there is no whole period.
     """
 
     channels: tuple[Channel, ...]
@@ -115,7 +116,7 @@ class PeriodicVibration:
     def displacement_m(self, name: str) -> Complex:
         """complex[H + 1]: harmonics of the displacement at the channel called ``name``, m.
 
-        The static part (harmonic 0) of a velocity or acceleration channel says nothing of the displacement: it is NaN.
+        Harmonic 0 is NaN for a velocity or acceleration channel, because its static part does not determine the displacement.
         """
         index = self.index(name)
         order = MOTION_ORDER[self.channels[index].motion]
@@ -138,10 +139,13 @@ class PeriodicVibration:
 
     @property
     def phase_lag_deg(self) -> float:
-        """Lag of the displacement behind the force, fundamental, at the drive point, in (-180, 180]."""
+        """Phase lag of the fundamental of the displacement behind the force at the drive point, degrees, in (-180, 180]."""
         return wrapped_deg(float(np.degrees(np.angle(self.force[1]) - np.angle(self.drive_m[1]))))
 
     @property
     def phase_error_deg(self) -> float:
-        """Lag asked for minus the measured one, in (-180, 180]; positive below resonance, where the loop has to go up."""
+        """Target phase lag minus measured phase lag, degrees, in (-180, 180].
+
+        The error is positive below resonance, where the loop has to raise the frequency.
+        """
         return wrapped_deg(self.phase_lag_target_deg - self.phase_lag_deg)

@@ -1,4 +1,4 @@
-"""Frozen dataclasses as arrays and JSON-able attributes, and back: what files hold."""
+"""Convert frozen dataclasses to arrays and JSON-able attributes for storage in files, and back."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def pack(thing: Any) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Arrays by the name of their field, and attributes: numbers, texts, tuples of these, channels."""
+    """Return the arrays of a dataclass by field name, and its other fields as attributes: numbers, texts, tuples, channels."""
     arrays: dict[str, NDArray[Any]] = {}
     attributes: dict[str, Any] = {}
     for field in fields(thing):
@@ -32,7 +32,7 @@ def pack(thing: Any) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
 
 
 def unpack(kind: type[T], arrays: Arrays, attributes: Mapping[str, Any]) -> T:
-    """Inverse of `pack`; raises `IdentificationError` if something is missing or unknown."""
+    """Invert `pack`; raise `IdentificationError` if something is missing or unknown."""
     values: dict[str, Any] = {name: np.asarray(array) for name, array in arrays.items()}
     for name, value in attributes.items():
         if name == "channels" and value and isinstance(value[0], Mapping):
@@ -46,7 +46,7 @@ def unpack(kind: type[T], arrays: Arrays, attributes: Mapping[str, Any]) -> T:
 
 
 def pack_all(name: str, things: tuple[Any, ...]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Several of one kind, None among them, in numbered groups called ``name``."""
+    """Pack several dataclasses of one kind, some of which may be None, in numbered groups called ``name``."""
     arrays: dict[str, NDArray[Any]] = {}
     attributes: list[Any] = []
     for index, thing in enumerate(things):
@@ -57,7 +57,7 @@ def pack_all(name: str, things: tuple[Any, ...]) -> tuple[dict[str, NDArray[Any]
 
 
 def unpack_all(kind: type[T], name: str, arrays: Arrays, attributes: Mapping[str, Any]) -> tuple[T | None, ...]:
-    """Inverse of `pack_all`."""
+    """Invert `pack_all`."""
     if name not in attributes:
         raise IdentificationError(f"{name}: is missing")
     found: list[T | None] = []

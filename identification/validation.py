@@ -11,14 +11,14 @@ __all__ = ["finite_array", "one_specimen", "positive", "read_only"]
 
 
 def read_only(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
-    """Copy of ``values`` as an array that cannot be written to."""
+    """Return a copy of ``values`` as a read-only array."""
     array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
 
 
 def finite_array(name: str, values: ArrayLike, dtype: DTypeLike, ndim: int) -> NDArray[Any]:
-    """Read-only copy of ``values``; raises `IdentificationError` unless it has ``ndim`` dimensions and is finite."""
+    """Return a read-only copy of ``values``; raise `IdentificationError` unless it has ``ndim`` dimensions and is finite."""
     try:
         array = read_only(values, dtype)
     except (TypeError, ValueError) as error:
@@ -32,7 +32,7 @@ def finite_array(name: str, values: ArrayLike, dtype: DTypeLike, ndim: int) -> N
 
 
 def positive(name: str, value: float, unit: str = "") -> float:
-    """``value`` as a float; raises `IdentificationError` unless it is finite and above zero."""
+    """Return ``value`` as a float; raise `IdentificationError` unless it is finite and above zero."""
     number = float(value)
     if not (np.isfinite(number) and number > 0.0):
         raise IdentificationError(f"{name}: is {number:g}{unit and ' '}{unit}, must be finite and above zero")
@@ -40,7 +40,7 @@ def positive(name: str, value: float, unit: str = "") -> float:
 
 
 def one_specimen(**named: str) -> None:
-    """Raise `IdentificationError` where two of the specimens, given by what they belong to, have different names."""
+    """Raise `IdentificationError` if two of the named things belong to different specimens; empty names are ignored."""
     known = {what: specimen for what, specimen in named.items() if specimen}
     if len(set(known.values())) > 1:
         listed = ", ".join(f"{what} of '{specimen}'" for what, specimen in known.items())

@@ -1,4 +1,4 @@
-"""A curve followed from one point on, until it leaves the range, closes or ends."""
+"""Follow a curve from one point until it leaves the range, closes or ends."""
 
 from collections.abc import Callable
 
@@ -36,28 +36,29 @@ def continued(
     Parameters
     ----------
     system
-        F and its derivatives; where it cannot answer it may give inf or NaN, and the step counts as failed.
+        F and its derivatives. Where F cannot be evaluated it may return inf or NaN; the step then counts as failed.
     unknowns, parameter
-        float[n_unknowns] near a solution, and the parameter at which it is one.
+        float[n_unknowns], unknowns near a solution, and the parameter of that solution.
     scale, parameter_scale
-        Sizes of the unknowns (one or one each) and of the parameter by which lengths are measured.
+        Units of length: sizes of the unknowns (one for all, or one each) and of the parameter.
     direction
-        Sign with which the parameter sets out.
+        Sign of the first change of the parameter.
     lowest, highest
         Range of the parameter.
     largest_size
         Allowed ``|z / scale|``.
     points
-        Most points.
+        Largest number of points.
     steps
         Step control.
     stop
-        Asked at every point, the first and the last too; a text ends the path there and is its ``reason``.
+        Called with the unknowns and the parameter at every point, including the first and the last. A text that is not empty
+        ends the path there and becomes its ``reason``.
 
     Raises
     ------
     IdentificationError
-        If there is no solution near the first point, or the parameter begins outside of its range.
+        If there is no solution near the first point, or if the parameter begins outside its range.
     """
     allowed, z = steps or Steps(), np.array(finite_array("unknowns", unknowns, np.float64, 1))
     if not lowest <= parameter <= highest:

@@ -1,4 +1,4 @@
-"""Newton's method at one value of the parameter, and the linear equations of all steps."""
+"""Newton's method at a fixed parameter, and the linear equations that every step solves."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ Float = NDArray[np.float64]
 def solved(
     system: System, unknowns: ArrayLike, parameter: float, *, scale: ArrayLike = 1.0, steps: Steps | None = None
 ) -> Float | None:
-    """Solution at one value of the parameter by Newton's method from ``unknowns``; None if it finds none."""
+    """Solve for the unknowns at a fixed parameter by Newton's method from ``unknowns``; return None if it does not converge."""
     z = np.array(unknowns, dtype=float)
     allowed, size = steps or Steps(), np.broadcast_to(np.asarray(scale, dtype=float), z.shape)
     for _ in range(allowed.iterations):
@@ -28,7 +28,7 @@ def solved(
 
 
 def tangent_of(bordered: Float) -> Float | None:
-    """Unit tangent on the side of the last row."""
+    """Return the unit tangent that has a positive product with the last row of ``bordered``; None if it does not exist."""
     right = np.zeros(len(bordered))
     right[-1] = 1.0
     tangent = solution(bordered, right)
@@ -36,13 +36,13 @@ def tangent_of(bordered: Float) -> Float | None:
 
 
 def evaluated(system: System, z: Float, parameter: float) -> tuple[Float, Float, Float]:
-    """The equations; what overflows there is inf or NaN and no warning."""
+    """Evaluate the equations; an overflow gives inf or NaN without a warning."""
     with np.errstate(all="ignore"):
         return system(z, parameter)
 
 
 def solution(matrix: Float, right: Float) -> Float | None:
-    """Solution of linear equations whose rows may be of any size; None if there is none."""
+    """Solve linear equations after scaling each row by its largest coefficient; return None if there is no finite solution."""
     with np.errstate(all="ignore"):
         size = np.max(np.abs(matrix), axis=1)
         if not (np.all(np.isfinite(size)) and np.all(np.isfinite(right)) and np.all(size > 0.0)):

@@ -1,4 +1,4 @@
-"""What a continuation follows, how it steps, and the points that it finds."""
+"""Types of a continuation: the system of equations, the step control and the resulting path."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,13 +25,13 @@ class Steps:
     Parameters
     ----------
     first, smallest, largest
-        Length of the first step; shortest that is tried before the path ends; longest.
+        Length of the first step; shortest step tried before the path ends; longest step.
     angle_deg
         Largest angle between the tangents at both ends of a step.
     iterations
         Newton iterations before a step counts as failed.
     tolerance
-        Length of the last Newton correction, with which a solution is accepted.
+        A solution is accepted once the length of the last Newton correction is at most this.
     """
 
     first: float = 0.02
@@ -55,20 +55,21 @@ class Path:
     Parameters
     ----------
     unknowns, parameter
-        float[n, n_unknowns], float[n].
+        float[n, n_unknowns], float[n], the points.
     direction
-        float[n], parameter's part of the unit tangent: its sign changes at turning points, where the derivative with
-        respect to the unknowns is singular, and with it the sign of that derivative's determinant.
+        float[n], component of the unit tangent along the parameter. Its sign changes at turning points. There the Jacobian
+        with respect to the unknowns is singular, and the sign of its determinant changes too.
     turning_unknowns, turning_parameter
-        float[k, n_unknowns], float[k], points where the parameter turns back.
+        float[k, n_unknowns], float[k], turning points, where the parameter turns back.
     turning_after
-        int[k], the last point before each.
+        int[k], index of the last point before each turning point.
     ending
-        Why the path ends: it left the ``range`` of the parameter (then its last point is at the end of the range), grew
-        beyond the allowed ``size``, ``closed`` on itself (then its last point is its first), has all its ``points``, no
-        ``step`` however short leads on, or it was ``stopped``.
+        Why the path ends. ``range``: the parameter reached the end of its range, where the last point lies. ``size``: the
+        unknowns exceeded the allowed size. ``closed``: the path returned to its first point, which is also its last.
+        ``points``: the largest number of points was reached. ``step``: even the shortest step failed. ``stopped``: the
+        function ``stop`` ended it.
     reason
-        What the one who stopped it said.
+        Text that ``stop`` returned; empty otherwise.
     """
 
     unknowns: Float

@@ -1,4 +1,4 @@
-"""Steps along a curve of solutions: predicted by the tangent, corrected across it; turning points between two."""
+"""Steps along a curve of solutions: predict along the tangent, correct normal to it, and locate turning points."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ Float = NDArray[np.float64]
 
 _GROWTH = 1.5
 _EASY = 3
-"""Newton iterations up to which the next step may be longer."""
+"""Largest number of Newton iterations after which the step length may grow."""
 _NEAR = 0.5
-"""A solution farther from the tangent than this share of the step may belong to another part of the curve."""
+"""Farthest distance of a solution from the prediction, as a share of the step; beyond it may lie another part of the curve."""
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A solution: ``v = (z, p)``, and the unit tangent, in the units of length at that point."""
+    """A solution ``v = (z, p)`` with its units of length and the unit tangent in these units."""
 
     v: Float
     units: Float
@@ -30,7 +30,7 @@ class Point:
     iterations: int = 0
 
     def ahead(self, length: float) -> Float:
-        """Where the tangent leads."""
+        """Return the point ``length`` along the tangent."""
         return np.asarray(self.v + length * self.tangent * self.units)
 
 
@@ -47,13 +47,13 @@ class Walk:
         return units
 
     def _bordered(self, v: Float, units: Float, across: Float) -> tuple[Float, Float]:
-        """Residual, and the derivatives in units of length with the plane ``across`` below."""
+        """Return residual and Jacobian in units of length; the last row of the Jacobian is ``across``, its residual 0."""
         residual, by_z, by_p = evaluated(self._system, v[:-1], float(v[-1]))
         rows = np.concatenate([by_z, by_p[:, None]], axis=1) * units
         return np.append(residual, 0.0), np.concatenate([rows, across[None]])
 
     def first(self, v: Float, direction: float) -> Point:
-        """The point where the path begins, with the tangent along which the parameter sets out."""
+        """Return the first point, with the tangent along which the parameter changes in ``direction``."""
         units = self._units(v)
         along = np.zeros(v.size)
         along[-1] = np.copysign(1.0, direction)
@@ -63,11 +63,11 @@ class Walk:
         return Point(v, units, tangent)
 
     def _tangent(self, v: Float, units: Float, along: Float) -> Float | None:
-        """Unit tangent on the side of ``along``."""
+        """Return the unit tangent that has a positive product with ``along``."""
         return tangent_of(self._bordered(v, units, along)[1])
 
     def corrected(self, point: Point, length: float) -> Point | None:
-        """The point of the curve ``length`` along the tangent of ``point``."""
+        """Correct the prediction ``length`` along the tangent of ``point``; return None if Newton's method fails."""
         v, begin = point.ahead(length), point.ahead(length)
         for count in range(1, self._steps.iterations + 1):
             residual, matrix = self._bordered(v, point.units, point.tangent)
@@ -82,7 +82,7 @@ class Walk:
         return None
 
     def _arrived(self, point: Point, v: Float, matrix: Float, iterations: int) -> Point | None:
-        """A solution with its tangent, from the derivatives at the last iterate: as near as the solution itself."""
+        """Return the solution with its tangent, computed from the Jacobian of the last iterate, which is accurate enough."""
         along = tangent_of(matrix)
         if along is None:
             return None
@@ -91,7 +91,7 @@ class Walk:
         return Point(v, units, tangent / np.linalg.norm(tangent), iterations)
 
     def next(self, last: Point, length: float) -> tuple[Point | None, float]:
-        """The next point and the length to try after it; None if there is none."""
+        """Return the next point and the step length to try after it; the point is None if even the shortest step fails."""
         while length >= self._steps.smallest:
             new = self.corrected(last, length)
             if new is not None:
@@ -104,7 +104,7 @@ class Walk:
         return None, length
 
     def passes(self, first: Point, last: Point, step: float) -> bool:
-        """Whether the step from ``last`` passes the very point where the path began."""
+        """Return whether the step from ``last`` passes through the first point of the path."""
         away = (first.v - last.v) / last.units
         along = float(last.tangent @ away)
         if not 0.0 < along <= step or np.linalg.norm(away - along * last.tangent) > _NEAR * step:
@@ -113,7 +113,7 @@ class Walk:
         return back is not None and float(np.linalg.norm((back.v - first.v) / last.units)) <= 0.1 * step
 
     def at_parameter(self, last: Point, new: Point, value: float) -> Point | None:
-        """The point between two whose parameter has a value."""
+        """Return the point between ``last`` and ``new`` whose parameter is ``value``; None if there is none."""
         share = (value - last.v[-1]) / (new.v[-1] - last.v[-1])
         z = solved(
             self._system,
@@ -129,7 +129,7 @@ class Walk:
         return None if tangent is None else Point(v, last.units, tangent)
 
     def turn(self, last: Point, step: float) -> Float | None:
-        """The point, within a step, where the parameter turns back."""
+        """Return the turning point within a step from ``last``; None if it is not found."""
         from scipy.optimize import brentq
 
         def direction(length: float) -> float:

@@ -1,1 +1,1 @@
-"""Linear frequency responses and what a modal analysis makes of them."""
+"""Linear modal analysis of frequency responses."""

@@ -1,8 +1,8 @@
-"""Frequency responses as accelerance with the covariance that weights them, line by line.
+"""Convert frequency responses to accelerance and compute the covariance that weights each line.
 
-A sample covariance of few periods or realisations is too scattered to be inverted. Weights come from the mean over
-neighbouring lines, the line itself left out: then weight and error of a line are independent, and
-``sum_k J_k^H W_k C_k W_k J_k`` with the line's own covariance C_k is an unbiased estimate of what the errors do.
+A sample covariance of few periods or realisations is too scattered to be inverted. The weight of a line is therefore the
+inverse of the mean covariance of its neighbours, without the line itself. Weight and error of a line are then independent,
+and ``sum_k J_k^H W_k C_k W_k J_k``, with the line's own covariance C_k, is an unbiased estimate of the effect of the errors.
 """
 
 from dataclasses import dataclass
@@ -30,14 +30,14 @@ Float = NDArray[np.float64]
 Weighting = Literal["auto", "total", "noise", "relative"]
 
 _NEIGHBOURS = 4
-"""Lines on either side that a weight is the mean of: with five realisations 32 degrees of freedom, a quarter more scatter."""
+"""Lines on either side that a weight averages: with five realisations, 32 degrees of freedom and a quarter more scatter."""
 _FLOOR = 1e-9
-"""Least eigenvalue of a covariance, relative to its largest: keeps an all but exact line from outweighing all others."""
+"""Least eigenvalue of a covariance relative to its largest, so that a nearly exact line cannot outweigh all others."""
 
 _TIMES_OVER = 4
-"""Samples per direction of a covariance that weights need at least."""
+"""Least number of samples per direction of a covariance that weights need."""
 _ROUNDING = 1e-13
-"""Standard deviation, relative to the response, below which a covariance is rounding."""
+"""Standard deviation relative to the response, below which a covariance is only rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +51,12 @@ class WeightedResponses:
     value
         complex[n_lines, n_outputs, n_inputs].
     covariance
-        complex[n_lines, m, m], m = n_outputs n_inputs, as estimated at the line; None where nothing is known.
+        complex[n_lines, m, m], m = n_outputs n_inputs, as estimated at each line; None if unknown.
     smooth
-        complex[n_lines, m, m], that of the neighbours, which weights are made of; where nothing is known the square of
-        the modulus (errors of equal relative size).
+        complex[n_lines, m, m], mean covariance of the neighbouring lines, whose inverse is the weight. If no covariance is
+        known: the squared modulus (errors of equal relative size).
     kind
-        What the covariance is: ``total``, ``noise`` or ``relative``.
+        Kind of covariance: ``total``, ``noise`` or ``relative``.
     """
 
     frequency_hz: Float
@@ -72,19 +72,19 @@ class WeightedResponses:
 
     @property
     def std(self) -> Float:
-        """float[n_lines, n_outputs, n_inputs]: roots of the diagonal of ``smooth``."""
+        """float[n_lines, n_outputs, n_inputs]: square roots of the diagonal of ``smooth``."""
         return np.asarray(np.sqrt(np.einsum("kii->ki", self.smooth).real).reshape(self.value.shape))
 
     @property
     def whitening(self) -> Complex:
-        """complex[n_lines, m, m]: W with ``W^H W`` the inverse of ``smooth``."""
+        """complex[n_lines, m, m]: whitening matrix W, where ``W^H W`` is the inverse of ``smooth``."""
         return np.asarray(np.linalg.inv(np.linalg.cholesky(self.smooth)))
 
 
 def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
-    """Responses with their weights; ``auto`` takes the total covariance if known, else that of noise, else none.
+    """Return responses with their weights; ``auto`` takes the total covariance if known, else the noise covariance, else none.
 
-    Raises `IdentificationError` where the covariance asked for is not known or the responses are zero.
+    Raises `IdentificationError` if the requested covariance is unknown or a response is zero at all lines.
     """
     covariance, kind = known_covariance(responses, weighting)
     count = responses.value[0].size
@@ -100,9 +100,9 @@ def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting 
 
 
 def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -> tuple[Complex | None, str]:
-    """The covariance asked for and its kind; None and ``relative`` where there is none, or none but rounding.
+    """Return the requested covariance and its kind; None and ``relative`` if it is unknown or no more than rounding error.
 
-    Raises `IdentificationError` where the covariance asked for is not known.
+    Raises `IdentificationError` if the requested covariance is unknown.
     """
     known = {"total": responses.total_covariance, "noise": responses.noise_covariance}
     if weighting not in ("auto", "relative", *known):
@@ -120,7 +120,10 @@ def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -
 
 
 def motion_factors(responses: FrequencyResponseMatrix) -> Complex:
-    """complex[n_lines, n_outputs]: what makes accelerations of motions; 1 for a force. Raises at 0 Hz."""
+    """complex[n_lines, n_outputs]: factors that convert each motion to an acceleration; 1 for a force.
+
+    Raises `IdentificationError` if the lines begin at 0 Hz.
+    """
     if responses.frequency_hz[0] == 0.0:
         raise IdentificationError(
             "frequency_hz: begins at 0 Hz, where no motion is an acceleration; select a band above"
@@ -130,7 +133,10 @@ def motion_factors(responses: FrequencyResponseMatrix) -> Complex:
 
 
 def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
-    """The same, every output turned into an acceleration (m/s2); raises where an output is no motion or at 0 Hz."""
+    """Return responses with their weights, every output converted to an acceleration (m/s2).
+
+    Raises `IdentificationError` if an output is not a motion, or at 0 Hz.
+    """
     plain = weighted_responses(responses, weighting)
     factor = np.repeat(motion_factors(responses), len(responses.inputs), axis=1)
 
@@ -147,10 +153,10 @@ def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weightin
 
 
 def pooled(covariance: Complex) -> Complex:
-    """Mean over the neighbours of each line, its own left out; floored so that it can be inverted.
+    """Return the mean covariance over the neighbours of each line, without the line itself; floored so that it can be inverted.
 
-    As many lines are taken as it needs to tell all directions several times over: a sample covariance of few realisations
-    is of low rank.
+    A sample covariance of few realisations has a low rank. The mean therefore takes as many lines as give several samples per
+    direction.
     """
     lines, count = covariance.shape[:2]
     reach = min(max(_NEIGHBOURS, -(-_TIMES_OVER * count // (2 * _rank(covariance)))), lines - 1)
@@ -166,7 +172,7 @@ def pooled(covariance: Complex) -> Complex:
 
 
 def _rank(covariance: Complex) -> int:
-    """Directions that the covariance of a single line tells, at most a few lines looked at."""
+    """Median rank of the covariance of a single line, from a few of the lines."""
     some = covariance[:: max(1, covariance.shape[0] // 16)]
     unit = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", some).real, 1e-300))
     values = np.linalg.eigvalsh(some * unit[:, :, None] * unit[:, None, :])

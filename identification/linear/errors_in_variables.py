@@ -1,18 +1,20 @@
-"""Force and motions from a voltage known without noise: what a fit needs where the force is hardly above its own noise.
+"""Maximum-likelihood fit to force and motions over a noise-free voltage, where the force is hardly above its own noise.
 
-The quotient of motion and force has no variance where noise of the force is not small against it: near a resonance, where
-the structure lets the exciter give little force. Force F and motions Y, each over the voltage, are linear in the measured
-noise instead, with a covariance C that is known as well as noise is. The model says ``Y = H F``, so that line by line
+The quotient of motion and force has no variance where the noise of the force is not small against the force. This happens
+near a resonance, where the structure lets the exciter deliver little force. Force F and motions Y, each divided by the
+voltage, are instead linear in the measured noise, and their covariance C is known as well as the noise. The model is
+``Y = H F``, so that at each line
 
-    r = Y - H F,    cov r = [-H, 1] C [-H, 1]^H = C_r,
+    r = Y - H F,    cov r = [-H, 1] C [-H, 1]^H = C_r.
 
-and maximum likelihood, the true force of every line being unknown, is least ``sum_k r^H C_r^-1 r`` (Pintelon and
-Schoukens, *System Identification*, 2nd ed., 9.10 and 9.11: errors in variables). Its gradient by the parameters of H is that of
-a weighted fit to ``H_0 + r / F_0`` with the covariance ``C_r / |F_0|^2``, both at the present model H_0, where
+With the true force of every line unknown, the maximum-likelihood estimate minimises ``sum_k r^H C_r^-1 r`` (Pintelon and
+Schoukens, *System Identification*, 2nd ed., 9.10 and 9.11: errors in variables). The gradient of this sum with respect to the
+parameters of H equals that of a weighted fit to ``H_0 + r / F_0`` with the covariance ``C_r / |F_0|^2``, both at the present
+model H_0, where
 
     F_0 = F + (C_FF H_0^H - C_FY) C_r^-1 r
 
-is the force that the model and the data together make most likely; taking F itself would bias the fit.
+is the most likely force, given the model and the data. Using F instead of F_0 would bias the fit.
 """
 
 from dataclasses import dataclass, replace
@@ -30,9 +32,9 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _LOCAL = 4
-"""Lines on either side for the first guess of the responses, of which only weights are made."""
+"""Lines on either side that the first guess of the responses averages; the first guess determines only the weights."""
 _SMALLEST = 1e-9
-"""Force below this part of its root mean square counts as this much: it has no weight either way."""
+"""A force below this share of its RMS value is replaced by this share; its line has practically no weight in either case."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,7 @@ class DrivenResponses:
     value
         complex[n_lines, 1 + n_outputs], force and accelerations over voltage.
     covariance, smooth
-        complex[n_lines, 1 + n_outputs, 1 + n_outputs], as estimated at the line, and that of its neighbours.
+        complex[n_lines, 1 + n_outputs, 1 + n_outputs], covariance as estimated at each line, and the mean of its neighbours.
     kind
         ``total`` or ``noise``.
     """
@@ -63,7 +65,10 @@ class DrivenResponses:
         return np.asarray(2j * np.pi * self.frequency_hz)
 
     def first_guess(self) -> WeightedResponses:
-        """The quotients, weighted by what a mean of ``Y F* / |F|^2`` over neighbouring lines lets expect."""
+        """Return the quotients of motion and force, weighted by their expected covariance.
+
+        The expected covariance is evaluated at the local estimate ``Y F* / |F|^2``, averaged over neighbouring lines.
+        """
         force, motion = self.value[:, :1], self.value[:, 1:]
         window = np.ones(2 * _LOCAL + 1)
 
@@ -74,7 +79,10 @@ class DrivenResponses:
         return self._weighted(local, motion / self._not_zero(force), force)
 
     def around(self, model: Complex) -> WeightedResponses:
-        """Responses to which a weighted fit returns ``model``, complex[n_lines, n_outputs], where that is most likely."""
+        """Return responses linearised about ``model``, complex[n_lines, n_outputs].
+
+        A weighted fit to these responses returns ``model`` itself if ``model`` is the most likely one.
+        """
         misfit = self.value[:, 1:] - model * self.value[:, :1]
         smooth = self._misfit(model, self.smooth)
         cross = self.smooth[:, 0, :1] * np.conj(model) - self.smooth[:, 0, 1:]
@@ -83,7 +91,7 @@ class DrivenResponses:
         return self._weighted(model, model + misfit / force, force)
 
     def _weighted(self, model: Complex, value: Complex, force: Complex) -> WeightedResponses:
-        """``value`` with the covariance of the misfit at ``model`` over the square of the force."""
+        """Return ``value`` with the covariance of the residual at ``model``, divided by the squared force."""
         power = np.abs(self._not_zero(force))[:, :, None] ** 2
         return WeightedResponses(
             self.frequency_hz,
@@ -94,7 +102,7 @@ class DrivenResponses:
         )
 
     def _misfit(self, model: Complex, covariance: Complex) -> Complex:
-        """Covariance of ``Y - H F``."""
+        """Covariance of the residual ``Y - H F``."""
         outputs = model.shape[1]
         turn = np.concatenate(
             [-model[:, :, None], np.broadcast_to(np.eye(outputs), (model.shape[0], outputs, outputs))], axis=2
@@ -107,14 +115,14 @@ class DrivenResponses:
 
 
 def is_driven(responses: FrequencyResponseMatrix) -> bool:
-    """Whether the force is among the outputs, over one input that drives it."""
+    """Return whether the force is among the outputs and there is a single input that drives it."""
     return len(responses.inputs) == 1 and any(channel.role == "force" for channel in responses.outputs)
 
 
 def driven_responses(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> DrivenResponses | None:
-    """Force and motions over a voltage as accelerations; None where no covariance is known.
+    """Return force and motions over a voltage as accelerations; None if no covariance is known.
 
-    Raises `IdentificationError` without a force among the outputs, where the covariance asked for is not known, or at 0 Hz.
+    Raises `IdentificationError` without a force among the outputs, if the requested covariance is unknown, or at 0 Hz.
     """
     force = find_role(responses.outputs, "force")
     covariance, kind = known_covariance(responses, weighting)
@@ -129,9 +137,10 @@ def driven_responses(responses: FrequencyResponseMatrix, weighting: Weighting = 
 
 
 def over_force(responses: FrequencyResponseMatrix) -> FrequencyResponseMatrix:
-    """Motions over force from both over a voltage, without covariance; the force's RMS as of a multisine with equal lines.
+    """Return motions over force from motions and force over a voltage, without covariance.
 
-    Raises `IdentificationError` without a force among the outputs.
+    The RMS value of the force is computed for a multisine with lines of equal amplitude. Raises `IdentificationError` without
+    a force among the outputs.
     """
     force = find_role(responses.outputs, "force")
     motions = [row for row in range(len(responses.outputs)) if row != force]

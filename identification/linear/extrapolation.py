@@ -1,10 +1,11 @@
-"""Modes of several levels extrapolated to zero force: what nonlinearity makes of them at any level is taken out.
+"""Extrapolate modes from several force levels to zero force, to remove the effect of nonlinearity at these levels.
 
-Below some level a property y follows ``y = y_0 + d F^p``. Smooth elements have p = 2 (a cubic's or a magnet's share in the
-best linear approximation grows with the variance of the response). Joints in micro-slip have p = 1 + chi of Segalman's
-density (J. Appl. Mech. 72, 2005), chi in (-1, 0) for the energy that a cycle loses, and finite numbers of sliders blur it:
-below some level none slips, and above it properties turn away steeply. On the friction beam damping was measured to
-follow 1.3, frequency 2.5. Unless p is known, every p of a range is held to be equally likely.
+At low levels a property y follows ``y = y_0 + d F^p``. Smooth elements have p = 2: the contribution of a cubic spring or a
+magnet to the best linear approximation grows with the variance of the response. Joints in micro-slip have p = 1 + chi, with
+the exponent chi of Segalman's density (J. Appl. Mech. 72, 2005), chi in (-1, 0), for the energy lost per cycle. A finite
+number of sliders departs from this law: below some level none slips, and above it properties change steeply. On the friction
+beam the measured exponent was 1.3 for damping and 2.5 for frequency. Unless p is known, every p of a range is taken to be
+equally likely.
 """
 
 from collections.abc import Sequence
@@ -29,23 +30,24 @@ _SPREAD = 1.1
 def extrapolated_to_zero(
     low: LinearModes, high: LinearModes, *further: LinearModes, exponent: float | tuple[float, float] = (1.0, 3.0)
 ) -> LinearModes:
-    """Modes at zero force, from the same modes at two or more levels.
+    """Extrapolate modes to zero force from the same modes at two or more levels.
 
-    Frequencies, damping ratios and shapes are straight lines over ``force_rms_n ** exponent``, each weighted by its errors.
-    Residual terms are those of the lowest level.
+    Frequencies, damping ratios and shapes are fitted by straight lines over ``force_rms_n ** exponent``, each weighted by its
+    standard errors. The residual terms of the lowest level are kept.
 
     Parameters
     ----------
     low, high, further
-        Modes of one structure, same channels, levels at least 10 % apart.
+        Modes of one structure with the same channels, at levels at least 10 % apart.
     exponent
-        Power of the force that properties are linear in: 2 for smooth elements; or lowest and highest possible power: the
-        mean of their results is taken, and their difference adds to the errors as a range of equally likely values does.
+        Power of the force in which properties are linear; 2 for smooth elements. If the lowest and the highest possible power
+        are given, the result is the mean of both extrapolations, and their difference d adds d^2 / 12 to the variance (a
+        range of equally likely values).
 
     Raises
     ------
     IdentificationError
-        On levels that are unknown or alike, channels that differ, no mode in common, exponents that are not above zero.
+        If levels are unknown or too close, channels differ, no mode is common to all levels, or exponents are not above zero.
     """
     models = sorted((low, high, *further), key=lambda model: model.force_rms_n)
     force = np.array([model.force_rms_n for model in models])
@@ -66,7 +68,10 @@ def extrapolated_to_zero(
 
 
 def _common(models: Sequence[LinearModes]) -> tuple[list[int], Float, Float]:
-    """Modes of the lowest level that every other has too; their parameters float[n_levels, m] and covariances."""
+    """Return the modes of the lowest level that all other levels have too.
+
+    Also returns their parameters at each level, float[n_levels, m], and the covariances.
+    """
     first, matches = models[0], []
     for k, frequency in enumerate(first.frequency_hz):
         partners = [model.nearest(float(frequency)) for model in models]
@@ -92,7 +97,7 @@ def _common(models: Sequence[LinearModes]) -> tuple[list[int], Float, Float]:
 
 
 def _intercept(x: Float, values: Float, covariances: Float) -> tuple[Float, Float]:
-    """Weighted straight lines over x at x = 0, parameter by parameter, and their covariance."""
+    """Return the values at x = 0 of weighted straight lines over x, one per parameter, and their covariance."""
     variance = np.einsum("lii->li", covariances)
     weight = 1.0 / variance if np.all(np.isfinite(variance)) and np.all(variance > 0.0) else np.ones(values.shape)
     weight = weight / weight.sum(axis=0)

@@ -1,4 +1,4 @@
-"""Experimental modal analysis in one call: from frequency responses to mass-normalised modes with errors."""
+"""Experimental modal analysis in one call: from frequency responses to mass-normalised modes with standard errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -24,12 +24,12 @@ __all__ = ["ModalAnalysis", "linear_modes"]
 Float = NDArray[np.float64]
 
 _NEEDED = 2.0
-"""A pole counts as a mode if the misfit without it grows by this factor, whatever number of modes is asked for."""
+"""A pole must be a mode if the misfit without it grows by this factor, whatever number of modes was requested."""
 _NEAR = 0.05
-"""A starting frequency takes the nearest pole of the diagram within this relative distance."""
+"""A starting frequency is replaced by the nearest pole of the diagram within this relative distance."""
 _ROUNDS = 20
 _AT_REST_STD = 0.01
-"""The rounds end once no pole moves by more than this share of its standard error."""
+"""The iteration ends once no pole moves by more than this share of its standard error."""
 _START_DAMPING = 0.005
 """Initial damping ratio where the diagram has no pole nearby."""
 
@@ -43,7 +43,7 @@ class ModalAnalysis:
     modes
         The modal model.
     responses
-        The responses it was fitted to; None if the modes come from elsewhere.
+        The responses to which the modes were fitted; None if the modes come from elsewhere.
     stabilisation
         The diagram in which the modes were found; None if starting values were given.
     """
@@ -53,7 +53,7 @@ class ModalAnalysis:
     stabilisation: StabilisationDiagram | None = None
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, a group for each part, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, in one group per part, and the JSON-able attributes that go with them."""
         arrays, attributes = _grouped("modes", self.modes)
         if self.responses is not None:
             more, attributes_of_responses = _grouped("responses", self.responses)
@@ -66,7 +66,7 @@ class ModalAnalysis:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "ModalAnalysis":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
         diagram = {name: np.asarray(values) for name, values in _group(arrays, "stabilisation").items()}
         return cls(
             LinearModes.from_arrays(_group(arrays, "modes"), attributes.get("modes", {})),
@@ -97,25 +97,26 @@ def linear_modes(
     orders: Sequence[int] | None = None,
     diagram: StabilisationDiagram | None = None,
 ) -> LinearModes:
-    """Linear modes from the frequency responses of all motions to the one drive force.
+    """Identify linear modes from the frequency responses of all motions to a single drive force.
 
-    A frequency-domain subspace of rising order gives poles to start from (`stabilisation`), a weighted least-squares fit
-    of a modal model with residual terms the result; shapes are normalised by the residue at the drive point.
+    A frequency-domain subspace method of rising order gives the initial poles (`stabilisation`). A weighted least-squares fit
+    of a modal model with residual terms gives the result. Shapes are mass-normalised by the residue at the drive point.
 
     Parameters
     ----------
     responses
-        Motions over the force, one of them of role ``drive``, best by the voltage as instrument; or better still force and
-        motions over the voltage (``best_linear_approximation(..., inputs=("voltage",), outputs=("force", ...))``), whose
-        noise counts rightly even where it is above the force (`errors_in_variables`).
+        Motions over the force, one motion of role ``drive``, preferably estimated with the voltage as instrument. Better
+        still are force and motions over the voltage (``best_linear_approximation(..., inputs=("voltage",), outputs=("force",
+        ...))``): their noise is weighted correctly even where it exceeds the force (`errors_in_variables`).
     modes
-        None: what the stabilisation diagram shows, without what turns out not to be a mode. A number: the most prominent
-        that many. Frequencies (Hz): a mode near each. Modes of another level: the fit starts from them.
+        None: all poles that are stable in the stabilisation diagram, less those that the fit rejects as modes. A number: that
+        many of the most prominent modes. Frequencies (Hz): one mode near each. Modes of another level: the fit starts from
+        their poles.
     lowest_hz, highest_hz
         Band of the fit; all lines if None.
     complex_residues
-        Fit residues as complex numbers, for damping that couples modes. Normal modes have half as many unknowns
-        and the smaller errors wherever damping is light; ``phase_collinearity`` tells whether they will do.
+        Fit residues as complex numbers, for damping that couples modes. Normal modes have half as many unknowns and smaller
+        standard errors where damping is light; ``phase_collinearity`` shows whether they suffice.
     weighting
         Covariance that weights the lines: ``total`` (with nonlinear distortion), ``noise``, ``relative`` (none), or
         the first of these that is known (``auto``).
@@ -157,7 +158,7 @@ def linear_modes(
 
 
 def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
-    """The maximum-likelihood fit from a nearby fit: repeated fits to the linearised problem until no pole moves."""
+    """Return the maximum-likelihood fit near ``fit``: repeat fits to the linearised problem until no pole moves."""
     for _ in range(_ROUNDS):
         before = fit
         basis = modal_basis(joint.s, fit.poles, normal)
@@ -170,7 +171,7 @@ def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tupl
 
 
 def _poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
-    """The poles of known modes in the band."""
+    """Return the poles of known modes in the band."""
     inside = (modes.frequency_hz >= data.frequency_hz[0]) & (modes.frequency_hz <= data.frequency_hz[-1])
     if not np.any(inside):
         raise IdentificationError(
@@ -180,7 +181,7 @@ def _poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
 
 
 def _start(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequence[float] | None) -> Float:
-    """Initial poles: rad/s and damping ratios."""
+    """Return the initial poles: angular frequencies in rad/s, then damping ratios."""
     if wanted is None:
         columns = stable.columns()
         if not columns.size:
@@ -217,7 +218,7 @@ def _without_spurious(
     normal: bool,
     modes: int | Sequence[float] | None,
 ) -> tuple[ModalFit, list[str]]:
-    """Fit, drop poles that are no modes (or the least prominent if a number was asked for), and repeat until all are modes."""
+    """Fit, drop poles that are not modes (or the least prominent if a number was requested), and repeat until all are modes."""
     notes: list[str] = []
     drive, whole = find_role(band.outputs, "drive"), np.inf
     while True:

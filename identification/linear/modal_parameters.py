@@ -1,4 +1,4 @@
-"""From the parameters of a fit to modes: normalisation by the drive-point residue, standard errors, rejections, notes."""
+"""Convert the parameters of a fit to modes: normalisation by the drive-point residue, standard errors, rejections, notes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,9 @@ _COLLINEAR = 0.95
 
 
 def phase_collinearity(residues: Complex) -> Float:
-    """float[n_modes]: how well the residues of each column lie on one line through zero, 1 where they do.
+    """float[n_modes]: modal phase collinearity of the residues of each column, 1 if they lie on one line through zero.
 
-    ``((Sxx - Syy)^2 + 4 Sxy^2) / (Sxx + Syy)^2`` of real and imaginary parts (Pappa, Elliott and Schenk, 1993).
+    It is ``((Sxx - Syy)^2 + 4 Sxy^2) / (Sxx + Syy)^2`` of the real and imaginary parts (Pappa, Elliott and Schenk, 1993).
     """
     xx, yy = np.sum(residues.real**2, axis=0), np.sum(residues.imag**2, axis=0)
     xy = np.sum(residues.real * residues.imag, axis=0)
@@ -34,7 +34,7 @@ def phase_collinearity(residues: Complex) -> Float:
 
 
 def _residues(poles: Float, terms: Float, normal: bool) -> Complex:
-    """complex[n_outputs, n_modes]: ``rho = a + b p``, 1/kg."""
+    """complex[n_outputs, n_modes]: residues ``rho = a + b p``, 1/kg."""
     omega, zeta = np.split(poles[:-1], 2)
     count = omega.size
     if normal:
@@ -43,7 +43,7 @@ def _residues(poles: Float, terms: Float, normal: bool) -> Complex:
 
 
 def _modes(poles: Float, terms: Float, drive: int, normal: bool) -> Float:
-    """Frequencies (Hz), damping ratios, shapes row by row."""
+    """Return frequencies (Hz), damping ratios and shapes row by row, in one vector."""
     omega, zeta = np.split(poles[:-1], 2)
     residues = _residues(poles, terms, normal)
     shapes = (residues / np.sqrt(residues[drive])).real
@@ -51,7 +51,10 @@ def _modes(poles: Float, terms: Float, drive: int, normal: bool) -> Float:
 
 
 def accepted(fit: ModalFit, data: WeightedResponses, drive: int, *, normal: bool) -> tuple[list[str], Float]:
-    """Why each pole is no mode (empty if it is one), and its prominence: peak at the drive point over its error."""
+    """Return why each pole is not a mode (empty if it is one), and its prominence.
+
+    The prominence is the drive-point residue over its standard error.
+    """
     omega, zeta = fit.omega, fit.zeta
     count, terms = omega.size, fit.terms.shape[1]
     std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
@@ -78,7 +81,7 @@ def accepted(fit: ModalFit, data: WeightedResponses, drive: int, *, normal: bool
 def as_linear_modes(
     fit: ModalFit, band: FrequencyResponseMatrix, data: WeightedResponses, *, normal: bool
 ) -> LinearModes:
-    """Modes in rising order of frequency; the covariance by first-order propagation."""
+    """Return the modes in rising order of frequency; their covariance follows by first-order propagation."""
     drive = find_role(band.outputs, "drive")
     rows, count, terms = len(band.outputs), fit.omega.size, fit.terms.shape[1]
     nonlinear = fit.poles.size
@@ -127,7 +130,7 @@ def as_linear_modes(
 
 
 def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) -> list[str]:
-    """Modes that are close, hardly resolved, complex, or badly fitted; one line each."""
+    """Return notes, one line each, on modes that are close, poorly resolved or complex, and on a poor fit."""
     notes = [] if converged else ["the fit did not come to rest: the poles depend on where it began"]
     frequency, bandwidth = modes.frequency_hz, 2.0 * modes.damping_ratio * modes.frequency_hz
     alike = mac_matrix(modes, modes)
@@ -160,6 +163,6 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
 
 
 def _spacing(data: WeightedResponses, frequency_hz: float) -> float:
-    """Distance of the lines around a frequency, Hz."""
+    """Spacing of the lines around a frequency, Hz."""
     index = int(np.clip(np.searchsorted(data.frequency_hz, frequency_hz), 1, data.frequency_hz.size - 1))
     return float(data.frequency_hz[index] - data.frequency_hz[index - 1])

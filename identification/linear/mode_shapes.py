@@ -1,4 +1,4 @@
-"""Linear mass-normalised mode shapes, as a modal analysis at low level gives them, and what they turn motion into."""
+"""Linear mass-normalised mode shapes from a modal analysis at low level, and the modal amplitudes computed with them."""
 
 from dataclasses import dataclass
 
@@ -26,13 +26,13 @@ class ModeShapes:
     shapes
         float[n_channels, n_modes], kg^-1/2; no more modes than channels, linearly independent.
     mode
-        Column of the mode that is tested.
+        Column of the tested mode in ``shapes``.
     shapes_std
         Standard errors of ``shapes``, kg^-1/2, NaN where unknown; None if none is known.
     covariance
-        float[n_channels n_modes, n_channels n_modes] of ``shapes`` row by row, takes the place of ``shapes_std``; None if
-        only those are known. A modal analysis scales all channels of a mode by the drive point's residue, so that their
-        errors go together.
+        float[n_channels n_modes, n_channels n_modes], covariance of ``shapes`` row by row, used instead of ``shapes_std``;
+        None if only ``shapes_std`` is known. A modal analysis scales all channels of a mode by the residue at the drive
+        point, so that their errors are correlated.
     """
 
     channels: tuple[str, ...]
@@ -69,7 +69,7 @@ class ModeShapes:
         return np.asarray(self.shapes[:, self.mode])
 
     def draw(self, draws: int, rng: np.random.Generator) -> Float | None:
-        """float[draws, n_channels, n_modes]: shapes as they might be, normally distributed; None if no error is known."""
+        """float[draws, n_channels, n_modes]: random shapes, normal with the known errors; None if no error is known."""
         if self.covariance is not None:
             values, vectors = np.linalg.eigh(self.covariance)
             root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -86,10 +86,10 @@ class ModeShapes:
         return np.array([point.displacement_m(name)[1] for name in self.channels])
 
     def modal_amplitude(self, point: PeriodicVibration) -> tuple[float, float]:
-        """Modal amplitude q (kg^1/2 m) and its standard error (NaN if the point has none).
+        """Return the modal amplitude q (kg^1/2 m) and its standard error (NaN if the point has none).
 
-        ``q^2 = psi^H (Phi^T)^+ Phi^+ psi``, psi the fundamental of the deflection shape (Scheel et al. 2018; the
-        founding paper's equation for the modal amplitude).
+        ``q^2 = psi^H (Phi^T)^+ Phi^+ psi`` with the fundamental psi of the deflection shape (Scheel et al. 2018; the founding
+        paper's equation for the modal amplitude).
         """
         inverse = np.linalg.pinv(self.shapes)
         psi = self.fundamental_m(point)
@@ -104,6 +104,6 @@ class ModeShapes:
 
 
 def mac(linear: Float, measured: Complex) -> float:
-    """Modal assurance criterion ``|a^T b|^2 / ((a^T a) (b^H b))`` of a linear shape and a measured one, in [0, 1]."""
+    """Modal assurance criterion ``|a^T b|^2 / ((a^T a) (b^H b))`` of a linear and a measured shape, in [0, 1]."""
     product = abs(np.dot(linear, measured)) ** 2
     return float(product / (np.dot(linear, linear) * np.vdot(measured, measured).real))

@@ -1,14 +1,14 @@
-"""A linear modal model from a modal analysis: poles, mass-normalised shapes, residual terms, their errors, MAC of two models.
+"""Linear modal model from a modal analysis: poles, mass-normalised shapes, residual terms, their errors; MAC of two models.
 
 The accelerance is, with ``s = i W``,
 
     H_o(s) = sum_k phi_ok phi_dk s^2 / (s^2 + 2 z_k w_k s + w_k^2)
              + L_o + L'_o / s + L''_o / s^2 + U_o s^2 / (1 + s^2 / w_u^2) + U'_o s^3 / (1 + s^2 / w_u^2)^2,
 
-phi mass-normalised shapes at the channel o and at the drive point d, L_o what lower modes and rigid-body motion leave
-in the band (inertia), U_o what higher modes leave (stiffness, growing towards the nearest of them, at w_u; a plain
-stiffness where w_u is infinite), L', L'' and U' the little that their damping and the lower modes' stiffness add.
-Complex residues ``rho_ok`` in place of ``phi_ok phi_dk`` turn a term into
+phi are the mass-normalised shapes at the channel o and at the drive point d. L_o is the contribution of lower modes and
+rigid-body motion in the band (inertia). U_o is that of higher modes: a stiffness that grows towards the nearest higher mode,
+at w_u; a plain stiffness if w_u is infinite. L', L'' and U' are the small contributions of the damping of these modes and of
+the stiffness of the lower modes. Complex residues ``rho_ok`` in place of ``phi_ok phi_dk`` turn a term into
 ``s^2 (a + b s) / (s^2 + 2 z w s + w^2)`` with ``rho = a + b p`` at the pole ``p = -z w + i w sqrt(1 - z^2)``.
 """
 
@@ -52,33 +52,34 @@ class LinearModes:
     shapes, shapes_std
         float[n_channels, n_modes], mass-normalised deflection, kg^-1/2, positive at the drive point.
     phase_collinearity
-        float[n_modes], how well the complex residues of a mode lie on one line, in [0, 1]; NaN if unknown.
+        float[n_modes], modal phase collinearity in [0, 1]: 1 if the complex residues of a mode lie on one line; NaN if
+        unknown.
     lower, upper
         complex[n_channels], residual terms L (1/kg) and U (s^2/kg) of the accelerance.
     small_terms
         float[n_channels, 3], L' (1/(kg s)), L'' (1/(kg s^2)) and U' (s^3/kg); None for none.
     lowest_hz, highest_hz
-        Band that the model was fitted in.
+        Frequency band of the fit.
     upper_hz
-        ``w_u / 2 pi``, above the band.
+        ``w_u / 2 pi``, the frequency of the residual higher mode, above the band.
     force_rms_n
-        RMS of the force in that band, the level of the test; 0 where it was extrapolated to zero, NaN if unknown.
+        RMS of the force in the band, the level of the test; 0 if the modes were extrapolated to zero, NaN if unknown.
     covariance
-        float[m, m] of ``(frequency_hz, damping_ratio, shapes row by row)``; None if unknown.
+        float[m, m], covariance of ``(frequency_hz, damping_ratio, shapes row by row)``; None if unknown.
     residues
-        complex[n_channels, n_modes], residues rho (1/kg) where they were fitted as complex; None for normal modes, where
-        they are ``phi_o phi_d``.
+        complex[n_channels, n_modes], residues rho (1/kg) if they were fitted as complex; None for normal modes, whose
+        residues are ``phi_o phi_d``.
     fit_residual
-        Root of the mean square of misfit over expected error; 1 where nothing but noise is left; NaN if unknown.
+        RMS of residual over expected error; 1 if only noise is left; NaN if unknown.
     specimen
         Name of what was tested.
     notes
-        What a user should know about these numbers, one line each.
+        Remarks on the quality of the result, one line each.
 
     Raises
     ------
     IdentificationError
-        On shapes that do not agree, no single drive channel, frequencies that are not positive and rising.
+        If array shapes do not agree, there is not exactly one drive channel, or frequencies are not positive and rising.
     """
 
     channels: tuple[Channel, ...]
@@ -131,7 +132,7 @@ class LinearModes:
 
     @property
     def drive_row(self) -> int:
-        """Row of the drive point."""
+        """Row of the drive-point channel."""
         return find_role(self.channels, "drive")
 
     @property
@@ -140,17 +141,20 @@ class LinearModes:
         return np.asarray(self.shapes[self.drive_row])
 
     def nearest(self, frequency_hz: float) -> int:
-        """Index of the mode nearest to a frequency."""
+        """Return the index of the mode nearest to a frequency."""
         return int(np.argmin(np.abs(self.frequency_hz - frequency_hz)))
 
     def mode_shapes(self, mode: int = 0, *, modes: int | None = None) -> ModeShapes:
-        """Shapes for the modal amplitude of ``mode``, from ``modes`` modes nearest to it (as many as channels tell apart)."""
+        """Return the shapes with which the modal amplitude of ``mode`` is computed.
+
+        They are those of the ``modes`` modes nearest to it; if None, as many as there are channels.
+        """
         count = min(len(self.channels), self.frequency_hz.size) if modes is None else modes
         order = np.argsort(np.abs(self.frequency_hz - self.frequency_hz[mode]), kind="stable")[:count]
         return ModeShapes(tuple(c.name for c in self.channels), self.shapes[:, order], 0)
 
     def accelerance(self, frequency_hz: ArrayLike, *, without: int | None = None) -> Complex:
-        """complex[n, n_channels]: acceleration over drive force, 1/kg, residual terms included; one mode may be left out."""
+        """complex[n, n_channels]: acceleration over drive force, 1/kg, with residual terms; ``without`` omits one mode."""
         s = 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))[:, None]
         omega = 2.0 * np.pi * self.frequency_hz
         modal = s**2 / (s**2 + 2.0 * self.damping_ratio * omega * s + omega**2)
@@ -176,7 +180,7 @@ class LinearModes:
         return np.asarray(self.accelerance(frequency_hz, without=without)[:, row] / s**2)
 
     def response_matrix(self, frequency_hz: ArrayLike) -> FrequencyResponseMatrix:
-        """The model's frequency responses in the units of the channels, for one force."""
+        """Return the model's frequency responses to one force, in the units of the channels."""
         frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         s = 2j * np.pi * frequency
         order = np.array([2 - MOTION_ORDER[channel.motion] for channel in self.channels])
@@ -191,7 +195,7 @@ class LinearModes:
         )
 
     def table(self) -> list[dict[str, float | None]]:
-        """One dictionary per mode, with None for what could not be had: ready for JSON."""
+        """Return one JSON-able dictionary per mode, with None for unknown values."""
         names = (*_POLES[:4], "drive_shape", "phase_collinearity")
         return [
             {name: float(v) if np.isfinite(v := getattr(self, name)[mode]) else None for name in names}
@@ -199,7 +203,7 @@ class LinearModes:
         ]
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         arrays = {name: getattr(self, name) for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
         arrays |= {name: np.array(getattr(self, name)) for name in _SCALARS}
         arrays |= {name: getattr(self, name) for name in _OPTIONAL if getattr(self, name) is not None}
@@ -208,7 +212,7 @@ class LinearModes:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "LinearModes":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
         try:
             channels = tuple(Channel(**channel) for channel in attributes["channels"])
             values: dict[str, Any] = {name: arrays[name] for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
@@ -220,9 +224,9 @@ class LinearModes:
 
 
 def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:
-    """float[n_modes of a, n_modes of b]: ``(x^T y)^2 / (x^T x y^T y)`` of the shapes at the channels that both have.
+    """float[n_modes of a, n_modes of b]: MAC ``(x^T y)^2 / (x^T x y^T y)`` of the shapes at the common channels.
 
-    Raises `IdentificationError` where they have no channel in common.
+    Raises `IdentificationError` if the two have no channel in common.
     """
     names = [channel.name for channel in b.channels]
     common = [(row, names.index(channel.name)) for row, channel in enumerate(a.channels) if channel.name in names]

@@ -1,18 +1,19 @@
-"""Modal model by weighted least squares: common poles by Levenberg-Marquardt, everything linear eliminated.
+"""Fit a modal model by weighted least squares: common poles by Levenberg-Marquardt, linear terms eliminated.
 
 The accelerance of the channel o is
 
     H_o = sum_k (a_ok + b_ok s) s^2 / (s^2 + 2 z_k w_k s + w_k^2)
           + L_o + L'_o / s + L''_o / s^2 + U_o s^2 / (1 + c s^2) + U'_o s^3 / (1 + c s^2)^2,
 
-b = 0 for normal modes; ``c = 1 / w_u^2`` lets the higher modes leave a term that grows towards the nearest of them, at w_u
-(c = 0: a plain stiffness). L' and U' are what the damping of lower and higher modes leaves, L'' the stiffness of the lower
-ones: small, but in quadrature like the damping that is sought; without them damping ratios were 0.3 % off.
+with b = 0 for normal modes. With ``c = 1 / w_u^2`` the contribution of the higher modes grows towards the nearest of them, at
+w_u (c = 0: a plain stiffness). L' and U' are the contributions of the damping of lower and higher modes, L'' that of the
+stiffness of the lower modes. They are small, but in quadrature, like the damping to be identified: without them damping
+ratios were 0.3 % off.
 
-Given the poles and c, all these terms follow by linear least squares; the poles' step is the Schur complement of the full
-Gauss-Newton step (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973; Ruhe and Wedin, SIAM Rev. 22,
-1980). With weights P, Jacobian J and ``M = Re sum J^H P J`` the parameters' covariance is
-``M^-1 (1/2 Re sum J^H P C P J) M^-1``: right for the errors C of the lines, whatever the weights are.
+Given the poles and c, all these terms follow by linear least squares. The step of the poles is the Schur complement of the
+full Gauss-Newton step (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973; Ruhe and Wedin, SIAM Rev. 22,
+1980). With weights P, Jacobian J and ``M = Re sum J^H P J`` the covariance of the parameters is
+``M^-1 (1/2 Re sum J^H P C P J) M^-1``. This is correct for line errors with covariance C, whatever the weights are.
 """
 
 from dataclasses import dataclass
@@ -28,16 +29,16 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 RESIDUAL_TERMS = 5
-"""Terms per channel that modes outside the band leave."""
+"""Number of residual terms per channel, from modes outside the band."""
 _ITERATIONS = 60
 _STEP_STD = 1e-4
-"""Converged where a step moves nothing by more than this part of its standard error."""
+"""The fit has converged if a step moves no parameter by more than this share of its standard error."""
 _NEAREST = 0.9
-"""Largest c, relative to that of a mode at the highest line."""
+"""Largest c, relative to the c of a mode at the highest line."""
 _PRIOR = 0.25
-"""Where the responses say nothing of c it stays about here, relative to that of a mode at the highest line."""
+"""Prior value of c, relative to the c of a mode at the highest line; c stays near it if the responses do not determine c."""
 _PRIOR_STD = 5.0
-"""How little that binds: standard deviation relative to it, in units of the error of the responses."""
+"""Standard deviation of the prior on c, relative to its value, in units of the error of the responses; a weak prior."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +53,11 @@ class ModalFit:
         float[n_outputs, n_terms], a (1/kg) of every mode, then b (s/kg) of every mode if the fit has them, then the
         `RESIDUAL_TERMS`: L (1/kg), L' (1/(kg s)), L'' (1/(kg s^2)), U (s^2/kg), U' (s^3/kg).
     covariance
-        float[m, m] of ``(poles, terms row by row)``.
+        float[m, m], covariance of ``(poles, terms row by row)``.
     residual
-        Root of the mean square of misfit over what its covariance lets expect; NaN where no covariance is known.
+        RMS of the residual over its expected value from the covariance; NaN if no covariance is known.
     converged
-        Whether the iteration came to rest.
+        Whether the iteration converged.
     """
 
     poles: Float
@@ -67,17 +68,17 @@ class ModalFit:
 
     @property
     def omega(self) -> Float:
-        """float[n_modes], rad/s."""
+        """float[n_modes]: natural angular frequencies, rad/s."""
         return np.asarray(self.poles[: self.poles.size // 2])
 
     @property
     def zeta(self) -> Float:
-        """float[n_modes]."""
+        """float[n_modes]: damping ratios."""
         return np.asarray(self.poles[self.poles.size // 2 : -1])
 
 
 def modal_basis(s: Complex, poles: Float, normal: bool) -> Complex:
-    """complex[n_lines, n_terms]: what the terms multiply."""
+    """complex[n_lines, n_terms]: basis functions that the terms multiply."""
     (omega, zeta), s = np.split(poles[:-1], 2), s[:, None]
     modal = s**2 / (s**2 + 2.0 * zeta * omega * s + omega**2)
     near = 1.0 + poles[-1] * s**2
@@ -86,7 +87,7 @@ def modal_basis(s: Complex, poles: Float, normal: bool) -> Complex:
 
 
 def pole_derivatives(s: Complex, poles: Float, terms: Float, normal: bool) -> Complex:
-    """complex[n_lines, n_outputs, 2 n_modes + 1]: of the accelerance by the poles and c."""
+    """complex[n_lines, n_outputs, 2 n_modes + 1]: derivatives of the accelerance with respect to the poles and c."""
     (omega, zeta), s = np.split(poles[:-1], 2), s[:, None, None]
     count = omega.size
     numerator = terms[None, :, :count] + (0.0 if normal else terms[None, :, count : 2 * count] * s)
@@ -98,16 +99,16 @@ def pole_derivatives(s: Complex, poles: Float, terms: Float, normal: bool) -> Co
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Normal equations at one set of poles, the terms being the best there."""
+    """Normal equations at one set of poles, with the terms that fit best there."""
 
     terms: Float
     cost: float
     matrix: Float
-    gradient: Float  # of half the cost by the poles
+    gradient: Float  # of half the cost with respect to the poles
 
 
 class _Problem:
-    """The responses with the precision of every line, and the normal equations that they give."""
+    """The responses with the precision of every line, and the normal equations of the fit."""
 
     def __init__(self, data: WeightedResponses, normal: bool) -> None:
         self.data, self.normal, self.s = data, normal, data.s
@@ -151,7 +152,7 @@ class _Problem:
         return _State(terms, cost + off**2, matrix, gradient)
 
     def fitted(self, poles: Float, state: _State, converged: bool) -> ModalFit:
-        """The fit with the errors of its parameters."""
+        """Return the fit with the covariance of its parameters."""
         outputs = self.value.shape[1]
         basis = modal_basis(self.s, poles, self.normal)
         unit = 1.0 / np.sqrt(np.diag(state.matrix))
@@ -174,7 +175,7 @@ class _Problem:
         return ModalFit(poles, state.terms, 0.5 * (covariance + covariance.T), residual, converged)
 
     def allowed(self, poles: Float) -> Float | None:
-        """The poles with c kept in its range; None where a pole is none."""
+        """Return the poles with c clipped to its range; None if a frequency or damping ratio is out of its range."""
         count = poles.size // 2
         if np.any(poles[:count] <= 0.0) or np.any(np.abs(poles[count:-1]) >= 1.0):
             return None
@@ -182,7 +183,7 @@ class _Problem:
 
 
 def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS) -> ModalFit:
-    """Weighted least-squares fit of a modal model from starting ``poles``: rad/s, then damping ratios (then c)."""
+    """Fit a modal model by weighted least squares from starting ``poles``: rad/s, then damping ratios (then c)."""
     problem, damping = _Problem(data, normal), 1e-3
     poles = np.append(poles, problem.prior_c) if poles.size % 2 == 0 else poles
     state, count = problem.state(poles), poles.size | 1
@@ -203,7 +204,7 @@ def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, ite
         else:
             return problem.fitted(poles, state, False)
         moved = np.max(np.abs(trial - poles) / unit)
-        # A misfit of one unit a value is what noise leaves, so that ``unit`` is what the poles' errors are like.
+        # Noise leaves a residual of one unit per value; ``unit`` is therefore of the size of the poles' standard errors.
         rest = moved <= _STEP_STD * np.sqrt(new.cost / problem.value.size + 1e-300)
         poles, state, damping = trial, new, 0.1 * damping
         if rest:

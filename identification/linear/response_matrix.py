@@ -1,4 +1,4 @@
-"""Frequency responses from several inputs to several outputs, with what is known of their errors."""
+"""Frequency responses from several inputs to several outputs, with the known covariances of their errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,21 +32,21 @@ class FrequencyResponseMatrix:
     value
         complex[n_lines, n_outputs, n_inputs], in units of output over input, ``exp(+i w t)``.
     noise_covariance, total_covariance
-        complex[n_lines, m, m] with ``m = n_outputs * n_inputs``, of ``value`` with its rows one after another:
-        ``E[e e^H]``, from noise alone and with nonlinear distortion. None where unknown.
+        complex[n_lines, m, m] with ``m = n_outputs * n_inputs``: covariance ``E[e e^H]`` of ``value`` row by row, from noise
+        alone and from noise with nonlinear distortion. None if unknown.
     estimator
-        How it came about: ``instrument``, ``H1``, ``H2``, ``model`` ...
+        Estimator of the responses: ``instrument``, ``H1``, ``H2``, ``model`` ...
     input_rms
         float[n_inputs], RMS of every input in the band, in its unit: the level; empty if unknown.
     specimen
         Name of what was tested.
     notes
-        What a user should know about these numbers, one line each.
+        Remarks on the quality of the responses, one line each.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, shapes that do not agree, frequencies that do not rise.
+        If values are NaN or infinite, shapes do not agree, or frequencies do not rise.
     """
 
     outputs: tuple[Channel, ...]
@@ -84,12 +84,12 @@ class FrequencyResponseMatrix:
 
     @property
     def noise_std(self) -> Float:
-        """float[n_lines, n_outputs, n_inputs]: ``sqrt(E|e|^2)`` of ``value`` from noise; NaN if unknown."""
+        """float[n_lines, n_outputs, n_inputs]: standard deviation ``sqrt(E|e|^2)`` of ``value`` from noise; NaN if unknown."""
         return self._std(self.noise_covariance)
 
     @property
     def total_std(self) -> Float:
-        """float[n_lines, n_outputs, n_inputs]: the same with nonlinear distortion; NaN if unknown."""
+        """float[n_lines, n_outputs, n_inputs]: standard deviation of ``value`` with nonlinear distortion; NaN if unknown."""
         return self._std(self.total_covariance)
 
     def _std(self, covariance: Complex | None) -> Float:
@@ -116,7 +116,7 @@ class FrequencyResponseMatrix:
     def select(
         self, outputs: Sequence[str] | None = None, *, lowest_hz: float = 0.0, highest_hz: float = np.inf
     ) -> "FrequencyResponseMatrix":
-        """The same for some outputs, and for the lines of a band, both ends included."""
+        """Return the responses of some outputs at the lines of a band, both ends included."""
         rows = list(range(len(self.outputs))) if outputs is None else [find_name(self.outputs, o) for o in outputs]
         lines = (self.frequency_hz >= lowest_hz) & (self.frequency_hz <= highest_hz)
         if not lines.any():
@@ -139,7 +139,7 @@ class FrequencyResponseMatrix:
         )
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         arrays = {name: getattr(self, name) for name in _ARRAYS if getattr(self, name) is not None}
         channels = {name: [vars(channel) for channel in getattr(self, name)] for name in ("outputs", "inputs")}
         texts = {"estimator": self.estimator, "specimen": self.specimen, "notes": list(self.notes)}
@@ -149,7 +149,7 @@ class FrequencyResponseMatrix:
     def from_arrays(
         cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]
     ) -> "FrequencyResponseMatrix":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
         try:
             channels = {name: tuple(Channel(**c) for c in attributes[name]) for name in ("outputs", "inputs")}
             texts = {name: attributes[name] for name in ("estimator", "specimen", "notes", "input_rms")}

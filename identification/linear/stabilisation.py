@@ -1,4 +1,4 @@
-"""Stabilisation diagram: poles of models of rising order; what comes back from order to order belongs to the structure."""
+"""Stabilisation diagram: poles of models of rising order; poles that recur from order to order belong to the structure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,24 +27,24 @@ _LARGEST_DAMPING = 0.1
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StabilisationDiagram:
-    """Poles of all orders, one entry each, by order and then by frequency.
+    """Poles of all orders, one entry per pole, sorted by order and then by frequency.
 
     Parameters
     ----------
     order
-        int[n], order of the model that the pole is of.
+        int[n], order of the model that has the pole.
     frequency_hz, damping_ratio
         float[n], ``|p| / 2 pi`` and ``-Re p / |p|``.
     shapes
-        complex[n, n_outputs], deflection of the pole as acceleration, length one.
+        complex[n, n_outputs], shape of the pole as acceleration, of length one.
     frequency_stable, damping_stable, shape_stable
-        bool[n], whether the order before has a pole with a frequency, then also a damping ratio, then also a shape like it.
+        bool[n], whether the order before has a pole that agrees in frequency; also in damping ratio; also in shape.
     physical
-        bool[n], whether the pole oscillates within the band, decays, and does so slowly enough for a mode.
+        bool[n], whether the pole oscillates within the band and its damping ratio is positive and small enough for a mode.
     orders
         int[n_orders], the orders tried.
     singular_values
-        float[n_singular], of the weighted data; a drop tells the order.
+        float[n_singular], singular values of the weighted data; a drop indicates the order.
     """
 
     order: NDArray[np.int64]
@@ -69,11 +69,11 @@ class StabilisationDiagram:
         return np.asarray(self.physical & self.shape_stable)
 
     def columns(self, *, share: float = 0.5) -> NDArray[np.int64]:
-        """int[n_modes]: the pole of highest order of every column of stable poles, lowest frequency first.
+        """int[n_modes]: index of one pole of every column of stable poles, lowest frequency first.
 
-        Poles are of one column where their frequencies differ by less than 1 %, or by less than a tenth of it where their
-        shapes differ, and shapes are alike. A column counts if it has stable poles in the given share of the orders above
-        its first.
+        Poles belong to one column if their frequencies differ by less than 1 % and their shapes have a MAC above 0.8. A
+        column counts if it has stable poles in the given share of the orders above its first. Of each column the steadiest
+        pole of the upper half of its orders is returned.
         """
         left = np.flatnonzero(self.stable)[::-1]  # highest order first
         found: list[int] = []
@@ -89,7 +89,7 @@ class StabilisationDiagram:
         return np.array(sorted(found, key=lambda index: self.frequency_hz[index]), dtype=np.int64)
 
     def _steadiest(self, column: NDArray[np.int64]) -> np.int64:
-        """The pole nearest to the column's median frequency and damping among its upper half."""
+        """Return the pole among the upper half of the column that is nearest to their median frequency and damping."""
         upper = column[: max(1, (column.size + 1) // 2)]
         distance = np.zeros(upper.size)
         for values in (self.frequency_hz[upper] / 0.01, self.damping_ratio[upper] * self.frequency_hz[upper] / 0.05):
@@ -106,28 +106,28 @@ def stabilisation(
     damping_tolerance: float = 0.05,
     lowest_mac: float = 0.95,
 ) -> StabilisationDiagram:
-    """Poles of subspace models of rising order, in continuous time.
+    """Compute the continuous-time poles of subspace models of rising order.
 
-    The bilinear map ``z = (1 + s/a) / (1 - s/a)`` spreads the band over the unit circle; it takes rational responses to
-    rational ones exactly, as sampling does not.
+    The bilinear map ``z = (1 + s/a) / (1 - s/a)`` spreads the band over the unit circle. Unlike sampling, it maps rational
+    responses exactly to rational responses.
 
     Parameters
     ----------
     responses
         One or several inputs and outputs, every output a motion; or force and motions over a voltage.
     orders
-        Numbers of states, 2 to 40 in steps of two if None; fewer where there are few lines or the band is narrow.
+        Numbers of states; if None, 2 to 40 in steps of two, or fewer if there are few lines or the band is narrow.
     weighting
         As in `linear_modes`.
     frequency_tolerance, damping_tolerance
-        Largest relative difference from the order before of a stable pole.
+        Largest relative difference of a stable pole from a pole of the order before.
     lowest_mac
-        Least modal assurance criterion between the shapes.
+        Least modal assurance criterion between the shapes of these two poles.
 
     Raises
     ------
     IdentificationError
-        On orders that are not above zero, or too high for the number of lines.
+        If orders are not above zero or too high for the number of lines.
     """
     joint = driven_responses(responses, weighting) if is_driven(responses) else None
     plain = over_force(responses) if is_driven(responses) and joint is None else responses
@@ -141,7 +141,7 @@ def stabilisation(
 def diagram(
     data: WeightedResponses, orders: Sequence[int] | None, tolerances: tuple[float, float, float] = (0.01, 0.05, 0.95)
 ) -> StabilisationDiagram:
-    """`stabilisation` of weighted accelerances."""
+    """Compute the `stabilisation` diagram of weighted accelerances."""
     lines, outputs, inputs = data.value.shape
     most = 2 * lines * inputs // (outputs + inputs) - 2
     middle = float(np.sqrt(np.abs(data.s[0]) * np.abs(data.s[-1])))
@@ -170,7 +170,7 @@ def diagram(
 
 
 def _poles(a: Float, c: Float, middle: float) -> tuple[Float, Float, Complex]:
-    """Frequencies (Hz), damping ratios and unit shapes of the oscillating poles, mapped back from the unit circle."""
+    """Return frequencies (Hz), damping ratios and unit shapes of the oscillating poles, mapped back from the unit circle."""
     z, vectors = np.linalg.eig(a)
     with np.errstate(divide="ignore", invalid="ignore"):
         poles = middle * (z - 1.0) / (z + 1.0)
@@ -184,7 +184,7 @@ def _poles(a: Float, c: Float, middle: float) -> tuple[Float, Float, Complex]:
 def _alike(
     now: tuple[Float, Float, Complex], before: tuple[Float, Float, Complex], tolerances: tuple[float, float, float]
 ) -> tuple[Bool, Bool, Bool]:
-    """Whether any pole of the order before agrees in frequency; also in damping; also in shape."""
+    """Return whether any pole of the order before agrees in frequency; also in damping; also in shape."""
     frequency = np.abs(now[0][:, None] - before[0]) <= tolerances[0] * now[0][:, None]
     damping = frequency & (np.abs(now[1][:, None] - before[1]) <= tolerances[1] * np.abs(now[1][:, None]))
     shape = damping & (np.abs(now[2] @ np.conj(before[2].T)) ** 2 >= tolerances[2])

@@ -1,10 +1,11 @@
 """Weighted fit of a discrete-time state-space model to frequency responses.
 
-The cost is ``sum_k e_k^H P_k e_k`` with ``e_k`` all paths of ``H(z_k) - H_k``, ``H(z) = C (z - A)^-1 B + D``, and P_k the
-inverse of their covariance (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 9
-and 14). All entries of A, B, C and D are free: a change of the states changes no response, so that n^2 directions are flat. The
-step is a Levenberg-Marquardt step in the singular vectors of the Jacobian, columns scaled, without the flat ones (McKelvey,
-Helmersson and Ribarits, Automatica 40, 2004). Derivatives, with ``L = C (z - A)^-1`` and ``R = (z - A)^-1 B``:
+The cost is ``sum_k e_k^H P_k e_k``. ``e_k`` holds all paths of ``H(z_k) - H_k`` with ``H(z) = C (z - A)^-1 B + D``, and P_k
+is the inverse of their covariance (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed.,
+chapters 9 and 14). All entries of A, B, C and D are free. A similarity transform of the states changes no response, so that
+the cost is flat in n^2 directions. Each Levenberg-Marquardt step is computed in the singular vectors of the column-scaled
+Jacobian, without the flat directions (McKelvey, Helmersson and Ribarits, Automatica 40, 2004). The derivatives, with
+``L = C (z - A)^-1`` and ``R = (z - A)^-1 B``, are
 
     dH/dA_ij = L_i R_j,    dH/dB_ij = L_i e_j,    dH/dC_ij = e_i R_j,    dH/dD_ij = e_i e_j.
 """
@@ -26,11 +27,11 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _FLAT = 1e-11
-"""Singular value, relative to the largest, of a direction that says nothing: a similarity, or lost in rounding."""
+"""Relative singular value below which a direction is flat: a similarity transform, or lost in rounding."""
 _CONVERGED = 1e-9
-"""Relative gain of the cost below which the iteration has come to rest; twice in a row."""
+"""The iteration has converged if the relative reduction of the cost is below this twice in a row."""
 _LEAST, _MOST = 1e-10, 1e6
-"""Range of the damping, relative to the largest singular value."""
+"""Range of the Levenberg-Marquardt damping, relative to the largest singular value."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,16 +43,16 @@ class StateSpaceFit:
     model
         A, B, C and D; stable.
     cost
-        float[n_iterations + 1], the weighted squared misfit at the start and after each iteration, over its number of values.
-        Relative weights: a mean squared relative error; known covariance: about one where nothing but noise is left.
+        float[n_iterations + 1], mean weighted squared residual at the start and after each iteration. With relative weights
+        it is a mean squared relative error; with a known covariance it is about one if only noise is left.
     residual
-        Root of the squared misfit over what the covariance lets expect; NaN where none is known.
+        RMS of the residual over its expected value from the covariance; NaN if no covariance is known.
     error
-        float[n_outputs, n_inputs], RMS misfit over RMS response of every path, unweighted.
+        float[n_outputs, n_inputs], RMS residual over RMS response of every path, unweighted.
     weighting
-        What weighted: ``total``, ``noise`` or ``relative``.
+        Kind of covariance that weighted the lines: ``total``, ``noise`` or ``relative``.
     converged
-        Whether the iteration came to rest.
+        Whether the iteration converged.
     """
 
     model: StateSpace
@@ -70,26 +71,27 @@ def fit_state_space(
     weighting: Weighting = "auto",
     iterations: int = 100,
 ) -> StateSpaceFit:
-    """Fit a state-space model of the order of ``start`` to frequency responses, beginning from it.
+    """Fit a state-space model to frequency responses, starting from ``start`` and keeping its order.
 
     Parameters
     ----------
     responses
-        One or several inputs and outputs; with their covariance where it is known.
+        Responses of one or several inputs and outputs, with their covariance if it is known.
     start
-        Stable, for instance from `subspace`.
+        Stable initial model, for instance from `subspace`.
     sample_rate_hz
-        Rate of the model, ``z = exp(2 pi i f / sample_rate_hz)``.
+        Sample rate of the model, ``z = exp(2 pi i f / sample_rate_hz)``.
     weighting
-        Which covariance weights the lines: ``total``, ``noise``, ``relative`` (none), or the first that is known.
+        Covariance that weights the lines: ``total``, ``noise``, ``relative`` (none), or the first of these that is known
+        (``auto``).
     iterations
-        At most so many.
+        Largest number of iterations.
 
     Raises
     ------
     IdentificationError
-        On matrices that do not fit the responses, an unstable start, lines at or above half the sample rate, or fewer values
-        than free parameters.
+        If the matrices of ``start`` do not match the responses, ``start`` is unstable, lines are at or above half the sample
+        rate, or there are fewer values than free parameters.
     """
     data = weighted_responses(responses, weighting)
     z = _points(responses, sample_rate_hz)
@@ -137,7 +139,7 @@ def fit_state_space(
 
 
 def response_jacobian(model: StateSpace, z: Complex) -> Complex:
-    """complex[n_points, n_outputs, n_inputs, p]: derivatives of the response by A, B, C, D, each row by row."""
+    """complex[n_points, n_outputs, n_inputs, p]: derivatives of the response with respect to A, B, C, D, each row by row."""
     n, inputs, outputs = model.a.shape[0], model.b.shape[1], model.c.shape[0]
     inverse = np.linalg.inv(z[:, None, None] * np.eye(n) - model.a)
     left, right = model.c @ inverse, inverse @ model.b
@@ -183,7 +185,7 @@ def _check(data: WeightedResponses, start: StateSpace) -> None:
 
 
 def _whitened(whitening: Complex, values: Complex) -> Float:
-    """Real and imaginary parts, one after the other, of W times all paths; further axes stay behind."""
+    """Return real, then imaginary parts of W times all paths, stacked along one axis; further axes follow."""
     lines, paths = whitening.shape[:2]
     product = whitening @ values.reshape(lines, paths, -1)
     stacked = np.concatenate([product.real, product.imag]).reshape(2 * lines * paths, -1)
@@ -191,7 +193,7 @@ def _whitened(whitening: Complex, values: Complex) -> Float:
 
 
 def _moved(model: StateSpace, step: Float) -> StateSpace:
-    """The model with ``step`` added to its entries, in the order of `response_jacobian`."""
+    """Return the model with ``step`` added to its entries, in the order of `response_jacobian`."""
     edges = np.cumsum([part.size for part in model])[:-1]
     return StateSpace(*(p + s.reshape(p.shape) for p, s in zip(model, np.split(step, edges), strict=True)))
 

@@ -1,12 +1,12 @@
-"""Frequency-domain subspace: a discrete-time state-space model straight from frequency responses.
+"""Frequency-domain subspace identification of a discrete-time state-space model from frequency responses.
 
 With ``z_k`` on the unit circle, ``H(z) = C (z - A)^-1 B + D`` and ``w(z) = (1, z, ..., z^(r-1))``,
 
     w(z_k) (x) H_k = O X_k + Gamma (w(z_k) (x) I),   O = (C; C A; ...; C A^(r-1)),
 
-so that what is left of the first block after projecting the second out spans the extended observability matrix
-(McKelvey, Akcay and Ljung, IEEE TAC 41, 1996; with noise weighting Pintelon and Schoukens, 2nd ed., section 9.7 and
-Pintelon, Automatica 38, 2002). Lines may lie anywhere on the circle, equally spaced or not.
+Projecting the second term out leaves a matrix whose columns span the extended observability matrix O (McKelvey, Akcay and
+Ljung, IEEE TAC 41, 1996; with noise weighting Pintelon and Schoukens, 2nd ed., section 9.7 and Pintelon, Automatica 38,
+2002). Lines may lie anywhere on the circle, equally spaced or not.
 """
 
 from dataclasses import dataclass
@@ -26,13 +26,13 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _TELLING = 1e-7
-"""Part of a block row, relative to the first, that those before it must not make up; sums have sixteen digits."""
+"""A block row must have at least this part independent of the rows before it, relative to the first row."""
 _FLOOR = 1e-13
-"""Least variance of a combination of block rows, relative to that of the rows: rounding of the sums stays below."""
+"""Least variance of a combination of block rows, relative to that of the rows; rounding errors of the sums stay below it."""
 
 
 class StateSpace(NamedTuple):
-    """``x(k+1) = A x(k) + B u(k)``, ``y(k) = C x(k) + D u(k)``."""
+    """Discrete-time model ``x(k+1) = A x(k) + B u(k)``, ``y(k) = C x(k) + D u(k)``."""
 
     a: Float
     b: Float
@@ -40,23 +40,23 @@ class StateSpace(NamedTuple):
     d: Float
 
     def response(self, z: Complex) -> Complex:
-        """complex[n, n_outputs, n_inputs]: ``C (z - A)^-1 B + D`` at points z."""
+        """complex[n, n_outputs, n_inputs]: frequency response ``C (z - A)^-1 B + D`` at points z."""
         left = z[:, None, None] * np.eye(self.a.shape[0]) - self.a
         return np.asarray(self.c @ np.linalg.solve(left, np.broadcast_to(self.b, (z.size, *self.b.shape))) + self.d)
 
 
 @dataclass(frozen=True, eq=False)
 class ObservableSpace:
-    """What the data say of the extended observability matrix, most prominent direction first.
+    """Estimate of the extended observability matrix, most prominent direction first.
 
     Parameters
     ----------
     basis
         float[r n_outputs, n], columns in the order of ``singular_values``.
     singular_values
-        float[n]; with noise weighting those of noise lie about one level, those of the system above.
+        float[n]; with noise weighting the singular values of noise lie at about one level, those of the system above it.
     n_outputs
-        Rows of a block.
+        Number of rows of a block.
     """
 
     basis: Float
@@ -64,16 +64,16 @@ class ObservableSpace:
     n_outputs: int
 
     def state_matrices(self, order: int) -> tuple[Float, Float]:
-        """A and C of a model of the given order, by shifting the observability matrix by one block."""
+        """Return A and C of a model of the given order, by shifting the observability matrix by one block."""
         observability = self.basis[:, :order]
         shifted = np.linalg.lstsq(observability[: -self.n_outputs], observability[self.n_outputs :], rcond=None)[0]
         return np.asarray(shifted), np.asarray(observability[: self.n_outputs])
 
 
 def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> ObservableSpace:
-    """Extended observability matrix of ``block_rows`` blocks from responses at points ``z`` of the unit circle.
+    """Estimate the extended observability matrix of ``block_rows`` blocks from responses at points ``z`` of the unit circle.
 
-    Raises `IdentificationError` where there are fewer values than unknowns.
+    Raises `IdentificationError` if there are fewer values than unknowns.
     """
     lines, outputs, inputs = data.value.shape
     if 2 * lines * inputs < block_rows * (outputs + inputs):
@@ -81,7 +81,7 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
             f"frequency_hz: {lines} lines are too few for {block_rows} block rows of {outputs} outputs and {inputs} "
             f"inputs, needs {-(-block_rows * (outputs + inputs) // (2 * inputs))}; lower the order"
         )
-    # A weight per line keeps the equations exact; lines of small error count more.
+    # One weight per line keeps the equations exact; lines with small errors have more weight.
     weight = 1.0 / np.sqrt(np.mean(data.std**2, axis=(1, 2)))
     powers = z[:, None] ** np.arange(block_rows) * (weight / np.linalg.norm(weight))[:, None]
     response = np.einsum("kr,koi->roki", powers, data.value).reshape(block_rows * outputs, -1)
@@ -106,7 +106,7 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
 
 
 def telling_rows(z: Complex, most: int) -> int:
-    """Block rows, at most so many, that points ``z`` tell apart: few where a narrow band is a short arc of the circle."""
+    """Number of block rows, at most ``most``, that are independent at points ``z``; few if a narrow band is a short arc."""
     powers = z[:, None] ** np.arange(most)
     triangle = np.linalg.qr(np.vstack([powers.real, powers.imag]), mode="r")
     own = np.abs(np.diag(triangle))
@@ -114,9 +114,9 @@ def telling_rows(z: Complex, most: int) -> int:
 
 
 def _root(covariance: Float) -> Float:
-    """Lower triangle L with ``L L^T`` the covariance, floored.
+    """Return the lower triangle L with ``L L^T`` equal to the covariance, floored.
 
-    Powers of z over a short arc of the circle (a narrow band) nearly depend on each other, and so does their noise.
+    Over a short arc of the circle (a narrow band) the powers of z are nearly dependent, and so is their noise.
     """
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(size, size)
@@ -132,25 +132,26 @@ def subspace(
     block_rows: int | None = None,
     weighting: Weighting = "auto",
 ) -> StateSpace:
-    """Discrete-time state-space model of given order from frequency responses, weighted by their covariance.
+    """Identify a discrete-time state-space model of given order from frequency responses, weighted by their covariance.
 
     Parameters
     ----------
     responses
-        One or several inputs and outputs, lines below half the sample rate.
+        Responses of one or several inputs and outputs, at lines below half the sample rate.
     order
         Number of states.
     sample_rate_hz
-        Rate of the model, ``z = exp(2 pi i f / sample_rate_hz)``.
+        Sample rate of the model, ``z = exp(2 pi i f / sample_rate_hz)``.
     block_rows
-        Rows r of the observability matrix; ``order + 2`` if None.
+        Number r of block rows of the observability matrix; ``order + 2`` if None.
     weighting
-        Which covariance weights the lines: ``total``, ``noise``, ``relative`` (none), or the first that is known.
+        Covariance that weights the lines: ``total``, ``noise``, ``relative`` (none), or the first of these that is known
+        (``auto``).
 
     Raises
     ------
     IdentificationError
-        On an order below one, too few block rows or lines, or lines at or above half the sample rate.
+        If the order is below one, there are too few block rows or lines, or lines are at or above half the sample rate.
     """
     if order < 1:
         raise IdentificationError(f"order: is {order}, needs at least 1")
@@ -170,7 +171,7 @@ def subspace(
 
 
 def _with_inputs(data: WeightedResponses, z: Complex, a: Float, c: Float) -> StateSpace:
-    """B and D by least squares, given A and C; every response weighted by its own deviation."""
+    """Return the model with B and D by least squares, given A and C; its weights are the inverse standard deviations."""
     order, outputs, inputs = a.shape[0], c.shape[0], data.value.shape[2]
     left = np.swapaxes(z[:, None, None] * np.eye(order) - a, 1, 2)
     rows = np.swapaxes(np.linalg.solve(left, np.broadcast_to(c.T, (z.size, order, outputs))), 1, 2)

@@ -1,1 +1,1 @@
-"""Mappings: where measurements of others are in nested data, and what they mean."""
+"""Mappings: where the values of an external measurement are in nested data, and what they mean."""

@@ -1,4 +1,4 @@
-"""Backbones that others measured, as a table of fundamentals, as `Backbone`."""
+"""Import backbones from elsewhere, given as a table of fundamentals, as `Backbone`."""
 
 from typing import Annotated, Any, Literal
 
@@ -30,13 +30,13 @@ class FundamentalMapping(ChannelMapping):
 
 
 class BackboneMapping(MappingTable):
-    """Where a backbone is and what it means."""
+    """Where a backbone is in the data and what its values mean."""
 
     kind: Literal["backbone"]
     specimen: str = ""
     """Name of what was tested."""
     source: str = ""
-    """Where the data comes from; for the reader."""
+    """Where the data comes from; for information only."""
     frequency: Path
     """Path of the frequencies."""
     frequency_unit: Literal["Hz", "rad/s"] = "Hz"
@@ -44,9 +44,9 @@ class BackboneMapping(MappingTable):
     values: Literal["peak", "rms"]
     """Whether amplitudes are stored as peak or as RMS."""
     sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
-    """Convention of the stored complex numbers and phases: with the first, what lags has the smaller phase."""
+    """Convention of the stored complex numbers and phases: with ``exp(+iwt)`` a lagging signal has the smaller phase."""
     periods: Annotated[int, Field(ge=1)] = 1
-    """Periods that every point was taken from."""
+    """Number of periods from which every point was computed."""
     drive_mode_shape: float | None = None
     """Mass-normalised shape of the tested mode at the drive point, kg^-1/2."""
     channels: Annotated[tuple[FundamentalMapping, ...], Field(min_length=2)]
@@ -54,9 +54,9 @@ class BackboneMapping(MappingTable):
 
 
 def map_backbone(data: Any, mapping: BackboneMapping) -> Backbone:
-    """The backbone in ``data``: SI, peak; without static parts, standard errors and residuals.
+    """Return the backbone in ``data`` in SI units and peak values, without static parts, standard errors and residuals.
 
-    Raises `IdentificationError` on a path that is not there, unequal lengths, NaN, or missing roles.
+    Raises `IdentificationError` if a path does not exist, lengths differ, values are NaN, or roles are missing.
     """
     frequency = np.asarray(numbers(value_at(data, mapping.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
     if mapping.frequency_unit == "rad/s":

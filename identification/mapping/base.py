@@ -33,9 +33,12 @@ Complex = NDArray[np.complex128]
 
 
 def value_at(data: Any, path: str, where: str) -> Any:
-    """Value at ``path`` (``a.b[2].c``) in ``data``; raises `IdentificationError` with ``where`` and what is there."""
+    """Return the value at ``path`` (``a.b[2].c``) in ``data``.
+
+    If the path does not exist, raises `IdentificationError` with ``where`` and the names that exist.
+    """
     if isinstance(data, Mapping) and path in data:
-        return data[path]  # a name with dots or brackets of its own
+        return data[path]  # a name that itself contains dots or brackets
     if not _PATH.fullmatch(path):
         raise IdentificationError(
             f"{where}: '{path}' is no path; write names joined by dots, with [0] for list entries"
@@ -73,7 +76,7 @@ def _entry(value: Any, index: int, walked: str, path: str, where: str) -> Any:
 
 
 def as_levels(value: Any, where: str) -> Sequence[Any]:
-    """``value`` as a list of structures; a single structure is a list of one (MATLAB does not distinguish them)."""
+    """Return ``value`` as a list of structures; a single structure becomes a list of one (MATLAB does not distinguish)."""
     if isinstance(value, Mapping):
         return [value]
     if not _is_list(value):
@@ -84,7 +87,7 @@ def as_levels(value: Any, where: str) -> Sequence[Any]:
 
 
 def numbers(value: Any, ndim: int, where: str) -> NDArray[Any]:
-    """Numeric array with ``ndim`` dimensions (1: a vector, whichever way it lies; 2: one column per level)."""
+    """Return a numeric array with ``ndim`` dimensions (1: a vector, row or column; 2: one column per level)."""
     try:
         array = np.asarray(value)
     except ValueError:
@@ -115,13 +118,13 @@ def _kind(value: Any) -> str:
 
 
 class MappingTable(BaseModel):
-    """Base of every part of a mapping: frozen, unknown keys refused."""
+    """Base of every part of a mapping: frozen, unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
 class ChannelMapping(MappingTable):
-    """A channel of the measurement and the unit that its numbers are stored in."""
+    """A channel of the measurement and the unit of its stored numbers."""
 
     name: Annotated[str, Field(min_length=1)]
     """Name of the channel after import."""
@@ -147,7 +150,7 @@ class ComplexPaths(MappingTable):
     amplitude: Path | None = None
     """Path of the amplitudes."""
     phase: Path | None = None
-    """Path of the phases, positive ahead; left out: zero."""
+    """Path of the phases, positive if leading; zero if left out."""
     phase_unit: PhaseUnit = "deg"
     """Unit of the phases."""
 
@@ -160,7 +163,7 @@ class ComplexPaths(MappingTable):
 
 
 def in_si(channels: Sequence[ChannelMapping]) -> tuple[tuple[Channel, ...], NDArray[np.float64]]:
-    """Channels in SI, and the factor of each to it; monitors in unknown units keep them."""
+    """Return the channels in SI units and the factors that convert to them; monitors in unknown units keep their units."""
     found, factors = [], []
     for channel in channels:
         monitor = channel.role == "monitor" and channel.unit not in UNITS
@@ -171,7 +174,7 @@ def in_si(channels: Sequence[ChannelMapping]) -> tuple[tuple[Channel, ...], NDAr
 
 
 def complex_at(data: Any, paths: str | ComplexPaths, ndim: int, where: str) -> Complex:
-    """Complex numbers by their path or paths, as a vector (``ndim`` 1) or a matrix (2)."""
+    """Return the complex numbers at a path or pair of paths, as a vector (``ndim`` 1) or a matrix (2)."""
 
     def at(path: str) -> NDArray[Any]:
         return numbers(value_at(data, path, where), ndim, f"{where} '{path}'")

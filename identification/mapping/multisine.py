@@ -1,4 +1,4 @@
-"""Time data of multisines that others recorded, as `PeriodicSpectra`."""
+"""Import recorded time data of multisines as `PeriodicSpectra`."""
 
 from typing import Annotated, Any, Literal
 
@@ -24,19 +24,19 @@ class SignalMapping(ChannelMapping):
 
 
 class MultisineMapping(MappingTable):
-    """Where the samples are, and what was played."""
+    """Where the samples are in the data, and which multisine was played."""
 
     kind: Literal["multisine"]
     specimen: str = ""
     """Name of what was tested."""
     source: str = ""
-    """Where the data comes from; for the reader."""
+    """Where the data comes from; for information only."""
     sample_rate_hz: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
-    """Samples per second; left out: from ``time``, or what the file says."""
+    """Samples per second; if left out, taken from ``time`` or from the file."""
     time: Path | None = None
     """Path of the instants in seconds."""
     period_samples: Annotated[int, Field(ge=3)]
-    """Samples of a period."""
+    """Number of samples in a period."""
     lowest_hz: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     """Lowest frequency of the band."""
     highest_hz: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -44,20 +44,20 @@ class MultisineMapping(MappingTable):
     grid: Literal["full", "odd"] = "full"
     """Whether every line of the band is excited or only odd multiples of the resolution."""
     transient_periods: Annotated[int, Field(ge=0)] = 0
-    """Periods at the beginning that are left out."""
+    """Number of periods to discard at the beginning."""
     instrument: str = ""
-    """Name of the channel that is known without noise, the voltage; left out: the force, which gives H1."""
+    """Name of the noise-free channel, the voltage; if left out, the force is used, which gives the H1 estimate."""
     realisations: Path | None = None
-    """Path of a list with one structure for each realisation, in which the other paths start."""
+    """Path of a list with one structure per realisation; the other paths are relative to these structures."""
     channels: Annotated[tuple[SignalMapping, ...], Field(min_length=2)]
     """The channels, one of role ``force``."""
 
 
 def map_multisine(data: Any, mapping: MultisineMapping) -> PeriodicSpectra:
-    """Spectra of all realisations, in SI.
+    """Return the spectra of all realisations, in SI units.
 
-    Samples beyond whole periods are left out at the end. Raises `IdentificationError` on a path that is not there, rates
-    that disagree, uneven sampling, unequal lengths, NaN, or fewer than one whole period.
+    Samples beyond the last whole period are discarded. Raises `IdentificationError` if a path does not exist, sample rates
+    disagree, sampling is uneven, lengths differ, values are NaN, or there is less than one whole period.
     """
     rate = _sample_rate(data, mapping)
     design = MultisineDesign(rate, mapping.period_samples, mapping.lowest_hz, mapping.highest_hz, mapping.grid)
@@ -81,7 +81,7 @@ def _entries(data: Any, mapping: MultisineMapping) -> Any:
 
 
 def _records(data: Any, mapping: MultisineMapping, where: str) -> list[NDArray[np.float64]]:
-    """One array float[n_channels, n] per column of the stored signals."""
+    """Return one array float[n_channels, n] per column of the stored signals."""
     signals = [
         numbers(value_at(data, c.value, f"{where}channels.{c.name}"), 2, f"{where}channels.{c.name}")
         for c in mapping.channels
@@ -93,7 +93,7 @@ def _records(data: Any, mapping: MultisineMapping, where: str) -> list[NDArray[n
 
 
 def _sample_rate(data: Any, mapping: MultisineMapping) -> float:
-    """The sample rate; what mapping, instants and file say must agree."""
+    """Return the sample rate; the rates from the mapping, the instants and the file must agree."""
     told = {"sample_rate_hz": mapping.sample_rate_hz}
     if mapping.time is not None:
         entry = _entries(data, mapping)[0]

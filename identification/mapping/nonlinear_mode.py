@@ -1,4 +1,4 @@
-"""Nonlinear modes that others identified, as a table over the level, as `NonlinearMode`."""
+"""Import identified nonlinear modes from elsewhere, given as a table over the level, as `NonlinearMode`."""
 
 from typing import Any, Literal
 
@@ -15,7 +15,7 @@ _ORDER = {"m": 0, "m/s": 1, "m/s2": 2}
 
 
 class NonlinearModeMapping(MappingTable):
-    """Where the properties of a nonlinear mode are and what they mean."""
+    """Where the properties of a nonlinear mode are in the data and what they mean."""
 
     kind: Literal["nonlinear-mode"]
     specimen: str = ""
@@ -33,7 +33,7 @@ class NonlinearModeMapping(MappingTable):
     damping_unit: Literal["1", "%"]
     """Unit of the damping ratios."""
     amplitude: Path
-    """Path of the amplitudes of the drive point."""
+    """Path of the amplitudes at the drive point."""
     amplitude_unit: str
     """Unit of the amplitudes; it also says whether they are displacement, velocity or acceleration."""
     force: Path | None = None
@@ -41,13 +41,13 @@ class NonlinearModeMapping(MappingTable):
     force_unit: str = "N"
     """Unit of the forces."""
     drive_mode_shape: float | None = None
-    """Mass-normalised shape at the drive point, kg^-1/2; with it the modal amplitude is known."""
+    """Mass-normalised shape at the drive point, kg^-1/2; if given, the modal amplitude is computed."""
 
 
 def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMode:
-    """The mode in ``data``: SI, peak; what the table does not say is NaN.
+    """Return the mode in ``data`` in SI units and peak values; properties that the table does not give are NaN.
 
-    Raises `IdentificationError` on a path that is not there, unequal lengths, NaN, or a unit that is not understood.
+    Raises `IdentificationError` if a path does not exist, lengths differ, values are NaN, or a unit is unknown.
     """
     columns = {"frequency": mapping.frequency, "damping": mapping.damping, "amplitude": mapping.amplitude}
     if mapping.force is not None:

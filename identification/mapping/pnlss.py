@@ -1,4 +1,4 @@
-"""Nonlinear state-space models that others identified, as a structure with A to F and powers, as `PnlssModel`."""
+"""Import nonlinear state-space models from elsewhere, a structure with A to F and powers, as `PnlssModel`."""
 
 from typing import Annotated, Any, Literal
 
@@ -17,17 +17,17 @@ Float = NDArray[np.float64]
 
 
 class PnlssMapping(MappingTable):
-    """Where a model's matrices are and what they mean; the states' scale is the model's own."""
+    """Where the matrices of a model are in the data and what they mean; the states are in the model's own units."""
 
     kind: Literal["pnlss"]
     specimen: str = ""
     """Name of what was tested."""
     source: str = ""
-    """Where the model comes from; for the reader."""
+    """Where the model comes from; for information only."""
     model: Path = "model"
     """Path of the structure with ``A``, ``B``, ``C``, ``D``, ``E``, ``F``, ``xpowers`` and ``ypowers``."""
     sample_rate_hz: Annotated[float, Field(gt=0)] | None = None
-    """Sample rate of the model, or give its path."""
+    """Sample rate of the model; give this or ``sample_rate``."""
     sample_rate: Path | None = None
     """Path of the sample rate, Hz."""
     inputs: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
@@ -43,10 +43,9 @@ class PnlssMapping(MappingTable):
 
 
 def map_pnlss(data: Any, mapping: PnlssMapping) -> PnlssModel:
-    """The model in ``data``, in SI; powers have a row per monomial, states first, then inputs.
+    """Return the model in ``data``, in SI units; powers have a row per monomial, with columns for states, then inputs.
 
-    Raises `IdentificationError` on a path that is not there, shapes that do not fit, NaN, and powers that are no whole
-    numbers.
+    Raises `IdentificationError` if a path does not exist, shapes do not fit, values are NaN, or powers are not integers.
     """
     inputs, of_inputs = in_si(mapping.inputs)
     outputs, of_outputs = in_si(mapping.outputs)
@@ -92,7 +91,7 @@ def _array(data: Any, mapping: PnlssMapping, name: str) -> Float:
 
 
 def _shaped(array: Float, name: str, shape: tuple[int, int]) -> Float:
-    """With the dimensions of size one that readers drop."""
+    """Return the array in ``shape``, with the dimensions of size one that file readers drop."""
     if array.size != shape[0] * shape[1] or (array.ndim == 2 and 1 not in shape and array.shape != shape):
         raise IdentificationError(f"{name}: shape {array.shape}, needs {shape}")
     return array.reshape(shape)

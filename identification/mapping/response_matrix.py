@@ -1,4 +1,4 @@
-"""Frequency responses that others estimated, as a `FrequencyResponseMatrix`."""
+"""Import frequency responses estimated elsewhere as a `FrequencyResponseMatrix`."""
 
 from typing import Annotated, Any, Literal
 
@@ -29,17 +29,17 @@ class PathMapping(MappingTable):
     input: str
     """Name of one of the inputs."""
     value: Path | ComplexPaths
-    """Path of complex numbers, or paths of their parts; in unit of the output over unit of the input."""
+    """Path of complex numbers, or paths of their parts; in the output's unit over the input's unit."""
 
 
 class ResponseMatrixMapping(MappingTable):
-    """Where frequency responses are and what they mean."""
+    """Where frequency responses are in the data and what they mean."""
 
     kind: Literal["frequency-response-matrix"]
     specimen: str = ""
     """Name of what was tested."""
     source: str = ""
-    """Where the data comes from; for the reader."""
+    """Where the data comes from; for information only."""
     estimator: str = "imported"
     """How the responses were estimated: ``H1``, ``H2`` ..."""
     frequency: Path
@@ -47,21 +47,21 @@ class ResponseMatrixMapping(MappingTable):
     frequency_unit: Literal["Hz", "rad/s"] = "Hz"
     """Unit of the frequencies."""
     sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
-    """Convention of the stored responses; with the first, displacement lags behind the force by a negative argument."""
+    """Convention of the stored responses; with ``exp(+iwt)`` a displacement that lags the force has a negative argument."""
     outputs: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
     """The responding channels."""
     inputs: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
     """The exciting channels."""
     matrix: Path | None = None
-    """Path of an array frequencies x outputs x inputs (the last left out for one input); or give ``paths``."""
+    """Path of an array frequencies x outputs x inputs (the last may be left out for one input); or give ``paths``."""
     paths: tuple[PathMapping, ...] = ()
-    """One entry for every output and input."""
+    """One entry for every pair of output and input."""
 
 
 def map_response_matrix(data: Any, mapping: ResponseMatrixMapping) -> FrequencyResponseMatrix:
-    """Frequency responses in ``data`` in SI, lines in rising order.
+    """Return the frequency responses in ``data`` in SI units, with lines in rising order.
 
-    Raises `IdentificationError` on a path that is not there, on shapes or numbers that do not fit, on a missing response.
+    Raises `IdentificationError` if a path does not exist, shapes or numbers do not fit, or a response is missing.
     """
     frequency = np.asarray(numbers(value_at(data, mapping.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
     outputs, out_factors = in_si(mapping.outputs)

@@ -1,8 +1,8 @@
-"""Turning measured frequency responses that others stored their own way into `FrequencyResponse`s.
+"""Import measured frequency responses in other formats as `FrequencyResponse`.
 
-A mapping says where things are in a nested structure (as ``scipy.io.loadmat(..., simplify_cells=True)`` gives it) and
-what they mean: units, peak or RMS, whose phase, against what. It is a small pydantic model, written as TOML by the
-user.
+A mapping states where values are in a nested structure (as ``scipy.io.loadmat(..., simplify_cells=True)`` returns it) and
+what they mean: units, peak or RMS, which motion the phases belong to, and their sign. It is a small pydantic model that the
+user writes as TOML.
 """
 
 from collections.abc import Sequence
@@ -41,21 +41,21 @@ class Units(MappingTable):
 
 
 class PhaseConvention(MappingTable):
-    """What the stored phases mean."""
+    """Meaning of the stored phases."""
 
     unit: Literal["deg", "rad"]
     """Unit of the phases."""
     of: Motion
-    """Whose phase against the force is stored; need not be the quantity whose amplitude is stored."""
+    """The motion whose phase against the force is stored; need not be the quantity whose amplitude is stored."""
     sense: Literal["response-minus-force", "force-minus-response"]
-    """``response-minus-force`` falls from 0 to -180 degrees through a displacement resonance."""
+    """Sign of the phase: ``response-minus-force`` falls from 0 to -180 degrees through a displacement resonance."""
 
 
 class LevelSet(MappingTable):
     """Levels that were measured the same way.
 
-    Paths are names joined by dots, with ``[3]`` for the fourth entry of a list. With ``levels``, the others start at
-    each of its entries; without, they start at the top, and columns of two-dimensional arrays are levels.
+    Paths are names joined by dots, with ``[3]`` for the fourth entry of a list. If ``levels`` is given, the other paths start
+    at each entry of that list. Otherwise they start at the top, and columns of two-dimensional arrays are levels.
     """
 
     levels: Path | None = None
@@ -69,48 +69,48 @@ class LevelSet(MappingTable):
     phase: Path | None = None
     """Path of the phases between force and response."""
     controlled: Controlled
-    """What the controller held constant."""
+    """Quantity that the controller held constant."""
     level_values: tuple[PositiveFloat, ...] = ()
-    """Nominal level of each, in the unit of the controlled quantity; left out: the median of what was measured."""
+    """Nominal value of each level, in the unit of the controlled quantity; if left out, the median of the measured values."""
     label: str = "{value:g} {unit}"
     """Name of each level; ``{value}``, ``{unit}`` (SI, peak) and ``{number}`` (from 1) are filled in."""
 
 
 class FrequencyResponseMapping(MappingTable):
-    """A whole mapping: what the file holds, and in which terms."""
+    """The whole mapping: where values are in the file and what they mean."""
 
     kind: Literal["frequency-responses"] = "frequency-responses"
     specimen: str = ""
     """Name of what was tested."""
     source: str = ""
-    """Where the data comes from; for the reader."""
+    """Where the data comes from; for information only."""
     units: Units
     """Units of the stored numbers."""
     phase: PhaseConvention | None = None
-    """What stored phases mean; needed where a set names a path of phases."""
+    """Meaning of the stored phases; needed if a set names a path of phases."""
     sets: Annotated[tuple[LevelSet, ...], Field(min_length=1)]
     """The levels, in groups."""
 
 
 def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tuple[FrequencyResponse, ...]:
-    """Frequency responses in ``data``, in the order of the mapping.
+    """Return the frequency responses in ``data``, in the order of the mapping.
 
     Parameters
     ----------
     data
         Nested dictionaries, lists and arrays.
     mapping
-        Where things are in it and what they mean.
+        Where the values are in ``data`` and what they mean.
 
     Returns
     -------
     tuple of FrequencyResponse
-        In SI, peak, the force's phase zero unless complex forces are stored.
+        In SI units and peak values; the phase of the force is zero unless complex forces are stored.
 
     Raises
     ------
     IdentificationError
-        On a path that is not there, on a shape or number that does not fit; the message names set, level and path.
+        If a path does not exist, or a shape or number does not fit; the message names set, level and path.
     """
     found: list[FrequencyResponse] = []
     for number, group in enumerate(mapping.sets):
@@ -127,7 +127,7 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
 
 
 def _levels(data: Any, group: LevelSet, where: str) -> Sequence[dict[str, NDArray[Any]]]:
-    """Arrays of every level of a set, by the name of their entry in the mapping."""
+    """Return the arrays of every level of a set, by the name of their entry in the mapping."""
     paths = {name: getattr(group, name) for name in ("frequency", "force", "response", "phase")}
     paths = {name: path for name, path in paths.items() if path is not None}
     if group.levels is not None:
@@ -146,14 +146,14 @@ def _levels(data: Any, group: LevelSet, where: str) -> Sequence[dict[str, NDArra
 
 
 def _stored(data: Any, path: str, ndim: int, where: str) -> NDArray[Any]:
-    """Numbers at ``path`` as a vector (``ndim`` 1) or a matrix with one column per level (2)."""
+    """Return the numbers at ``path`` as a vector (``ndim`` 1) or a matrix with one column per level (2)."""
     return numbers(value_at(data, path, where), ndim, f"{where} '{path}'")
 
 
 def _response(
     stored: dict[str, NDArray[Any]], index: int, group: LevelSet, mapping: FrequencyResponseMapping, where: str
 ) -> FrequencyResponse:
-    """One level in SI, peak, with the phase in the house's convention."""
+    """Return one level in SI units and peak values, with the phase in the convention of `FrequencyResponse`."""
     units = mapping.units
     peak = np.sqrt(2.0) if units.values == "rms" else 1.0
     unit, response_scale = si_of(units.response, "units.response")

@@ -1,4 +1,4 @@
-"""Units that measurements of others come in."""
+"""Units that imported measurements may have."""
 
 from identification.errors import IdentificationError
 
@@ -15,7 +15,7 @@ UNITS: dict[str, tuple[str, float]] = {
     **{"N": ("N", 1.0), "mN": ("N", 1e-3), "kN": ("N", 1e3), "lbf": ("N", _POUND), "kgf": ("N", GRAVITY)},
     **{"V": ("V", 1.0), "mV": ("V", 1e-3), "1": ("1", 1.0)},
 }
-"""SI unit and factor of every unit that is understood."""
+"""SI unit of every known unit, and the factor to it."""
 
 _SPELLINGS = {
     "m/s²": "m/s2",
@@ -30,7 +30,7 @@ _SPELLINGS = {
 
 
 def si_of(unit: str, where: str) -> tuple[str, float]:
-    """SI unit and factor to it; raises `IdentificationError` with the units that are understood."""
+    """Return the SI unit and the factor to it; raise `IdentificationError` with the known units if ``unit`` is unknown."""
     unit = unit.strip()
     known = UNITS.get(_SPELLINGS.get(unit, unit))
     if known is None:

@@ -1,1 +1,1 @@
-"""Multisines: their design, and the spectra of what was recorded under them."""
+"""Multisines: their design and the spectra of their recordings."""

@@ -30,28 +30,28 @@ def best_linear_approximation(
     instruments: Sequence[str] = ("voltage",),
     specimen: str = "",
 ) -> FrequencyResponseMatrix:
-    """Frequency responses at the excited lines, their noise and total covariance over all paths.
+    """Estimate the frequency responses at the excited lines, with the noise and total covariance over all paths.
 
     Parameters
     ----------
     spectra
-        Recorded spectra. With several inputs, every ``len(inputs)`` realisations in turn are the experiments of one block
-        (`MultisineDesign.orthogonal_realisation`), and blocks are independent; the total covariance is unbiased for
+        Recorded spectra. With several inputs, consecutive groups of ``len(inputs)`` realisations are the experiments of one
+        block (`MultisineDesign.orthogonal_realisation`). Blocks are independent; the total covariance is unbiased for
         orthogonal blocks.
     outputs, inputs
-        Names of channels; None for all motions, and for all forces.
+        Names of channels. None: all motions as outputs, all forces as inputs.
     estimator
         ``instrument``, ``H1`` or ``H2`` (one input).
     instruments
-        Channels that serve as Z for ``instrument``, as many as inputs.
+        Channels that serve as the instruments Z for the estimator ``instrument``, as many as inputs.
     specimen
         Name for the result.
 
     Raises
     ------
     IdentificationError
-        On channels that are missing or named twice, realisations that do not fill blocks, lines without power at an input or
-        its instrument, inputs that do not move independently.
+        If channels are missing or named twice, realisations do not fill whole blocks, an input or its instrument has no power
+        at a line, or inputs are linearly dependent.
     """
     found = estimated_responses(
         spectra.channels,
@@ -71,11 +71,11 @@ def best_linear_approximation(
 
 
 def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str] | None = None) -> Float:
-    """Part of the output's power that is linear in the inputs, every period of every realisation counted as one record.
+    """Return the share of the output's power that is linear in the inputs; every period of every realisation is one record.
 
-    ``S_yU S_UU^-1 S_Uy / S_yy`` (Bendat and Piersol, *Random Data*, 4th ed., section 7.3): ordinary with one input,
-    multiple with several. Neither noise nor distortion leaves it at 1, and few records bring it up: n records of pure noise
-    show ``n_inputs / n`` on average.
+    ``S_yU S_UU^-1 S_Uy / S_yy`` (Bendat and Piersol, *Random Data*, 4th ed., section 7.3): ordinary with one input, multiple
+    with several. Both noise and distortion reduce it below 1. Few records bias it upwards: n records of pure noise give
+    ``n_inputs / n`` on average.
 
     Parameters
     ----------
@@ -94,7 +94,8 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     Raises
     ------
     IdentificationError
-        On channels that are missing, fewer records than inputs and one, lines without power, inputs that depend on each other.
+        If channels are missing, there are not more records than inputs, lines have no power, or inputs are linearly
+        dependent.
     """
     rows = chosen("inputs", spectra.channels, inputs, ("force",))
     lines = spectra.spectra[..., spectra.excited].reshape(-1, len(spectra.channels), int(spectra.excited.sum()))

@@ -1,8 +1,9 @@
 """Multisines: periodic signals with given amplitudes and random phases on chosen lines of the frequency grid.
 
-Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapter 5. The signal of a period of
-N samples is ``u(n) = sum_k A_k cos(2 pi k n / N + phi_k)`` with ``phi_k`` even over the circle; its RMS is ``sqrt(sum A_k^2
-/ 2)``. The converter's hold weakens line f by ``sinc(f / sample rate)``; the design does not make up for that.
+Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapter 5. The signal of a period of N
+samples is ``u(n) = sum_k A_k cos(2 pi k n / N + phi_k)`` with ``phi_k`` uniformly distributed over the circle. Its RMS is
+``sqrt(sum A_k^2 / 2)``. The zero-order hold of the converter attenuates line f by ``sinc(f / sample rate)``; the design does
+not compensate for that.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ _LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte
 
 @dataclass(frozen=True)
 class MultisineDesign:
-    """A multisine up to its phases.
+    """A multisine without its phases, which a realisation draws.
 
     Parameters
     ----------
@@ -36,21 +37,21 @@ class MultisineDesign:
     lowest_hz, highest_hz
         Band of the excited lines, both ends included.
     grid
-        ``full`` excites every line of the band, ``odd`` the odd multiples of the resolution only, ``odd-random`` these but
-        for one of every ``detection_group`` in turn. What is not excited is a detection line.
+        ``full`` excites every line of the band, ``odd`` only the odd multiples of the resolution. ``odd-random`` excites
+        these except one random line of every ``detection_group``. A line that is not excited is a detection line.
     rms
-        RMS of `realisation`, in the unit of whatever is played.
+        RMS of `realisation`, in the unit of the played signal.
     relative_amplitudes
-        Amplitudes of the excited lines against each other; None for a flat spectrum.
+        Relative amplitudes of the excited lines; None for a flat spectrum.
     detection_group
-        Odd lines of a group, of which ``odd-random`` leaves out one.
+        Number of odd lines in a group, of which ``odd-random`` leaves one out.
     grid_seed
-        Seed that chooses it: the same lines in all realisations, so that their spectra can be averaged.
+        Seed that chooses the line left out. All realisations excite the same lines, so that their spectra can be averaged.
 
     Raises
     ------
     IdentificationError
-        On a band without a line or at half the sample rate and above, and on numbers that are not usable.
+        If the band has no line or reaches half the sample rate, or if a number is out of its range.
     """
 
     sample_rate_hz: float
@@ -112,7 +113,7 @@ class MultisineDesign:
         detection_group: int = 4,
         grid_seed: int = 0,
     ) -> "MultisineDesign":
-        """A design by the distance of its lines; refused where a period is not a whole number of samples."""
+        """Create a design from the spacing of its lines; a period must be a whole number of samples."""
         samples = positive("sample_rate_hz", sample_rate_hz, "Hz") / positive("resolution_hz", resolution_hz, "Hz")
         if not 3.0 <= samples <= _LONGEST_PERIOD:
             raise IdentificationError(
@@ -137,7 +138,7 @@ class MultisineDesign:
 
     @property
     def resolution_hz(self) -> float:
-        """Distance of neighbouring lines."""
+        """Spacing of neighbouring lines."""
         return self.sample_rate_hz / self.period_samples
 
     @property
@@ -159,17 +160,17 @@ class MultisineDesign:
 
     @property
     def detection_lines_odd(self) -> NDArray[np.int64]:
-        """int[n]: odd lines of the band that are not excited, on which odd nonlinearity is heard."""
+        """int[n]: odd lines of the band that are not excited, at which odd nonlinearity appears."""
         return np.asarray(np.setdiff1d(self.band_lines[self.band_lines % 2 == 1], self.lines))
 
     @property
     def detection_lines_even(self) -> NDArray[np.int64]:
-        """int[n]: even lines of the band that are not excited, on which even nonlinearity is heard."""
+        """int[n]: even lines of the band that are not excited, at which even nonlinearity appears."""
         return np.asarray(np.setdiff1d(self.band_lines[self.band_lines % 2 == 0], self.lines))
 
     @property
     def folding_degree(self) -> int:
-        """Lowest degree of nonlinearity of which products lie above half the sample rate and fold back into the band."""
+        """Lowest degree of nonlinearity whose products above half the sample rate alias back into the band."""
         return int(np.ceil(self.sample_rate_hz / self.highest_hz - 1.0 - _ROUNDING))
 
     @property
@@ -184,18 +185,18 @@ class MultisineDesign:
         return np.asarray(relative * self.rms * np.sqrt(2.0 / np.sum(relative**2)))
 
     def realisation(self, seed: int, index: int) -> Float:
-        """float[period_samples]: one period with RMS ``rms``; the same for the same seed and index, always.
+        """float[period_samples]: one period with RMS ``rms``; the same seed and index always give the same period.
 
-        Realisations of one seed are independent of each other, and none depends on how many are drawn.
+        Realisations of one seed are statistically independent, and none depends on how many are drawn.
         """
         return np.asarray(self._signals(self._phases(seed, index, 1))[0])
 
     def orthogonal_realisation(self, seed: int, index: int, n_inputs: int) -> Float:
-        """float[n_inputs, n_inputs, period_samples]: experiments of a block by signals of the inputs, each with RMS ``rms``.
+        """float[n_inputs, n_inputs, period_samples]: signals of each experiment of a block at each input, with RMS ``rms``.
 
-        Input i plays ``phi_i`` with ``exp(2 pi i i e / n_inputs)`` turned upon it in experiment e (the matrix of the discrete
-        Fourier transform): at every line the spectra of the experiments are orthogonal, so that the block can be inverted
-        without loss (Dobrowiecki and Schoukens, Automatica 43, 2007). With one input it is `realisation`.
+        In experiment e, input i plays its phases ``phi_i`` shifted by ``2 pi i e / n_inputs`` (the matrix of the discrete
+        Fourier transform). At every line the spectra of the experiments are then orthogonal, so that the block can be
+        inverted without loss (Dobrowiecki and Schoukens, Automatica 43, 2007). With one input the block is `realisation`.
         """
         if n_inputs < 1:
             raise IdentificationError(f"n_inputs: is {n_inputs}, needs one or more")
@@ -204,7 +205,7 @@ class MultisineDesign:
         return self._signals(phases + turns[:, :, None])
 
     def _phases(self, seed: int, index: int, inputs: int) -> Float:
-        """float[inputs, n_lines], even over the circle."""
+        """float[inputs, n_lines]: phases uniformly distributed over the circle."""
         for name, value in (("seed", seed), ("index", index)):
             if value < 0:
                 raise IdentificationError(f"{name}: is {value}, needs zero or more")
@@ -212,16 +213,16 @@ class MultisineDesign:
         return random.uniform(0.0, 2.0 * np.pi, (inputs, self.lines.size))
 
     def _signals(self, phases: Float) -> Float:
-        """float[..., period_samples] from float[..., n_lines]."""
+        """float[..., period_samples]: one period with the phases float[..., n_lines]."""
         spectrum = np.zeros((*phases.shape[:-1], self.period_samples // 2 + 1), dtype=np.complex128)
         spectrum[..., self.lines] = 0.5 * self.period_samples * self.amplitudes * np.exp(1j * phases)
         return np.asarray(np.fft.irfft(spectrum, self.period_samples))
 
     def unit_peak(self, seed: int, index: int) -> Float:
-        """float[period_samples]: the same period scaled to a largest absolute value of one."""
+        """float[period_samples]: the period of `realisation` scaled to a largest absolute value of one."""
         signal = self.realisation(seed, index)
         return np.asarray(signal / np.max(np.abs(signal)))
 
     def crest_factor(self, seed: int, index: int) -> float:
-        """Largest absolute value over RMS: ``unit_peak`` times ``crest_factor * rms`` is ``realisation``."""
+        """Largest absolute value over RMS, so that ``realisation`` is ``unit_peak`` times ``crest_factor * rms``."""
         return float(np.max(np.abs(self.realisation(seed, index)))) / self.rms

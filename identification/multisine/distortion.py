@@ -1,14 +1,14 @@
-"""Levels of nonlinear distortion: from detection lines, odd and even apart, and from the scatter over realisations.
+"""Levels of nonlinear distortion: from odd and even detection lines, and from the scatter over realisations.
 
 Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., section 4.3. The distortion of a
-channel is what its best linear approximation G from the input leaves, ``E = Y - G X``, less the power of the noise. At
-detection lines G is interpolated between the excited ones on either side.
+channel is the residual of its best linear approximation G from the input, ``E = Y - G X``, less the power of the noise. At
+detection lines G is interpolated between the excited lines on either side.
 
-With the voltage as input, X is zero at the detection lines and E is all that the *rig* distorts, exciter and structure: a
-force that is distorted by the structure's own motion shows as distortion of the force and, through the structure, of every
-response. With the force as input, what the force has at the detection lines is taken out of the responses to first order,
-``Y - G F``: what is left is the *structure's* own distortion under the force it got. The interpolation limits that where
-lines are as far apart as a resonance is wide.
+With the voltage as input, X is zero at the detection lines, and E is the distortion of the whole *rig*, exciter and
+structure. A force that the structure's own motion distorts appears as distortion of the force and, through the structure, of
+every response. With the force as input, the contribution of the force at the detection lines is subtracted from the responses
+to first order, ``Y - G F``. The residual is then the *structure's* own distortion under the actual force. The interpolation
+of G limits this correction if the spacing of the lines is as large as the width of a resonance.
 """
 
 from collections.abc import Sequence
@@ -37,14 +37,14 @@ _OTHER_DESIGN = 0.1  # amplitude of the instrument at detection lines against th
 class DistortionLevels:
     """Power of signal, distortion and noise of every channel at every line of the band.
 
-    Powers are mean squares of peak amplitudes in the mean over periods of one realisation, in the square of the channel's
-    unit. Those of the distortion have the noise's subtracted and are below zero where chance made it so: average first,
-    take roots later, as `amplitude` and `ratio` do.
+    A power is the mean square of the peak amplitude in the mean over periods of one realisation, in the square of the
+    channel's unit. The power of the noise is subtracted from that of the distortion, which may therefore be below zero by
+    chance. Average powers first and take the root afterwards, as `ratio` does.
 
     Parameters
     ----------
     channels
-        All but the input.
+        All channels except the input and the instruments.
     input
         Name of the input, ``voltage`` (distortion of the rig) or a force (distortion of the structure).
     frequency_hz
@@ -52,7 +52,7 @@ class DistortionLevels:
     excited, even
         bool[n_lines], whether a line is excited, and whether it is an even multiple of the resolution.
     signal, distortion, noise
-        float[n_channels, n_lines]; ``distortion`` of excited lines is NaN with one realisation.
+        float[n_channels, n_lines], powers; ``distortion`` of excited lines is NaN with one realisation.
     """
 
     channels: tuple[Channel, ...]
@@ -65,7 +65,7 @@ class DistortionLevels:
     noise: Float
 
     def select(self, lines: Lines) -> Bool:
-        """bool[n_lines]: the excited lines, or the ``odd`` or ``even`` detection lines."""
+        """bool[n_lines]: selects the excited lines, or the ``odd`` or ``even`` detection lines."""
         if lines not in get_args(Lines):
             raise IdentificationError(f"lines: is '{lines}', allowed are {', '.join(get_args(Lines))}")
         return self.excited if lines == "excited" else ~self.excited & (self.even == (lines == "even"))
@@ -77,9 +77,9 @@ class DistortionLevels:
         return self.frequency_hz[chosen], np.sqrt(np.maximum(power, 0.0))
 
     def ratio(self, channel: str, lines: Lines, *, lowest_hz: float = 0.0, highest_hz: float = np.inf) -> float:
-        """Distortion of a line against the signal of an excited line, root of the mean powers in a band, 0 to about 1.
+        """Root of the mean distortion power per line over the mean signal power per excited line in a band, 0 to about 1.
 
-        NaN where there are no such lines, or distortion is unknown.
+        NaN if there are no such lines or the distortion is unknown.
         """
         row = find_name(self.channels, channel)
         band = (self.frequency_hz >= lowest_hz) & (self.frequency_hz <= highest_hz)
@@ -93,13 +93,13 @@ class DistortionLevels:
 def distortion_levels(
     spectra: PeriodicSpectra, *, input: str = "voltage", instruments: Sequence[str] = ("voltage",)
 ) -> DistortionLevels:
-    """Distortion of every channel but ``input``, by what is linear in the input; see the module for the choice of input.
+    """Estimate the distortion of every channel other than ``input``; the module describes the choice of input.
 
     Raises
     ------
     IdentificationError
-        With one period (noise is unknown), where the instrument has more than a tenth of its amplitude at lines that the
-        design does not excite, and as `best_linear_approximation` does.
+        If there is only one period (noise is unknown), if the instrument has more than a tenth of its largest amplitude at a
+        line that the design does not excite, and in the cases of `best_linear_approximation`.
     """
     realisations, periods = spectra.spectra.shape[:2]
     if periods < 2:
@@ -127,7 +127,7 @@ def distortion_levels(
 
 
 def _check_silence(spectra: PeriodicSpectra, instruments: Sequence[str]) -> None:
-    """Refuse instruments that are heard where the design is silent: then it is not what was played."""
+    """Raise if an instrument has power at lines that the design does not excite: the design is then not what was played."""
     for name in instruments:
         amplitude = spectra.amplitude[spectra.index(name)]
         heard = np.where(spectra.excited, 0.0, amplitude)
@@ -140,7 +140,7 @@ def _check_silence(spectra: PeriodicSpectra, instruments: Sequence[str]) -> None
 
 
 def _interpolated(at_hz: Float, frequency_hz: Float, values: Complex) -> Complex:
-    """complex[n_channels, n], linear between the lines, constant beyond."""
+    """complex[n_channels, n]: linear interpolation between the lines, constant beyond them."""
     return np.array(
         [np.interp(at_hz, frequency_hz, row.real) + 1j * np.interp(at_hz, frequency_hz, row.imag) for row in values]
     )

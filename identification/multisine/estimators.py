@@ -1,12 +1,12 @@
-"""Estimators of the best linear approximation from spectra, with its covariance from noise and with nonlinear distortion.
+"""Estimators of the best linear approximation from spectra, with its noise and total covariance.
 
 Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapters 2 (H1, H2, instrumental
 variables), 3 and 4 (robust method, several inputs). Every estimate is, line by line and over realisations r,
 
     H = S_YZ S_UZ^-1,    S_YZ = sum_r Y_r Z_r^H,    S_UZ = sum_r U_r Z_r^H,
 
-Y_r and U_r means over the periods; the estimators differ in Z. ``instrument`` takes signals that drive the inputs and are
-known without noise, such as the voltage: noise and nonlinear distortion of a force that the structure makes itself leave no
+Y_r and U_r are means over the periods; the estimators differ in Z. ``instrument`` takes noise-free signals that drive the
+inputs, such as the voltage. Noise and nonlinear distortion in the force, which the structure itself causes, then leave no
 bias. ``H1`` takes Z = U (noise of the inputs biases it low where they are small, near resonance), ``H2`` takes Z = Y, each
 output separately (noise of the outputs biases it high, near antiresonance). With a noiseless input, ``instrument`` with the
 input as its own instrument and ``H1`` are the same.
@@ -46,7 +46,7 @@ def estimated_responses(
     estimator: Estimator,
     instruments: Sequence[str],
 ) -> FrequencyResponseMatrix:
-    """Frequency responses and their covariances from spectra complex[n_realisations, n_periods, n_channels, n_lines].
+    """Estimate responses and covariances from spectra complex[n_realisations, n_periods, n_channels, n_lines].
 
     All lines must be excited; the other parameters are those of `best_linear_approximation`, which also raises the errors
     listed there.
@@ -82,7 +82,7 @@ def estimated_responses(
 
 
 def chosen(what: str, channels: Sequence[Channel], names: Sequence[str] | None, roles: tuple[Role, ...]) -> list[int]:
-    """Rows of the channels called ``names``, or of all with one of ``roles``; at least one row, none twice."""
+    """Return the rows of the channels called ``names``, or of all with one of ``roles``; at least one row, none twice."""
     if isinstance(names, str):
         names = (names,)
     if names is None:
@@ -105,7 +105,7 @@ def _instruments(
     estimator: Estimator,
     instruments: Sequence[str],
 ) -> tuple[Complex, str]:
-    """Z of every realisation, complex[n_realisations, n_outputs or 1, n_inputs, n_lines], and its name for messages."""
+    """Return Z, complex[n_realisations, n_outputs or 1, n_inputs, n_lines], and its name for messages."""
     if estimator == "H2":
         if len(columns) > 1:
             raise IdentificationError(
@@ -125,7 +125,7 @@ def _instruments(
 
 
 def _weights(u: Complex, z: Complex, frequency_hz: Float, label: str) -> Complex:
-    """``Z_r^H S_UZ^-1``, complex[n_realisations, n_outputs or 1, n_inputs, n_lines]: ``H = sum_r Y_r (Z_r^H S_UZ^-1)``."""
+    """Weights ``Z_r^H S_UZ^-1``, complex[n_realisations, n_outputs or 1, n_inputs, n_lines]; ``H = sum_r Y_r weight_r``."""
     size_u, size_z = np.sqrt(np.sum(np.abs(u) ** 2, axis=0)), np.sqrt(np.sum(np.abs(z) ** 2, axis=0))
     silent = np.any(size_u <= _SILENT * size_u.max(axis=-1, keepdims=True), axis=0)
     silent |= np.any(size_z <= _SILENT * size_z.max(axis=-1, keepdims=True), axis=(0, 1))
@@ -148,13 +148,16 @@ def _weights(u: Complex, z: Complex, frequency_hz: Float, label: str) -> Complex
 
 
 def _noise_covariance(error: Complex) -> Complex | None:
-    """complex[n_lines, m, m] of the sum over realisations, from complex[n_realisations, n_periods, m, n_lines]."""
+    """complex[n_lines, m, m]: noise covariance of the sum over realisations.
+
+    ``error`` is complex[n_realisations, n_periods, m, n_lines].
+    """
     periods = error.shape[1]
     return _products(error - error.mean(axis=1, keepdims=True)) / (periods * (periods - 1)) if periods > 1 else None
 
 
 def _total_covariance(error: Complex, inputs: int) -> Complex | None:
-    """complex[n_lines, m, m] of the sum, from the scatter of blocks of as many realisations as inputs."""
+    """complex[n_lines, m, m]: total covariance of the sum, from the scatter of blocks of as many realisations as inputs."""
     means = error.mean(axis=1)
     blocks = means.reshape(-1, inputs, *means.shape[1:]).sum(axis=1)[:, None]
     count = blocks.shape[0]
@@ -168,7 +171,7 @@ def _products(samples: Complex) -> Complex:
 
 
 def _mixed(outputs: list[Channel]) -> list[str]:
-    """A note on outputs that are different motions."""
+    """Return a note if the outputs are different kinds of motion."""
     motions = {channel.name: channel.motion for channel in outputs if channel.role in ("drive", "response")}
     if len(set(motions.values())) < 2:
         return []
@@ -177,7 +180,7 @@ def _mixed(outputs: list[Channel]) -> list[str]:
 
 
 def _notes(error: Complex, inputs: int) -> list[str]:
-    """Notes on covariances that are unknown or singular, and why."""
+    """Return notes on covariances that are unknown or singular, with the reason."""
     realisations, periods, paths = error.shape[:3]
     blocks = realisations // inputs
     plural = "s" if blocks > 1 else ""

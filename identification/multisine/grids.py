@@ -1,7 +1,7 @@
-"""Which lines of a band a multisine excites, and which it leaves out to listen for nonlinear distortion.
+"""Excited lines and detection lines of a multisine; detection lines show nonlinear distortion.
 
 Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., section 4.3: under odd excitation an
-even nonlinearity is heard on even lines only, an odd one on odd lines, of which a random few are kept silent.
+even nonlinearity appears only at even lines, an odd one only at odd lines. A random few odd lines are therefore not excited.
 """
 
 from typing import Literal, get_args
@@ -20,7 +20,7 @@ _APART = 2**32 - 1  # a key that no realisation has
 
 
 def check_grid(grid: str, detection_group: int, grid_seed: int) -> None:
-    """Refuse a grid that is not known, and groups and seeds that cannot be."""
+    """Raise `IdentificationError` if the grid is unknown, or if the group or the seed is out of its range."""
     if grid not in get_args(Grid):
         raise IdentificationError(f"grid: is '{grid}', allowed are {', '.join(get_args(Grid))}")
     if detection_group < 2:
@@ -30,9 +30,9 @@ def check_grid(grid: str, detection_group: int, grid_seed: int) -> None:
 
 
 def excited_lines(band: Lines, grid: Grid, detection_group: int, grid_seed: int) -> Lines:
-    """int[n]: the lines of ``band`` that are excited; empty if there is none, or no detection line where some are asked for.
+    """int[n]: the excited lines of ``band``; empty if there is none, or if ``odd-random`` finds no complete group.
 
-    ``odd-random`` leaves out one of every ``detection_group`` odd lines in turn; an incomplete last group is excited whole.
+    ``odd-random`` leaves out one of every ``detection_group`` odd lines in turn; an incomplete last group is fully excited.
     """
     if grid == "full":
         return band

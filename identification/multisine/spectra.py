@@ -1,9 +1,9 @@
 """Spectra of multisine recordings period by period, and the frequency response with the voltage as instrument.
 
-Near resonance the structure makes most of the force, so that noise and harmonics in the force correlate with the response
-and ``H1 = S_yF / S_FF`` is biased. The voltage is known without noise and drives both: ``H = S_yV / S_FV`` is not
-(Pintelon and Schoukens, 2nd ed., section 2.6: instrumental variables). What differs from period to period is noise; what
-differs from realisation to realisation is noise and nonlinear distortion.
+Near resonance the structure determines most of the force. Noise and harmonics in the force are then correlated with the
+response, and ``H1 = S_yF / S_FF`` is biased. The voltage is noise-free and drives both force and response, so that
+``H = S_yV / S_FV`` is unbiased (Pintelon and Schoukens, 2nd ed., section 2.6: instrumental variables). The scatter over
+periods is noise; the scatter over realisations is noise and nonlinear distortion.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ __all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_LOW_DEGREE = 3  # what a weak nonlinearity mostly makes
+_LOW_DEGREE = 3  # highest degree of the products that a weak nonlinearity mainly generates
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +39,8 @@ class InstrumentResponse:
     noise_std
         float[n_lines], standard deviation of ``value`` from noise: ``sqrt(E|value - E value|^2)``; NaN with one period.
     total_std
-        float[n_lines], the same from the scatter over realisations, nonlinear distortion included; NaN with one
-        realisation.
+        float[n_lines], standard deviation from the scatter over realisations, which includes nonlinear distortion; NaN with
+        one realisation.
     unit
         Unit of ``value``.
     """
@@ -73,7 +73,7 @@ class PeriodicSpectra:
     Raises
     ------
     IdentificationError
-        On NaN or inf, or shapes that do not agree.
+        If values are NaN or infinite, or shapes do not agree.
     """
 
     channels: tuple[Channel, ...]
@@ -131,7 +131,7 @@ class PeriodicSpectra:
 
     @property
     def noise_std(self) -> Float:
-        """float[n_channels, n_lines]: standard deviation that noise leaves in the mean over periods of one realisation."""
+        """float[n_channels, n_lines]: standard error, from noise, of the mean over periods of one realisation."""
         return np.asarray(np.sqrt(self.noise_variance.mean(axis=0) / self.spectra.shape[1]))
 
     def rms(self, name: str) -> float:
@@ -142,10 +142,10 @@ class PeriodicSpectra:
     def frequency_response(
         self, output: str, input: str | None = None, *, instrument: str = "voltage"
     ) -> InstrumentResponse:
-        """Frequency response from ``input`` (the force if None) to ``output`` by ``S_yV / S_FV``.
+        """Estimate the frequency response from ``input`` (the force if None) to ``output`` by ``S_yV / S_FV``.
 
-        One path of `best_linear_approximation`. Raises `IdentificationError` where a channel is missing or the instrument
-        does not move the input at a line.
+        This is one path of `best_linear_approximation`. Raises `IdentificationError` if a channel is missing or the
+        instrument does not excite the input at a line.
         """
         force = input if input is not None else self.channels[find_role(self.channels, "force")].name
         found = estimated_responses(
@@ -169,7 +169,7 @@ class PeriodicSpectra:
 def periodic_spectra(
     records: Sequence[ArrayLike], channels: Sequence[Channel], design: MultisineDesign, *, transient_periods: int = 0
 ) -> PeriodicSpectra:
-    """Spectra of a multisine recording.
+    """Compute the spectra of a multisine recording.
 
     Parameters
     ----------
@@ -178,14 +178,14 @@ def periodic_spectra(
     channels
         The channels, one per row.
     design
-        What was played.
+        Design of the played multisine.
     transient_periods
         Periods at the beginning of every record that had not settled and are left out.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, on records that are not whole periods, or of which nothing is left.
+        If values are NaN or infinite, records are not whole periods, or no period is left.
     """
     if not len(records):
         raise IdentificationError("records: is empty, needs at least one realisation")
@@ -219,7 +219,7 @@ def periodic_spectra(
 
 
 def _folding(design: MultisineDesign) -> tuple[str, ...]:
-    """A note where products of low degree come back into the band in what is sampled without a filter."""
+    """Return a note if products of low degree alias into the band when sampled without an anti-aliasing filter."""
     degree = design.folding_degree
     if degree > _LOW_DEGREE:
         return ()

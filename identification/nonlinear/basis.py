@@ -1,10 +1,11 @@
-"""Which shapes of a linear modal analysis turn the motion of a backbone into a modal amplitude.
+"""Choose the shapes of a linear modal analysis with which the motion of a backbone is converted to a modal amplitude.
 
-With the tested mode alone, ``q`` is its least-squares share of the measured shape. Every further mode takes from this
-what it causes itself, and multiplies the errors of channels and shapes by what it looks like the tested one. Measured
-on the shipped rigs, three channels each: alone, 0.003 % (one-sided magnet beam) and 0.014 % (friction beam) are wrong at
-the highest level; with the next mode in frequency the errors grow 1.8 and 1.1 times, with two of them 11 and 9 times,
-for nothing. So only modes near in frequency are added: those answer to the same force nearly as strongly.
+With the tested mode alone, ``q`` is the least-squares projection of the measured shape on its shape. Every further mode
+removes its own contribution, but amplifies the errors of channels and shapes as far as its shape resembles the tested one. On
+the shipped rigs, with three channels each, the tested mode alone gives errors of 0.003 % (one-sided magnet beam) and 0.014 %
+(friction beam) at the highest level. With the next mode in frequency the errors grow 1.8 and 1.1 times, with two further
+modes 11 and 9 times, without benefit. Only modes near in frequency are therefore added: they respond to the same force nearly
+as strongly as the tested mode.
 """
 
 from collections.abc import Sequence
@@ -21,25 +22,26 @@ __all__ = ["shapes_for"]
 
 Float = NDArray[np.float64]
 
-_NEAR = 0.25  # modes that close in frequency, relative, are told apart from the tested one
-_FURTHEST = 0.1  # between the backbone's lowest level and the mode that is taken for the tested one, relative
-_CLEARLY = 3.0  # times further away has the next mode to be
-_SAME = 0.005  # modes that close, relative, cannot be told apart by their frequency
-_LARGEST_GAIN = 5.0  # of the errors, by modes that look alike
-_UNLIKE = 0.9  # MAC at the lowest level below which something is wrong with the channels
+_NEAR = 0.25  # relative distance in frequency up to which other modes are included in the shapes
+_FURTHEST = 0.1  # largest relative distance in frequency of the tested mode from the lowest level of the backbone
+_CLEARLY = 3.0  # the next mode must be this many times farther away
+_SAME = 0.005  # modes closer than this, relative, cannot be distinguished by frequency
+_LARGEST_GAIN = 5.0  # largest amplification of errors by modes with similar shapes
+_UNLIKE = 0.9  # MAC at the lowest level below which the channels are suspect
 
 
 def shapes_for(
     modes: LinearModes, backbone: Backbone, mode: int | None = None
 ) -> tuple[ModeShapes, int, tuple[str, ...]]:
-    """Shapes at the channels that backbone and modal model share, the index of the tested mode, and notes.
+    """Return the shapes at the common channels of backbone and modal model, the index of the tested mode, and notes.
 
-    ``mode`` says which mode is tested; None takes the one nearest to the frequency of the lowest level.
+    ``mode`` is the index of the tested mode; if None, the mode nearest to the frequency of the lowest level.
 
     Raises
     ------
     IdentificationError
-        Where no mode or more than one fits, the drive point is missing or another channel, channels cannot tell modes apart.
+        If no mode or more than one fits, the drive point is missing or a different channel, or the channels cannot
+        distinguish the modes.
     """
     tested = _tested(modes, backbone, mode)
     channels, notes = _common(modes, backbone)
@@ -89,7 +91,7 @@ def _tested(modes: LinearModes, backbone: Backbone, mode: int | None) -> int:
 
 
 def _common(modes: LinearModes, backbone: Backbone) -> tuple[tuple[str, ...], list[str]]:
-    """Names of the motions that both have, the backbone's order, and notes on the others."""
+    """Return the names of the motions that both have, in the backbone's order, and notes on the other channels."""
     known = {channel.name: channel.role for channel in modes.channels}
     motions = [channel for channel in backbone.channels if channel.role in ("drive", "response")]
     drive = next(channel.name for channel in motions if channel.role == "drive")
@@ -120,7 +122,7 @@ def _shape_covariance(modes: LinearModes, rows: Sequence[int], columns: Sequence
 
 
 def _error_gain(shapes: Float) -> float:
-    """By how much the other columns multiply the errors of the first one's amplitude."""
+    """Factor by which the other columns amplify the errors of the first column's amplitude."""
     norms = np.linalg.norm(shapes, axis=0)
     if np.linalg.matrix_rank(shapes / norms) < shapes.shape[1]:
         return float(np.inf)
@@ -128,7 +130,7 @@ def _error_gain(shapes: Float) -> float:
 
 
 def _unlike(shapes: ModeShapes, backbone: Backbone) -> Sequence[str]:
-    """A note where the lowest level does not look like the linear mode: units mixed, channels swapped or reversed."""
+    """Return a note if the lowest level does not match the linear shape: units mixed, channels swapped or reversed."""
     point = backbone.points[int(np.argmin(backbone.amplitude_m))]
     measured = shapes.fundamental_m(point)
     likeness = mac(shapes.tested, measured)

@@ -1,4 +1,4 @@
-"""A nonlinear mode as identified: modal frequency and damping ratio over the vibration level."""
+"""An identified nonlinear mode: modal frequency and damping ratio over the vibration level."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -41,13 +41,13 @@ _TEXT = ("source", "specimen")
 
 
 def _unknown() -> Float:
-    """NaN, which becomes an array of as many as there are points."""
+    """Return NaN, which the mode expands to one entry per point."""
     return np.array(np.nan)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NonlinearMode:
-    """Properties of one nonlinear mode, one entry per measured point or level; NaN marks what could not be had.
+    """Properties of one nonlinear mode, one entry per measured point or level; NaN marks unknown values.
 
     Parameters
     ----------
@@ -64,11 +64,11 @@ class NonlinearMode:
     damping_ratio, damping_ratio_std
         float[n], modal damping ratio from the active power of the fundamental, with its standard error.
     damping_ratio_total_power
-        float[n], the same from the active power of all harmonics.
+        float[n], modal damping ratio from the active power of all harmonics.
     damping_ratio_uncorrected
-        float[n], the same as ``damping_ratio`` with the vibration's frequency taken for the modal frequency.
+        float[n], damping ratio computed with the frequency of the vibration in place of the modal frequency.
     modal_amplitude
-        float[n], q, kg^1/2 m.
+        float[n], modal amplitude q, kg^1/2 m.
     apparent_mass_kg
         float[n], ``1 / (phi_force phi_response)``: ``(w^2 - W^2 + 2 i W w z) X = F / apparent_mass`` near resonance.
     mac
@@ -77,24 +77,24 @@ class NonlinearMode:
         float[n], ``|Y_1| / sqrt(sum_{h>=1} |Y_h|^2)`` of the force and of the drive-point displacement.
     force_std_n, amplitude_std_m, phase_lag_std_deg, damping_ratio_total_power_std, modal_amplitude_std,
     apparent_mass_std_kg, mac_std, force_purity_std, response_purity_std
-        float[n], standard errors of the quantities of these names, everything that is known counted.
+        float[n], standard errors of the quantities of these names, from all known sources of error.
     systematic_std
-        float[n, n_quantities], the part of the standard errors that all points share (shapes, calibration), in the order
-        of `QUANTITIES`; it does not become less by more points. See `systematic`.
+        float[n, n_quantities], the part of the standard errors that is common to all points (shapes, calibration), in the
+        order of `QUANTITIES`; more points do not reduce it. See `systematic`.
     random_std
-        float[n, n_quantities], the part that each point has for itself; see `random`.
+        float[n, n_quantities], the part of the standard errors that is independent between points; see `random`.
     interval_95
         float[n, n_quantities, 2], interval that holds the true value in 95 % of cases; see `interval`.
     fit_residual
-        float[n], what a fit leaves of the measured data, relative, RMS; NaN where nothing was fitted.
+        float[n], RMS residual of the fit relative to the measured data; NaN where nothing was fitted.
     force_harmonics, response_harmonics_m
-        complex[n, H + 1], N and m at the drive point.
+        complex[n, H + 1], harmonics of force (N) and displacement (m) at the drive point.
     source
         ``backbone``, ``stepped sine`` or ``several backbones``.
     specimen
         Name of what was tested.
     notes
-        What a user should know about these numbers, one line each.
+        Remarks on the quality of the result, one line each.
     """
 
     force_n: Float
@@ -148,11 +148,11 @@ class NonlinearMode:
             raise IdentificationError("force_n: a nonlinear mode needs at least one point")
 
     def systematic(self, quantity: str) -> Float:
-        """float[n]: standard error of ``quantity`` (a name in `QUANTITIES`) that all points share."""
+        """float[n]: standard error of ``quantity`` (a name in `QUANTITIES`) that is common to all points."""
         return np.asarray(self.systematic_std[:, _column(quantity)])
 
     def random(self, quantity: str) -> Float:
-        """float[n]: standard error of ``quantity`` that each point has for itself; NaN if unknown."""
+        """float[n]: standard error of ``quantity`` that is independent between points; NaN if unknown."""
         return np.asarray(self.random_std[:, _column(quantity)])
 
     def interval(self, quantity: str) -> Float:
@@ -160,9 +160,9 @@ class NonlinearMode:
         return np.asarray(self.interval_95[:, _column(quantity)])
 
     def bound_95(self, quantity: str) -> Float:
-        """float[n]: what to print behind +-: the distance to the farther end of the 95 % interval of ``quantity``.
+        """float[n]: distance to the farther end of the 95 % interval of ``quantity``, to print after +-.
 
-        Where the interval is not known, 1.96 standard errors.
+        If the interval is unknown, it is 1.96 standard errors.
         """
         ends = self.interval(quantity)
         farther = np.max(np.abs(ends - np.asarray(getattr(self, quantity))[:, None]), axis=1)
@@ -182,7 +182,7 @@ class NonlinearMode:
         return np.asarray(np.abs(self.force_harmonics[:, harmonic] / self.force_harmonics[:, 1]))
 
     def table(self) -> list[dict[str, float | None]]:
-        """One dictionary per point, with None for what could not be had: ready for JSON."""
+        """Return one JSON-able dictionary per point, with None for unknown values."""
         columns = {name: getattr(self, name) for name in _TABLE}
         columns["modal_frequency_bound_95_hz"] = self.bound_95("modal_frequency_hz")
         columns["damping_ratio_bound_95"] = self.bound_95("damping_ratio")
@@ -192,15 +192,15 @@ class NonlinearMode:
         return [{name: _number(values[row]) for name, values in columns.items()} for row in rows]
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         return arrays, {**{name: getattr(self, name) for name in _TEXT}, "notes": list(self.notes)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "NonlinearMode":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing.
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing.
 
-        Files of earlier versions hold fewer standard errors: the others are NaN then, and a note says so.
+        Files of earlier versions hold fewer standard errors; the missing ones are NaN, and a note says so.
         """
         needed = [name for name in _ARRAYS if name not in _ADDED]
         missing = [name for name in needed if name not in arrays] + [name for name in _TEXT if name not in attributes]

@@ -4,21 +4,22 @@ One nonlinear mode under the fundamental force F at the drive point obeys
 
     (w^2 - W^2 + 2 i W w z) q = phi_d F exp(i psi),    psi = arg F_1 - arg Q_d (phase lag), q = |Q_d| / phi_d,
 
-W the frequency of the vibration, w and z modal frequency and damping ratio (founding paper, steady slow flow). Its
-real and imaginary parts are solved for w and z at every point, so that a residual phase error costs nothing:
+with W the frequency of the vibration, w and z the modal frequency and damping ratio (founding paper, steady slow flow). Its
+real and imaginary parts are solved for w and z at every point, so that a residual phase error does not bias them:
 
     w^2 = W^2 + (phi_d F / q) cos psi,    2 W w z = (phi_d F / q) sin psi.
 
-The second is the active power of the fundamental, ``P_1 = 1/2 Re(F_1 conj(i W Q_d))``, as ``z = P_1 / (W^2 w q^2)``,
-which at W = w is the founding paper's ``P_1 / (w^3 q^2)`` (Scheel et al. 2018). A linear rig of one mode returns its
-own damping ratio exactly. ``damping_ratio_uncorrected`` is ``P_1 / (W^3 q^2)``.
+With the active power of the fundamental, ``P_1 = 1/2 Re(F_1 conj(i W Q_d))``, the second equation is
+``z = P_1 / (W^2 w q^2)``. At W = w it is the founding paper's ``P_1 / (w^3 q^2)`` (Scheel et al. 2018). For a linear rig of
+one mode the result is exactly its damping ratio. ``damping_ratio_uncorrected`` is ``P_1 / (W^3 q^2)``.
 
-The force's own harmonics, fed back by the exciter, do work too; ``damping_ratio_total_power`` takes the power of all
-harmonics, ``P = sum_h 1/2 Re(F_h conj(i h W Q_d,h))``.
+The harmonics of the force, which the exciter's reaction causes, do work too; ``damping_ratio_total_power`` is computed from
+the power of all harmonics, ``P = sum_h 1/2 Re(F_h conj(i h W Q_d,h))``.
 
-What a pure sine would find is yet another thing where the vibration has a mean: the exciter's suspension holds the mean
-deflection with a static force that piezo sensors do not see. On the one-sided magnet beam it is 1.1 N at 0.56 N and raises
-the modal frequency by 0.37 %; the modal frequency here is that of the rig as it stands, static force included.
+If the vibration has a mean, the exciter's suspension opposes the mean deflection with a static force that piezo sensors do
+not measure. On the one-sided magnet beam this static force is 1.1 N at a force amplitude of 0.56 N and raises the modal
+frequency by 0.37 %, compared with a purely sinusoidal force. The modal frequency here includes the effect of the static
+force.
 """
 
 from collections.abc import Mapping
@@ -50,7 +51,7 @@ _NO_SHAPE = (
 _FAR_FROM_RESONANCE_DEG = 15.0
 _FEW_LEVELS = 4
 _FEW_PERIODS = 10
-_DROWNED = 3.0  # standard errors that force and motion have to stand above
+_DROWNED = 3.0  # least ratio of force and motion to their standard errors
 
 
 def nonlinear_mode(
@@ -65,7 +66,7 @@ def nonlinear_mode(
     draws: int = 1000,
     seed: int = 0,
 ) -> NonlinearMode:
-    """Nonlinear mode from a measured backbone, every quantity with its standard error.
+    """Identify a nonlinear mode from a measured backbone, every quantity with its standard error.
 
     Parameters
     ----------
@@ -75,33 +76,33 @@ def nonlinear_mode(
         Linear modal analysis of the specimen; if given, modal amplitude and MAC come from its shapes, mapped by the
         names of the channels.
     mode
-        Index in ``modes`` of the tested mode; the nearest to the lowest level's frequency if None.
+        Index in ``modes`` of the tested mode; if None, the mode nearest to the frequency of the lowest level.
     mode_shapes
         Mass-normalised shapes chosen by hand, in place of ``modes``.
     linear_shape
-        Linear deflection shape by channel name, in any scale, for the MAC; else the tested one of the mode shapes.
+        Linear deflection shape for the MAC by channel name, in any scale; if None, the tested mode of the mode shapes.
     calibration_std, phase_skew_std_deg
         Relative standard error of the channels' sensitivities, and of their phase at the fundamental in degrees: one
         number for all, or by channel name. They are the same at all points.
     draws, seed
-        Of the Monte Carlo that carries errors through; the same seed gives the same numbers.
+        Number of draws and seed of the Monte Carlo error propagation; the same seed gives the same numbers.
 
     Returns
     -------
     NonlinearMode
         In the order of the backbone. Without any mass-normalised shape, damping and modal amplitude are NaN, the modal
-        frequency is that of the vibration, and a note says so. Standard errors hold those of the Fourier coefficients,
-        of the drift, of the shapes (where ``modes`` has them) and what is given here of the sensors. They do not hold
-        what the output's stairs fold into readings without anti-alias filter, or the run-to-run scatter of the
-        specimen and of the level that a run comes to rest at (`identification.combined` has that): at one voltage the
-        friction beam's amplitudes differ by up to 5e-5 from run to run, several of their standard errors; frequency,
-        damping and apparent mass at the amplitude that was reached do not.
+        frequency is that of the vibration, and a note says so. Standard errors include the errors of the Fourier
+        coefficients, of the drift, of the shapes (if known) and of the sensors (as given here). They do not include aliasing
+        of the output's steps in inputs without an anti-aliasing filter. Nor do they include the run-to-run scatter of the
+        specimen and of the reached level, which `identification.combined` estimates. At one voltage the amplitudes of the
+        friction beam differ by up to 5e-5 from run to run, several times their standard error; frequency, damping and
+        apparent mass at the reached amplitude do not.
 
     Raises
     ------
     IdentificationError
-        On unsettled points, a force or motion that is zero or drowns in noise, a modal frequency that is not real, negative
-        damping at most points (reversed polarity), modes or channels that do not fit.
+        If points are unsettled, a force or motion is zero or not above its noise, a modal frequency is not real, the damping
+        is negative at most points (reversed polarity), or modes or channels do not match.
     """
     notes: tuple[str, ...] = ()
     if modes is not None:
@@ -136,7 +137,7 @@ def nonlinear_mode(
 
 
 def _refuse(name: str, point: PeriodicVibration) -> None:
-    """Refuse a point that nothing can be identified from."""
+    """Raise `IdentificationError` if nothing can be identified from a point."""
     if not point.settled:
         raise IdentificationError(f"{name}: is not settled; use backbone.settled() to leave such points out")
     if point.force_n == 0.0 or point.amplitude_m == 0.0:
@@ -155,7 +156,7 @@ def _refuse(name: str, point: PeriodicVibration) -> None:
 
 
 def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
-    """Refuse points without a real modal frequency or a modal amplitude, and a reversed polarity."""
+    """Raise if a point has no real modal frequency or no modal amplitude, or if a polarity is reversed."""
     for number, point in enumerate(backbone.points):
         name = f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)"
         if found["modal_amplitude"][number] == 0.0:
@@ -177,7 +178,7 @@ def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
 def _states(
     backbone: Backbone, shapes: ModeShapes | None, linear: Mapping[str, float] | None
 ) -> tuple[States, tuple[int, ...]]:
-    """The backbone as arrays, and the channels of its deflection shapes."""
+    """Return the backbone as arrays, and the rows of the channels of its deflection shapes."""
     names = tuple(dict.fromkeys((*(shapes.channels if shapes is not None else ()), *(linear or ()))))
     rows = tuple(backbone.points[0].index(name) for name in names)
     deflection = [[point.displacement_m(name)[1] for name in names] for point in backbone.points]
@@ -200,7 +201,7 @@ def _states(
 
 
 def _drift_rate(point: PeriodicVibration) -> complex:
-    """Relative rate of change (1/s) of the fundamental of the drive point's motion; 0 where the drift is not known."""
+    """Relative rate of change (1/s) of the fundamental of the drive-point motion; 0 if the drift is unknown."""
     if point.drift is None:
         return 0j
     return complex(point.drift[find_role(point.channels, "drive")]) * point.frequency_hz / point.periods

@@ -1,8 +1,8 @@
-"""The one-mode equation, for all points at once, and for all draws of a Monte Carlo at once.
+"""The one-mode equation, evaluated for all points and all Monte Carlo draws at once.
 
-From ``D = (phi_d F / q) exp(i psi) = w^2 + s^2 + 2 s w z`` with ``s = i W + sigma``: sigma is the rate at which the
-fundamental of the motion still drifted, relative to it. What a growing vibration stores, and a decaying one returns, is
-no damping. To first order ``D = w^2 - W^2 + 2 i W (w z + sigma)``.
+It is ``D = (phi_d F / q) exp(i psi) = w^2 + s^2 + 2 s w z`` with ``s = i W + sigma``. sigma is the relative rate at which the
+fundamental of the motion still drifted. The energy that a growing vibration stores, and that a decaying one returns, is not
+counted as damping. To first order ``D = w^2 - W^2 + 2 i W (w z + sigma)``.
 """
 
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """Vibrations at n points; ``...`` stands for the draws, or for nothing.
+    """Vibrations at n points; ``...`` is the axis of the draws, or no axis.
 
     Parameters
     ----------
     frequency_hz
-        float[n].
+        float[n], frequency of the vibration.
     force, drive_m
         complex[..., n, H + 1], harmonics of force (N) and drive-point displacement (m).
     drift
-        complex[..., n], sigma, 1/s.
+        complex[..., n], relative drift rate sigma of the motion, 1/s.
     deflection_m
         complex[..., n, C], fundamentals at the channels of the shapes, m.
     inverse
@@ -35,7 +35,7 @@ class States:
     drive_shape
         Mass-normalised shape at the drive point, used without ``inverse``; None if unknown.
     linear_shape, linear_columns
-        float[..., K], linear shape for the MAC, and the K columns of ``deflection_m`` that it belongs to; K = 0 for none.
+        float[..., K], linear shape for the MAC, and its K columns in ``deflection_m``; K = 0 for none.
     """
 
     frequency_hz: Float
@@ -50,7 +50,7 @@ class States:
 
 
 def properties(states: States) -> dict[str, Float]:
-    """float[..., n] each: what `NonlinearMode` calls by these names; NaN where it cannot be had."""
+    """Return the properties of `NonlinearMode` by name, float[..., n] each; NaN where they are unknown."""
     omega = 2.0 * np.pi * states.frequency_hz
     force, drive = states.force[..., 1], states.drive_m[..., 1]
     turn = force * np.conj(drive)
@@ -89,7 +89,7 @@ def properties(states: States) -> dict[str, Float]:
 
 
 def _modal_amplitude(states: States) -> Float | None:
-    """``q^2 = psi^H (Phi^T)^+ Phi^+ psi`` (founding paper), or ``|Q_d| / phi_d``."""
+    """Modal amplitude ``q^2 = psi^H (Phi^T)^+ Phi^+ psi`` (founding paper), or ``|Q_d| / phi_d``."""
     if states.inverse is not None:
         modal = np.einsum("...mc,...nc->...nm", states.inverse, states.deflection_m)
         return np.asarray(np.linalg.norm(modal, axis=-1))
@@ -106,7 +106,7 @@ def _active_powers(states: States, omega: Float) -> Float:
 
 
 def _purity(harmonics: Complex) -> Float:
-    """float[..., n]: share of the fundamental in all harmonics from the first."""
+    """float[..., n]: amplitude of the fundamental over the root sum of squares of all harmonics from the first."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.abs(harmonics[..., 1]) / np.linalg.norm(harmonics[..., 1:], axis=-1))
 

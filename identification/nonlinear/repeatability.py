@@ -1,8 +1,8 @@
-"""Several backbones of one specimen: what repeats, what scatters, and one model that holds the scatter.
+"""Compare several backbones of one specimen: mean, scatter between runs, and one model whose errors include the scatter.
 
-Runs never meet the same amplitudes. Each run's properties are interpolated (PCHIP) over the drive point's amplitude to
-common levels within the range that all runs cover. What is measured of one run holds its own random error, so the
-variance between runs is the observed one less the mean of these: ``s_between^2 = s_observed^2 - mean s_within^2``.
+Different runs do not reach the same amplitudes. The properties of each run are therefore interpolated (PCHIP) over the
+drive-point amplitude to common levels within the range that all runs cover. The observed variance includes the random error
+within each run, so that the variance between runs is ``s_between^2 = s_observed^2 - mean s_within^2``.
 """
 
 from collections.abc import Sequence
@@ -31,9 +31,9 @@ class Repeatability:
     amplitude_m
         float[n], amplitudes of the drive point that all runs cover.
     modal_frequency_hz, damping_ratio
-        float[n_runs, n], of each run.
+        float[n_runs, n], values of each run.
     modal_frequency_within_hz, damping_ratio_within
-        float[n], random standard error of a single run, root of the mean square over runs; NaN if unknown.
+        float[n], random standard error of a single run, RMS over runs; NaN if unknown.
     specimen
         Name of what was tested.
     """
@@ -50,23 +50,24 @@ class Repeatability:
         return np.asarray(np.mean(self._runs(quantity), axis=0))
 
     def std(self, quantity: str) -> Float:
-        """float[n]: standard deviation over runs, as observed."""
+        """float[n]: observed standard deviation over runs."""
         return np.asarray(np.std(self._runs(quantity), axis=0, ddof=1))
 
     def range(self, quantity: str) -> Float:
-        """float[n]: largest less smallest run."""
+        """float[n]: largest minus smallest value over runs."""
         return np.asarray(np.ptp(self._runs(quantity), axis=0))
 
     def between(self, quantity: str) -> Float:
-        """float[n]: standard deviation between runs, the random error within them taken out (as it is if unknown)."""
+        """float[n]: standard deviation between runs without the random error within them, which counts as 0 if unknown."""
         within = self.modal_frequency_within_hz if quantity == "modal_frequency_hz" else self.damping_ratio_within
         return np.asarray(np.sqrt(np.maximum(self.std(quantity) ** 2 - np.nan_to_num(within) ** 2, 0.0)))
 
     def scatter(self, quantity: str) -> tuple[float, float, float]:
-        """Relative scatter of whole runs, and the 95 % interval that so few runs leave it.
+        """Return the relative scatter of whole runs, and both ends of its 95 % interval for this number of runs.
 
-        Each run's deviation from the mean is averaged over the levels: a specimen that came out stiffer is so at all of
-        them. Its standard deviation over R runs is distributed as chi with R - 1 degrees of freedom.
+        The deviation of each run from the mean is averaged over the levels, because a specimen that is stiffer in one run is
+        stiffer at all levels. The standard deviation of this average over R runs has a chi distribution with R - 1 degrees of
+        freedom.
         """
         from scipy.stats import chi2
 
@@ -78,7 +79,7 @@ class Repeatability:
         return size, low, high
 
     def table(self) -> list[dict[str, float | None]]:
-        """One dictionary per common amplitude, ready for JSON."""
+        """Return one JSON-able dictionary per common amplitude."""
         columns = {"amplitude_m": self.amplitude_m}
         for name in ("modal_frequency_hz", "damping_ratio"):
             columns[name] = self.mean(name)
@@ -97,18 +98,18 @@ class Repeatability:
 
 
 def repeatability(runs: Sequence[NonlinearMode | Backbone]) -> Repeatability:
-    """What repeats over several backbones of the same specimen.
+    """Compare several backbones of the same specimen at common amplitudes.
 
     Parameters
     ----------
     runs
-        Nonlinear modes, or backbones (then identified with their ``drive_mode_shape``); a backbone with several passes,
-        up and down or repeated, counts as one run per pass. Two runs at the least.
+        Nonlinear modes, or backbones (identified with their ``drive_mode_shape``). A backbone with several passes, up and
+        down or repeated, counts as one run per pass. At least two runs are needed.
 
     Raises
     ------
     IdentificationError
-        On fewer than two runs, different specimens or channels, runs without a common range of amplitudes.
+        If there are fewer than two runs, specimens or channels differ, or runs have no common range of amplitudes.
     """
     modes = _modes(runs)
     levels = _common_levels(modes)
@@ -124,12 +125,12 @@ def repeatability(runs: Sequence[NonlinearMode | Backbone]) -> Repeatability:
 
 
 def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
-    """One nonlinear mode from several runs, with standard errors of what the specimen will do in a further run.
+    """Combine several runs to one nonlinear mode whose standard errors hold for a further run of the specimen.
 
-    Properties are means over runs at common amplitudes. Their variance is ``(1 + 1/R) s_observed^2`` over R runs plus that
-    of the systematic errors, which all runs share; intervals use Student's quantile for so few runs. Where one run's own
-    random error is larger than what is observed, it takes the place of the latter. Harmonics are turned so that the
-    drive point's fundamental is real before they are averaged.
+    Properties are means over runs at common amplitudes. Their variance is ``(1 + 1/R) s_observed^2`` over R runs plus the
+    variance of the systematic errors, which all runs share. If the mean random variance within the runs is larger than
+    ``s_observed^2``, it is used instead. Intervals use Student's quantile for R runs. Before averaging, harmonics are rotated
+    so that the fundamental of the drive point is real.
 
     Raises
     ------
@@ -175,7 +176,7 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
 
 
 def _scatter_notes(modes: Sequence[NonlinearMode]) -> tuple[str, ...]:
-    """How far whole runs lie apart, in one line each for frequency and damping; none where it is not known."""
+    """Return a note each on the scatter of frequency and damping between runs; none where it is unknown."""
     found = repeatability(modes)
     notes = []
     for name, what in (("modal_frequency_hz", "modal frequency"), ("damping_ratio", "damping")):
@@ -191,7 +192,7 @@ _COMPARED = ("modal_frequency_hz", "damping_ratio")
 
 
 def _modes(runs: Sequence[NonlinearMode | Backbone]) -> list[NonlinearMode]:
-    """One nonlinear mode per run."""
+    """Return one nonlinear mode per run."""
     backbones = [run for run in runs if isinstance(run, Backbone)]
     for number, backbone in enumerate(backbones[1:], 2):
         if backbone.channels != backbones[0].channels:
@@ -216,7 +217,7 @@ def _modes(runs: Sequence[NonlinearMode | Backbone]) -> list[NonlinearMode]:
 
 
 def _common_levels(modes: Sequence[NonlinearMode]) -> Float:
-    """Amplitudes that all runs cover: the mean ones level by level if there are as many in each run, else evenly spread."""
+    """Return amplitudes within the range of all runs: level means if all runs have as many levels, else log-spaced values."""
     amplitudes = [np.sort(mode.amplitude_m) for mode in modes]
     low, high = max(a[0] for a in amplitudes), min(a[-1] for a in amplitudes)
     if not low < high:
@@ -230,7 +231,7 @@ def _common_levels(modes: Sequence[NonlinearMode]) -> Float:
 
 
 def _at(levels: Float, mode: NonlinearMode, values: Float) -> Float:
-    """``values`` of a run at the common levels; NaN where the run does not know them."""
+    """Return ``values`` of a run interpolated to the common levels; NaN if they are unknown."""
     from scipy.interpolate import PchipInterpolator
 
     amplitude, first = np.unique(mode.amplitude_m, return_index=True)
@@ -240,7 +241,7 @@ def _at(levels: Float, mode: NonlinearMode, values: Float) -> Float:
 
 
 def _mean_harmonics(levels: Float, modes: Sequence[NonlinearMode], name: str, harmonics: int) -> Complex:
-    """complex[n, H + 1]: mean over runs, turned so that the drive point's fundamental is real."""
+    """complex[n, H + 1]: mean over runs, after a rotation that makes the fundamental of the drive point real."""
     out = np.empty((levels.size, harmonics), np.complex128)
     orders = np.arange(harmonics)
     turned = [

@@ -1,16 +1,17 @@
-"""A nonlinear mode from single points of stepped-sine tests, whatever was controlled.
+"""Identify a nonlinear mode from single points of stepped-sine tests, under any kind of control.
 
 Every settled point near resonance obeys the one-mode equation at its own amplitude,
 
     w^2 - W^2 + 2 i W w z = phi_d^2 F / Q',    Q' = Q - R F,
 
-with Q the displacement at the drive point and R the receptance of all other modes there. Both sides of the resonance pass
-the same amplitudes, so that a level gives every amplitude between its wings and its peak up to twice. Far from resonance
-F / Q is nearly real: then a degree of phase error, or of R, is a large share of the damping. Such points are left out.
+with Q the displacement at the drive point and R the drive-point receptance of all other modes. The response passes the same
+amplitudes on both sides of the resonance, so that each level contributes up to two points per amplitude. Far from resonance F
+/ Q is nearly real, and a small error of the phase or of R becomes a large relative error of the damping. Such points are left
+out.
 
-Measured against the shipped rigs' own backbones: both magnet beams agree at 60 degrees from resonance within 0.3 % of
-damping and 0.006 % of frequency. On the friction beam, whose slipping joint moves the other modes too, the damping errs by
-1 % per 10 degrees, one way below and the other way above resonance: points on both sides cancel it.
+Compared with backbones measured on the shipped rigs, both magnet beams agree at 60 degrees from resonance within 0.3 % in
+damping and 0.006 % in frequency. On the friction beam, whose slipping joint also changes the other modes, the damping error
+is 1 % per 10 degrees, with opposite signs below and above resonance, so that points on both sides cancel it.
 """
 
 from collections.abc import Sequence
@@ -39,30 +40,31 @@ def single_point_mode(
     modes: LinearModes | None = None,
     mode: int | None = None,
 ) -> NonlinearMode:
-    """Nonlinear mode from points near resonance, each by itself.
+    """Identify a nonlinear mode from points near resonance, each point independently.
 
     Parameters
     ----------
     responses
-        Stepped-sine responses at the drive point: force, response, voltage or nothing controlled.
+        Stepped-sine responses at the drive point, with force, response, voltage or nothing controlled.
     drive_mode_shape
         Mass-normalised shape of the tested mode at the drive point, kg^-1/2.
     phase_window_deg
-        Points whose phase lag is within this of 90 degrees are used.
+        Largest distance of the phase lag from 90 degrees; points beyond it are left out.
     modes, mode
-        Linear modal analysis whose other modes and residual terms are taken out of the response (R above), and the
-        index of the tested one (the nearest to the points if None). Without it R is zero.
+        Linear modal analysis, and the index of the tested mode in it (if None, the mode nearest to the points). The other
+        modes and the residual terms are subtracted from the response (``R F`` above). Without ``modes``, R is zero.
 
     Returns
     -------
     NonlinearMode
-        One entry per point, smallest amplitude first; ``frequency_hz`` and ``phase_lag_deg`` say how far from resonance each
-        is. Standard errors are NaN: fundamentals alone have none. Harmonics, total power, purity and MAC are NaN.
+        One entry per point, smallest amplitude first; ``frequency_hz`` and ``phase_lag_deg`` show its distance from
+        resonance. Standard errors are NaN, because fundamentals alone do not provide them. Harmonics, total power, purity and
+        MAC are NaN.
 
     Raises
     ------
     IdentificationError
-        Without a point in the window, on a mode shape of zero, a window that is not allowed.
+        If no point is in the window, the mode shape is zero, or the window is out of its range.
     """
     if not 0.0 < phase_window_deg <= 80.0:
         raise IdentificationError(f"phase_window_deg: is {phase_window_deg:g}, allowed is above 0 to 80")
@@ -96,7 +98,7 @@ def _identified(
     modes: LinearModes | None,
     mode: int | None,
 ) -> NonlinearMode:
-    """The one-mode equation at every point."""
+    """Solve the one-mode equation at every point."""
     omega = 2.0 * np.pi * frequency
     own = motion
     if modes is not None:

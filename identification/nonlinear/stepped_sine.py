@@ -1,19 +1,19 @@
 """Modal frequency and damping from stepped-sine responses, one level at a time.
 
-Where the controller holds the response amplitude, stiffness and damping of the mode are those of that amplitude at
-every frequency of the level: its response is that of a linear mode, and a fit of one mode with constant w and z is
-legitimate (under force control the amplitude passes through a range, and it is not). With the dynamic stiffness S = F
-/ X, X the displacement,
+If the controller holds the response amplitude, stiffness and damping of the mode belong to that amplitude at every frequency
+of the level. The response is then that of a linear mode, and one mode with constant w and z can be fitted to it. (Under force
+control the amplitude varies along the level, and such a fit is not valid.) The dynamic stiffness S = F / X, with the
+displacement X, obeys
 
     S exp(-i beta) = m (w^2 - W^2 + 2 i W w z),
 
-where m is the apparent mass (``1 / (phi_force phi_response)``) and beta turns the modal constant. For a given beta
-this is linear in ``m w^2``, ``m`` and ``2 m w z``; eliminating these leaves ``cos beta, sin beta`` as the smaller
-eigenvector of a 2 x 2 matrix, so the fit needs neither start values nor iterations. Equations are weighted by ``1 /
-|S|``, that is for noise in proportion to the force.
+where m is the apparent mass (``1 / (phi_force phi_response)``) and beta is the phase of the modal constant. For a given beta
+this is linear in ``m w^2``, ``m`` and ``2 m w z``. After eliminating these, ``cos beta, sin beta`` is the eigenvector of the
+smaller eigenvalue of a 2 x 2 matrix, so that the fit needs neither start values nor iterations. Equations are weighted by
+``1 / |S|``, which suits noise in proportion to the force.
 
-Why beta: damping localised in a joint makes the modal constant complex, and a skew between the two sensors or a
-drifting resonance looks the same. Holding it at zero forces the mismatch into the modal frequency.
+beta is needed because damping localised in a joint makes the modal constant complex; a phase skew between the two sensors or
+a drifting resonance has the same effect. With beta held at zero this mismatch would bias the modal frequency.
 """
 
 import math
@@ -33,9 +33,9 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _LEVEL_TOLERANCE = 0.02
-_ENOUGH_POINTS = 5  # below, the window is widened
+_ENOUGH_POINTS = 5  # with fewer points the window is widened
 _MIN_POINTS = 3  # six equations for four unknowns
-_SAID_APART = 2e-4  # relative distance of phase resonance from the modal frequency that is worth a note
+_SAID_APART = 2e-4  # relative distance of phase resonance from the modal frequency above which a note is made
 
 
 @dataclass(frozen=True)
@@ -50,39 +50,40 @@ class _LevelFit:
     damping_std: float
     residual: float
     widest_deg: float
-    """Distance from phase resonance of the farthest point."""
+    """Largest distance of a point from phase resonance, degrees."""
 
 
 def stepped_sine_mode(
     responses: Sequence[FrequencyResponse], *, phase_window_deg: float = 60.0, complex_constant: bool = True
 ) -> NonlinearMode:
-    """Nonlinear mode from the response-controlled levels of a stepped-sine test.
+    """Identify a nonlinear mode from the response-controlled levels of a stepped-sine test.
 
     Parameters
     ----------
     responses
-        Measured levels; those not response-controlled are left out and named in the notes.
+        Measured levels; levels that are not response-controlled are left out and counted in the notes.
     phase_window_deg
-        Points whose phase lag is within this of 90 degrees are used, if the response held its level within 2 %. Where
-        fewer than five lie within, the five nearest to 90 degrees are, up to 90 degrees away; three must be left.
+        Largest distance of the phase lag from 90 degrees; points farther away, or whose response is not within 2 % of the
+        level, are left out. If fewer than five points remain, the five nearest to 90 degrees are used, at most 90 degrees
+        away. At least three points are needed.
     complex_constant
-        Whether the modal constant may be complex (beta above); False holds beta at zero.
+        Whether the modal constant may be complex; False holds its phase beta at zero.
 
     Returns
     -------
     NonlinearMode
-        One entry per level, in the given order; ``amplitude_m`` is the displacement of the measured response at its
-        level, ``frequency_hz`` the modal frequency, ``phase_lag_deg`` is ``90 + beta``, ``force_n`` the fitted force
-        there. Without a mass-normalised shape ``modal_amplitude`` is NaN: amplitudes are those of the measured point,
-        which is enough to predict responses there together with ``apparent_mass_kg``. Power, purity and MAC are NaN:
-        fundamentals alone say nothing of them. Standard errors come from the residual of the fit as if it were noise,
-        enlarged for few points: 1.96 of them are half of Student's 95 % interval. Where the model is what does not fit,
-        they are no interval. Levels that no mode can be fitted to are left out and named in the notes.
+        One entry per level, in the given order; ``amplitude_m`` is the displacement of the measured response at its level,
+        ``frequency_hz`` the modal frequency, ``phase_lag_deg`` is ``90 + beta``, ``force_n`` the fitted force at the modal
+        frequency. ``modal_amplitude`` is NaN without a mass-normalised shape; the amplitudes of the measured point and
+        ``apparent_mass_kg`` suffice to predict responses there. Power, purity and MAC are NaN, because fundamentals alone do
+        not determine them. Standard errors treat the residual of the fit as noise and are enlarged for few points: 1.96
+        standard errors are half of Student's 95 % interval. They are not valid if the residual is a model error. Levels to
+        which no mode can be fitted are left out and named in the notes.
 
     Raises
     ------
     IdentificationError
-        Without response-controlled levels, or with fewer than three usable points or no resonance in all of them.
+        If there are no response-controlled levels, or if every level has fewer than three usable points or no resonance.
     """
     if not 0.0 < phase_window_deg <= 90.0:
         raise IdentificationError(f"phase_window_deg: is {phase_window_deg:g}, allowed is above 0 to 90")
@@ -129,7 +130,7 @@ def stepped_sine_mode(
 def _fitted(
     levels: Sequence[FrequencyResponse], window_deg: float, complex_constant: bool
 ) -> tuple[list[tuple[FrequencyResponse, _LevelFit]], list[str]]:
-    """Levels with their fits, and why others have none; raises the first reason where none has a fit."""
+    """Return the levels with their fits, and why other levels have none; raise the first reason if no level has a fit."""
     fitted, refusals = [], []
     for level in levels:
         try:
@@ -143,7 +144,7 @@ def _fitted(
 
 
 def _used(level: FrequencyResponse, window_deg: float, name: str) -> NDArray[np.bool_]:
-    """bool[n]: held at their level and within the window; where these are few, those nearest to phase resonance."""
+    """bool[n]: points held at their level and within the window; if these are few, those nearest to phase resonance."""
     held = np.abs(np.abs(level.response) / np.median(np.abs(level.response)) - 1.0) <= _LEVEL_TOLERANCE
     away_deg = np.where(held, np.abs(level.phase_lag_deg - 90.0), np.inf)
     used = away_deg <= window_deg
@@ -161,7 +162,7 @@ def _used(level: FrequencyResponse, window_deg: float, name: str) -> NDArray[np.
 
 
 def _fit_level(level: FrequencyResponse, window_deg: float, complex_constant: bool) -> _LevelFit:
-    """Weighted linear least squares for m w^2, m and 2 m w z, with beta eliminated; see the module's head."""
+    """Fit m w^2, m and 2 m w z by weighted linear least squares, with beta eliminated; the module gives the equations."""
     name = f"level '{level.label}'" if level.label else f"level {level.level:g} {level.level_unit}"
     used = _used(level, window_deg, name)
     omega = 2.0 * np.pi * level.frequency_hz[used]
@@ -199,12 +200,12 @@ def _fit_level(level: FrequencyResponse, window_deg: float, complex_constant: bo
 
 
 def _stacked(values: Complex | Float) -> Float:
-    """Real parts above imaginary parts."""
+    """Stack real parts above imaginary parts."""
     return np.concatenate([values.real, values.imag])
 
 
 def _covariance(x: Float, w: float, z: float, mass: float, weight: Float, misfit: Float, turned: bool) -> Float:
-    """Covariance of w, z, m (and beta) from the misfit taken as white noise, with Student's factor for few points."""
+    """Covariance of w, z, m (and beta), with the residual taken as white noise and Student's factor for few points."""
     from scipy.stats import t
 
     model = mass * (w**2 - x**2 + 2j * x * w * z)
@@ -218,7 +219,7 @@ def _covariance(x: Float, w: float, z: float, mass: float, weight: Float, misfit
 
 
 def _held_amplitude_m(level: FrequencyResponse, omega: float) -> float:
-    """Displacement at ``omega`` (rad/s) of the amplitude that the controller held."""
+    """Displacement amplitude at ``omega`` (rad/s) that corresponds to the amplitude held by the controller."""
     held = float(np.median(np.abs(level.response)))
     return held / omega ** {"displacement": 0, "velocity": 1, "acceleration": 2}[level.kind]
 

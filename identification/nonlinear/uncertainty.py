@@ -1,8 +1,9 @@
-"""Monte Carlo over everything that is measured: which errors go into a nonlinear mode, and what they do to it.
+"""Monte Carlo propagation of measurement errors to the properties of a nonlinear mode.
 
-Random errors, of each point for itself: Fourier coefficients of all channels and harmonics, drawn with the tails that a
-standard error from so many batches has (Student), and the slope of the drift. Systematic ones, the same at all points:
-mass-normalised shapes, gains of the channels, phase skew (a delay: harmonic h turns h times as far).
+Random errors are independent between points: those of the Fourier coefficients of all channels and harmonics, drawn from
+Student's distribution for the number of batches behind a standard error, and that of the slope of the drift. Systematic
+errors are the same at all points: mass-normalised shapes, gains of the channels, and phase skew (a delay: the phase of
+harmonic h changes h times as much).
 """
 
 from collections.abc import Mapping
@@ -27,21 +28,21 @@ Float = NDArray[np.float64]
 
 _BOUNDED = ("mac", "force_purity", "response_purity")
 _TAILS = (2.5, 97.5)
-_STANDS_OUT = 2.5  # of its standard error per part, a drift that noise alone reaches in 4 % of cases
+_STANDS_OUT = 2.5  # multiple of its standard error per part; noise alone causes such a drift in 4 % of cases
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorModel:
-    """What may be wrong with a backbone, beside the noise that its points know of.
+    """Errors of a backbone other than the noise in the standard errors of its points.
 
     Parameters
     ----------
     calibration_std
         Relative standard error of the sensitivity of each channel: one number for all, or by channel name.
     phase_skew_std_deg
-        Standard error of each channel's phase at the fundamental, likewise.
+        Standard error of each channel's phase at the fundamental: one number for all, or by channel name.
     draws, seed
-        Of the Monte Carlo; the same seed gives the same numbers.
+        Number of draws and seed of the Monte Carlo; the same seed gives the same numbers.
     """
 
     calibration_std: float | Mapping[str, float] = 0.0
@@ -54,7 +55,7 @@ class ErrorModel:
             raise IdentificationError(f"draws: is {self.draws}, needs at least 100")
 
     def per_channel(self, name: str, backbone: Backbone) -> Float:
-        """float[n_channels]: the field ``name`` of each channel; raises `IdentificationError` for unknown ones."""
+        """float[n_channels]: the field ``name`` of each channel; raises `IdentificationError` for unknown channels."""
         given = getattr(self, name)
         names = [channel.name for channel in backbone.channels]
         if isinstance(given, Mapping):
@@ -75,9 +76,9 @@ def propagated(
     shapes: ModeShapes | None,
     model: ErrorModel,
 ) -> dict[str, Float]:
-    """Standard errors, their systematic and random parts and intervals, by field of `NonlinearMode`.
+    """Return standard errors, their systematic and random parts, and intervals, by field name of `NonlinearMode`.
 
-    ``rows`` are the channels of ``states.deflection_m``; ``shapes`` are what ``states.inverse`` inverts.
+    ``rows`` are the channels of ``states.deflection_m``; ``states.inverse`` is the pseudo-inverse of ``shapes``.
     """
     estimate = properties(states)
     rng = np.random.default_rng(model.seed)
@@ -86,7 +87,7 @@ def propagated(
     total = _deviations(estimate, properties(both))
     systematic, random = {name: np.zeros_like(total[name]) for name in total}, total
     if wrong is not None:
-        # Each part by itself: their difference from the total would drown in the scatter of the draws.
+        # Each part is drawn by itself: a difference of variances would be lost in the scatter of the draws.
         systematic = _deviations(estimate, properties(wrong))
         alone = _random(_repeated(states, model.draws), states, backbone, rows, rng)
         random = _deviations(estimate, properties(alone))
@@ -95,10 +96,10 @@ def propagated(
     intervals = np.empty((len(backbone.points), len(QUANTITIES), 2))
     for column, name in enumerate(QUANTITIES):
         out[STANDARD_ERRORS[name]] = np.where(known, _std(total[name]), np.nan)
-        # What the errors do to the estimate they did to the truth: the quantiles of the deviation, turned over.
+        # The errors act on the estimate as they acted on the true value: quantiles of the deviation with reversed sign.
         low, high = np.percentile(total[name], _TAILS, axis=0)
         intervals[:, column] = np.column_stack([estimate[name] - high, estimate[name] - low])
-        if name in _BOUNDED:  # beside its bound a quantity is skewed, and either way of reading the draws falls short
+        if name in _BOUNDED:  # skewed near its bound: take the union of both intervals
             ends = np.column_stack([intervals[:, column], estimate[name] + low, estimate[name] + high])
             intervals[:, column] = np.clip(np.column_stack([ends.min(axis=1), ends.max(axis=1)]), 0.0, 1.0)
     intervals[~known] = np.nan
@@ -115,14 +116,14 @@ def _std(deviations: Float) -> Float:
 
 
 def _deviations(estimate: Mapping[str, Float], drawn: Mapping[str, Float]) -> dict[str, Float]:
-    """float[draws, n] by quantity."""
+    """Return the deviations of the draws from the estimate by quantity, float[draws, n]."""
     out = {name: drawn[name] - estimate[name] for name in QUANTITIES}
     out["phase_lag_deg"] = 180.0 - (180.0 - out["phase_lag_deg"]) % 360.0
     return out
 
 
 def _repeated(states: States, draws: int) -> States:
-    """The same states once per draw."""
+    """Return the same states once per draw."""
 
     def often(values: Complex) -> Complex:
         return np.broadcast_to(values, (draws, *values.shape))
@@ -144,7 +145,7 @@ def _systematic(
     model: ErrorModel,
     rng: np.random.Generator,
 ) -> States | None:
-    """States with the errors that all points share; None where there are none."""
+    """Return states with the errors that are common to all points; None if there are none."""
     calibration = model.per_channel("calibration_std", backbone)
     skew = np.radians(model.per_channel("phase_skew_std_deg", backbone))
     drawn = None if shapes is None else shapes.draw(model.draws, rng)
@@ -178,7 +179,7 @@ def _systematic(
 def _random(
     wrong: States, states: States, backbone: Backbone, rows: tuple[int, ...], rng: np.random.Generator
 ) -> States:
-    """``wrong`` with errors of each point for itself added; the drive's are the same wherever it appears."""
+    """Add independent errors at each point to ``wrong``; the drive channel has the same errors wherever it appears."""
     draws, points = wrong.force.shape[0], backbone.points
     freedom = np.array([2 * (batches_of(point.periods) - 1) for point in points], dtype=float)
 
@@ -208,18 +209,18 @@ def _errors(point: PeriodicVibration) -> Float:
 
 
 def _to_displacement(points: tuple[PeriodicVibration, ...], row: int) -> Float:
-    """float[n, H + 1]: size of the displacement per unit of the channel; 1 for harmonic 0, which is not used."""
+    """float[n, H + 1]: displacement per unit of the channel, in magnitude; 1 for harmonic 0, which is not used."""
     order = MOTION_ORDER[points[0].channels[row].motion]
     harmonic = np.maximum(np.arange(points[0].harmonics.shape[1]), 1)
     return np.asarray([(2.0 * np.pi * point.frequency_hz * harmonic) ** -order for point in points], dtype=np.float64)
 
 
 def _drift_noise(states: States, backbone: Backbone, rng: np.random.Generator, draws: int) -> Complex:
-    """complex[draws, n]: what the drift may be wrong by.
+    """complex[draws, n]: random errors of the drift.
 
-    The slope of a line over -1/2 ... 1/2 has the variance of its mean times twelve. And where a vibration has not come to
-    rest its properties are those of a steady one to first order only (joints with memory dissipate otherwise while
-    they creep): as much as stands out of the noise is counted once more.
+    The slope of a line over -1/2 ... 1/2 has twelve times the variance of its mean. In addition, the properties of a
+    vibration that still drifts equal those of a steady one only to first order (joints with memory dissipate differently
+    while they creep). Drift above the noise is therefore added to the standard error.
     """
     row = find_role(backbone.channels, "drive")
     relative = [

@@ -1,1 +1,1 @@
-"""Polynomial nonlinear state-space models: identified from experiments, simulated, balanced harmonically."""
+"""Polynomial nonlinear state-space models: identification from experiments, simulation, harmonic balance."""

@@ -1,7 +1,7 @@
 """Best linear approximation of the periodic experiments, from which a nonlinear state-space model is identified.
 
-Experiments are checked first: whether they are periodic and settled. Pintelon and Schoukens, *System Identification: A
-Frequency Domain Approach*, 2nd ed., chapters 3 and 4; the estimate is `identification.multisine.best_linear_approximation`.
+Experiments are first checked to be periodic and settled. Pintelon and Schoukens, *System Identification: A Frequency Domain
+Approach*, 2nd ed., chapters 3 and 4; the estimate is `identification.multisine.best_linear_approximation`.
 """
 
 from collections import Counter
@@ -24,7 +24,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _DIFFERENCE = 0.3
-"""Largest RMS difference of two periods relative to the signal; a larger one is not noise, or noise that hides the signal."""
+"""Largest RMS difference of two periods relative to the signal; a larger one is not noise, or the noise hides the signal."""
 _SETTLED_PART = 32
 """Just before the counted part, 1/32 of a period is compared with the same part one period later."""
 _EXCITED = 1e-2
@@ -32,10 +32,10 @@ _EXCITED = 1e-2
 
 
 def periodic_ones(experiments: Sequence[Experiment]) -> tuple[list[Experiment], tuple[str, ...]]:
-    """The periodic experiments of the commonest period, checked, and notes on those that are left out.
+    """Check the periodic experiments; return those with the commonest period, and notes on the others.
 
-    Experiments that are not periodic are left out without a note. Raises `IdentificationError` where none is periodic, and
-    where one is not what it claims (`check_periodic`).
+    Experiments that are not declared periodic are left out without a note. Raises `IdentificationError` if none is, or if an
+    experiment is declared periodic but is not (`check_periodic`).
     """
     claimed = [experiment for experiment in experiments if experiment.period_samples]
     if not claimed:
@@ -55,7 +55,7 @@ def periodic_ones(experiments: Sequence[Experiment]) -> tuple[list[Experiment], 
 
 
 def check_periodic(experiment: Experiment, name: str) -> None:
-    """Raise `IdentificationError` unless the counted periods repeat each other, and what is just before them repeats too.
+    """Raise `IdentificationError` unless the counted periods, and the samples just before them, repeat.
 
     Two neighbouring periods may differ by 0.3 of the signal (RMS, mean removed) in every channel. The last
     1/32 of a period before the counted part must be as close to the same part one period later: the transient has decayed.
@@ -91,33 +91,33 @@ def check_periodic(experiment: Experiment, name: str) -> None:
 def best_linear_responses(
     experiments: Sequence[Experiment], *, band_hz: tuple[float, float] | None = None
 ) -> FrequencyResponseMatrix:
-    """Frequency responses ``H = sum_r Y_r U_r^H (sum_r U_r U_r^H)^-1`` of the periodic experiments, with their covariance.
+    """Estimate ``H = sum_r Y_r U_r^H (sum_r U_r U_r^H)^-1`` of the periodic experiments, with its covariance.
 
-    Every experiment is a realisation; over its counted periods the mean is taken. Levels may be mixed: each experiment counts
-    with its power and its weight, as it does in the fit over time. For one level alone hand in its experiments alone. Those
-    that are not periodic take no part.
+    Every experiment is a realisation, averaged over its counted periods. Levels may be mixed: each experiment counts with its
+    power and its weight, as in the fit over time. For the responses of one level, pass only the experiments of that level.
+    Experiments that are not periodic are ignored.
 
     Parameters
     ----------
     experiments
-        Of the same channels, one periodic at least; with several inputs as many as inputs, neighbours of one block
-        (orthogonal multisines) following each other.
+        Experiments with the same channels, at least one of them periodic. With several inputs, at least as many periodic ones
+        as inputs; the experiments of one block (orthogonal multisines) follow each other.
     band_hz
-        Lowest and highest line; None for the band that the experiments were excited in. Of its lines, or where it is
-        unknown of all below half the sample rate, those count where all inputs have a hundredth of the amplitude of their
-        strongest one.
+        Lowest and highest line; if None, the excited band of the experiments, or all lines below half the sample rate if that
+        is unknown. Within the band a line counts as excited if every input has at least a hundredth of the amplitude of its
+        strongest line.
 
     Returns
     -------
     FrequencyResponseMatrix
-        At the excited lines. The total covariance needs two realisations per input, that of noise two periods; what is
-        unknown is said in its notes.
+        Responses at the excited lines. The total covariance needs two realisations per input, the noise covariance two
+        periods; the notes name a covariance that is unknown.
 
     Raises
     ------
     IdentificationError
-        Where none is periodic, where one is not what it claims, on fewer realisations than inputs, inputs that do not move
-        independently, or no excited line.
+        If no experiment is periodic, one is declared periodic but is not, there are fewer realisations than inputs, inputs
+        are linearly dependent, or no line is excited.
     """
     same_channels(experiments)
     chosen, notes = periodic_ones(experiments)
@@ -135,7 +135,7 @@ def best_linear_responses(
     spectra = _spectra(chosen)
     frequency_hz = np.arange(spectra.shape[-1]) * first.sample_rate_hz / first.period_samples
     lines = _excited(spectra[:, :, : len(inputs)], frequency_hz, band_hz or excited_band(chosen))
-    # Any channel may be an input or an output here: roles are given for the estimate alone.
+    # Any channel may be an input or an output here: these roles serve only the estimate.
     roles = [Channel(f"input {i + 1}", "force", "N") for i in range(len(inputs))]
     roles += [Channel(f"output {o + 1}", "response", "m") for o in range(len(outputs))]
     found = best_linear_approximation(
@@ -161,7 +161,7 @@ def best_linear_responses(
 def _spectra(experiments: Sequence[Experiment]) -> Complex:
     """complex[n_realisations, n_periods, n_inputs + n_outputs, n_lines], peak amplitudes times the root of the weight.
 
-    Where experiments have different numbers of periods, the last of each are taken.
+    If experiments have different numbers of periods, the last periods of each are used.
     """
     n = experiments[0].period_samples
     periods = min(experiment.counted // n for experiment in experiments)
@@ -176,7 +176,7 @@ def _spectra(experiments: Sequence[Experiment]) -> Complex:
 def _excited(
     inputs: Complex, frequency_hz: NDArray[np.float64], band_hz: tuple[float, float] | None
 ) -> NDArray[np.bool_]:
-    """bool[n_lines], from complex[n_realisations, n_periods, n_inputs, n_lines]; neither 0 Hz nor half the sample rate."""
+    """bool[n_lines]: excited lines of complex[n_realisations, n_periods, n_inputs, n_lines], not 0 Hz nor half the rate."""
     inner = (np.arange(frequency_hz.size) > 0) & (frequency_hz < frequency_hz[-1] * (1.0 - 1e-9))
     if band_hz is not None:
         lowest, highest = band_hz

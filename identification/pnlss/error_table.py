@@ -1,4 +1,4 @@
-"""Tests of many models on what they were not trained on, and the table of their errors (Scheel et al., Tables 2 and 4)."""
+"""Test many models on data they were not trained on, and tabulate their errors (Scheel et al., Tables 2 and 4)."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from identification.pnlss.model import PnlssModel
 __all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest"]
 
 SAME_LEVEL = "same level"
-"""Test on the realisations that a model's own training set left out."""
+"""Name of the test on the realisations that a model's own training set left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelTest:
-    """One model simulated with the input of one experiment."""
+    """Result of one model simulated with the input of one experiment."""
 
     model: str
     training_set: str
@@ -40,7 +40,7 @@ class ModelTest:
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorCell:
-    """Statistics of the tests of one training set at one level; mean, deviation and largest are of the bounded runs."""
+    """Statistics of the tests of one training set at one level; mean, deviation and largest error are over the bounded runs."""
 
     mean: float
     standard_deviation: float
@@ -50,11 +50,11 @@ class ErrorCell:
     unbounded_runs: int
     unbounded_models: int
     range_use: float
-    """Largest known one of the bounded runs; NaN where none is."""
+    """Largest known value over the bounded runs; NaN if there is none."""
 
     @classmethod
     def of(cls, tests: Iterable[ModelTest]) -> "ErrorCell":
-        """Statistics of some tests; NaN where there is nothing to take them of."""
+        """Return the statistics of some tests; NaN where there are too few."""
         rows = list(tests)
         bounded = [row for row in rows if row.bounded]
         errors = np.array([row.error for row in bounded])
@@ -75,13 +75,13 @@ class ErrorCell:
         return self.range_use > 1.0
 
     def row(self) -> dict[str, Any]:
-        """Numbers by name, ready for JSON; None for numbers that are not finite."""
+        """Return JSON-able numbers by name; None for numbers that are not finite."""
         return {name: value if np.isfinite(value) else None for name, value in vars(self).items()}
 
     def __str__(self) -> str:
-        """Mean and, in brackets, standard deviation, as in the paper; unbounded runs are counted and not called unstable.
+        """Format mean and, in brackets, standard deviation as in the paper, with the number of unbounded runs.
 
-        An asterisk says that a bounded run went beyond the range of the training data.
+        An asterisk marks a bounded run that exceeded the range of the training data.
         """
         if not self.runs:
             return "-"
@@ -111,7 +111,7 @@ class ErrorTable:
     tests
         Every single test.
     failures
-        Reasons by the names of models that could not be identified.
+        Models that could not be identified: reasons by model name.
     """
 
     output: str
@@ -130,11 +130,12 @@ class ErrorTable:
         output: int | str = 0,
         failures: Mapping[str, str] | None = None,
     ) -> "ErrorTable":
-        """Test the models (by the names of their jobs) on every realisation of every level that they have not seen.
+        """Test the models (by the names of their jobs) on every realisation of every level that was not in their training data.
 
-        The same-level error is that on the realisations which a model's training set left out: one, of the mixed set one of
-        each level. Other levels are tested with all their realisations, of the mixed set with the one left out. ``output``
-        is the output channel by name or number. Raises `IdentificationError` where it is not there, or there is no level.
+        The same-level error is the error on the realisations that a model's training set left out: one, or for the mixed set
+        one of each level. Other levels are tested with all their realisations, except that models of the mixed set are tested
+        only with the realisation left out. ``output`` is the output channel by name or number. Raises `IdentificationError`
+        if it is unknown, or if there is no level.
         """
         if not levels:
             raise IdentificationError("levels: none given, needs one at least")
@@ -158,7 +159,7 @@ class ErrorTable:
         )
 
     def cell(self, training_set: str, test: str, *, model: str | None = None) -> ErrorCell:
-        """Statistics over all models of a training set, or of one of them."""
+        """Return the statistics over all models of a training set, or of one of these models."""
         return ErrorCell.of(
             row
             for row in self.tests
@@ -167,7 +168,7 @@ class ErrorTable:
 
     @cached_property
     def selected(self) -> dict[str, str]:
-        """Per training set the model of smallest mean same-level error among those bounded there; none if there is none."""
+        """Model with the smallest mean same-level error of each training set, among models bounded in all these tests."""
         found: dict[str, str] = {}
         for training_set in self.training_sets:
             names = dict.fromkeys(row.model for row in self.tests if row.training_set == training_set)
@@ -178,7 +179,7 @@ class ErrorTable:
         return found
 
     def rows(self) -> list[dict[str, Any]]:
-        """One dictionary per training set and test, of all models and of the selected one (``model`` has its name)."""
+        """Return one dictionary per training set and test, for all models and for the selected one (named in ``model``)."""
         found = []
         for training_set in self.training_sets:
             for model in (None, self.selected.get(training_set)):
@@ -189,7 +190,7 @@ class ErrorTable:
         return found
 
     def text(self) -> str:
-        """Both parts as the paper has them: all models, and the selected ones."""
+        """Format both parts of the table as in the paper: all models, and the selected models."""
         counts = {name: self.cell(name, SAME_LEVEL).models for name in self.training_sets}
         heads = [f"{name} ({count} model{'' if count == 1 else 's'})" for name, count in counts.items()]
         lines = [f"relative error of {self.output}: mean (standard deviation) over the bounded runs"]
@@ -233,6 +234,6 @@ def _tests(
 
 
 def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a table with columns as wide as they need."""
+    """Format a table with columns as wide as needed."""
     widths = [max(len(row[column]) for row in (heads, *rows)) for column in range(len(heads))]
     return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in (heads, *rows)]

@@ -1,4 +1,4 @@
-"""Errors of a model simulated with the inputs of experiments, its use of the trained range, and initial states."""
+"""Errors of a model simulated with the inputs of experiments, its use of the trained range, and estimated initial states."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ __all__ = ["PnlssErrors", "error_spectra", "estimated_initial_state", "pnlss_err
 Float = NDArray[np.float64]
 
 _ENOUGH = 1e3
-"""The search for sizes of states ends once the outputs' response to them exceeds this multiple of the largest so far."""
+"""The search for the sizes of states ends once the response of the outputs exceeds this multiple of the largest so far."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -31,12 +31,12 @@ class PnlssErrors:
     Parameters
     ----------
     relative
-        float[n_experiments, n_outputs], RMS of simulated less measured output over the RMS of the measured one, over the
-        samples that count (Scheel et al., the relative error of Section 3.3); inf for an unbounded run.
+        float[n_experiments, n_outputs], RMS of the output error over the RMS of the measured output, over the samples that
+        count (Scheel et al., the relative error of Section 3.3); inf for an unbounded run.
     rms
-        float[n_experiments, n_outputs], the same in the units of the outputs.
+        float[n_experiments, n_outputs], RMS of the output error in the units of the outputs.
     bounded
-        bool[n_experiments].
+        bool[n_experiments], whether the run stayed bounded.
     range_use
         float[n_experiments], largest state or input over the largest in the training data; inf for an unbounded run, NaN
         where unknown.
@@ -60,7 +60,7 @@ class PnlssErrors:
 
     @property
     def overall(self) -> Float:
-        """float[n_experiments], root of the mean over outputs of squared relative errors."""
+        """float[n_experiments]: RMS over outputs of the relative errors."""
         return np.asarray(np.sqrt(np.mean(self.relative**2, axis=1)))
 
     @property
@@ -70,10 +70,10 @@ class PnlssErrors:
 
 
 def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, samples: int = SAMPLES) -> PnlssErrors:
-    """Simulate each experiment and compare; initial states are estimated from the first ``samples`` where asked for.
+    """Simulate each experiment and compare; an initial state to be estimated is fitted to the first ``samples`` samples.
 
-    Raises `IdentificationError` on experiments of other channels or another sample rate, none at all, an output that is zero
-    where it counts.
+    Raises `IdentificationError` if there are no experiments, their channels or sample rates differ from the model's, or an
+    output is zero where it counts.
     """
     if not experiments:
         raise IdentificationError("experiments: none given, needs one at least")
@@ -109,9 +109,10 @@ def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, sample
 def simulated_run(
     model: PnlssModel, experiment: Experiment, *, initial_state: Float | None = None, use: str = "test"
 ) -> SimulatedRun:
-    """Simulate an experiment from rest, or from ``initial_state``; it is estimated where the experiment asks for it.
+    """Simulate an experiment from rest or from ``initial_state``, which is estimated if the experiment requires it.
 
-    Raises `IdentificationError` where the channels or rates of the two differ, and where an output is zero where it counts.
+    Raises `IdentificationError` if channels or sample rates of model and experiment differ, or an output is zero where it
+    counts.
     """
     check_channels(model, experiment)
     check_not_zero(experiment, f"experiment '{experiment.name}'")
@@ -133,7 +134,7 @@ def simulated_run(
 
 
 def error_spectra(model: PnlssModel, linear: PnlssModel | None, experiment: Experiment) -> ErrorSpectra:
-    """Amplitudes by line of a periodic experiment: the measurement, the errors of a model and of its linear start.
+    """Return amplitudes by line of a periodic experiment: the measurement, and the errors of a model and its linear start.
 
     Raises `IdentificationError` for an experiment that is not periodic.
     """
@@ -191,8 +192,8 @@ def check_channels(model: PnlssModel, experiment: Experiment) -> None:
 def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, samples: int = SAMPLES) -> Float:
     """float[n_states] before the first sample, by least squares on the first ``samples`` that count, each output over its RMS.
 
-    Combinations of states that the outputs do not show stay near zero. The states are scaled for this so that each alone
-    moves the outputs alike, so the result depends neither on the units of the states nor on a known range.
+    Unobservable combinations of states stay near zero. For this the states are scaled so that each alone has an equal effect
+    on the outputs; the result then depends neither on the units of the states nor on a known range.
 
     Raises `IdentificationError` on other channels, another sample rate, too few samples.
     """
@@ -213,9 +214,9 @@ def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, sample
 
 
 def _seen_alike(model: PnlssModel, outputs: Float, samples: int) -> Float:
-    """float[n_states]: sizes at which each state alone, near rest, makes an output reach its own size within so many samples.
+    """float[n_states]: initial size of each state alone, near rest, at which an output reaches its RMS within ``samples``.
 
-    For a state that no output shows: its trained range or, where that is unknown, the smallest size of the others.
+    For an unobservable state: its trained range or, if that is unknown, the smallest size of the other states.
     """
     rest = np.zeros((model.states + len(model.inputs), 1))
     by_state, by_output = (
@@ -227,7 +228,7 @@ def _seen_alike(model: PnlssModel, outputs: Float, samples: int) -> Float:
         seen = np.fmax(seen, np.max(np.abs(row), axis=0))
         row = row @ (model.a + by_state)
         if not np.max(np.abs(row)) < _ENOUGH * np.max(seen, initial=1e-300):
-            break  # unstable at rest: what a state does later is the growth's, not its own
+            break  # unstable at rest: later effects of a state come from the growth, not from the state itself
     known = np.isfinite(model.state_range) & (model.state_range > 0.0)
     unseen = np.where(known, model.state_range, 1.0 / np.max(seen, initial=1e-300) if np.any(seen) else 1.0)
     return np.divide(1.0, seen, out=unseen, where=seen > 0.0)

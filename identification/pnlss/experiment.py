@@ -30,27 +30,27 @@ class Experiment:
     input_channels, output_channels
         One per row.
     counted_from
-        First sample that counts in errors; earlier ones let transients decay: they are simulated and not compared.
+        First sample that counts in errors; earlier samples let transients decay: they are simulated but not compared.
     period_samples
-        Samples of a period, of which the counted part holds a whole number; 0 for a record that is not periodic.
+        Number of samples in a period; the counted part is a whole number of periods. 0 for a record that is not periodic.
     initial_state
         Whether the state before the first sample is ``zero`` or ``estimated`` together with the model.
     weight
-        Weight of its squared errors beside those of other experiments.
+        Weight of the squared errors of this experiment relative to other experiments.
     name
         Name for tables and messages.
     level
-        Level (RMS or peak as set) by which tables sort; NaN if it has none.
+        Level (RMS or peak, as specified) by which tables sort; NaN if there is none.
     specimen
         Name of the test specimen.
     excited_hz
-        Lowest and highest excited frequency; None if unknown. Frequencies that the structure adds, such as harmonics in a
-        measured force, do not count.
+        Lowest and highest excited frequency; None if unknown. Frequencies that the structure generates, such as harmonics in
+        a measured force, do not count as excited.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, shapes that do not agree, nothing left to count, a counted part that is not whole periods.
+        If values are NaN or infinite, shapes do not agree, no sample counts, or the counted part is not whole periods.
     """
 
     inputs: Float
@@ -121,9 +121,10 @@ class Experiment:
         specimen: str = "",
         excited_hz: tuple[float, float] | None = None,
     ) -> "Experiment":
-        """One settled period (float[n_channels, n_period]), preceded by ``transient_samples`` samples of the same period.
+        """Create an experiment of one settled period (float[n_channels, n_period]) with ``transient_samples`` ahead of it.
 
-        The transient of a simulation from rest decays in these samples, which are not compared. They may exceed a period.
+        The samples ahead repeat the same period; they may exceed one period. The transient of a simulation from rest decays
+        in them, and they are not compared.
         """
         both: list[Float] = []
         for values in (inputs, outputs):
@@ -160,10 +161,11 @@ class Experiment:
         return np.asarray(self.outputs[:, self.counted_from :])
 
     def averaged(self, *, transient_samples: int | None = None) -> "Experiment":
-        """The mean over the counted periods as one settled period, preceded by samples of it (`periodic`).
+        """Return the mean over the counted periods as one settled period, preceded by samples of it (`periodic`).
 
-        A fit to the mean gives the same model as a fit to all periods, if these are equally noisy, in a fraction of the time.
-        None for ``transient_samples`` keeps as many as were not counted. Raises `IdentificationError` if it is not periodic.
+        If all periods are equally noisy, a fit to the mean gives the same model as a fit to all periods in a fraction of the
+        time. None for ``transient_samples`` keeps the number of samples that were not counted. Raises `IdentificationError`
+        if it is not periodic.
         """
         if not self.period_samples:
             raise IdentificationError(
@@ -179,10 +181,10 @@ class Experiment:
         return replace(self, inputs=means[0], outputs=means[1], counted_from=ahead)
 
     def with_constant_input(self, value: float = 1.0) -> "Experiment":
-        """The experiment with one more input, ``constant``, of one value throughout, whose effect compensates offsets.
+        """Return the experiment with an additional input ``constant`` of one value, whose effect compensates offsets.
 
-        Offsets of sensors and amplifiers disturb polynomials much and are rarely known well enough to be subtracted. Give the
-        input the same value in all experiments, predicted ones included.
+        Offsets of sensors and amplifiers strongly disturb polynomials and are rarely known well enough to be subtracted. Give
+        the input the same value in all experiments, including predicted ones.
         """
         return replace(
             self,
@@ -191,7 +193,7 @@ class Experiment:
         )
 
     def weighted(self, weight: float) -> "Experiment":
-        """The experiment with another weight."""
+        """Return the experiment with another weight."""
         return replace(self, weight=weight)
 
 
@@ -202,7 +204,7 @@ def excited_band(experiments: Sequence[Experiment]) -> tuple[float, float] | Non
 
 
 def same_data(one: Experiment, other: Experiment) -> bool:
-    """Whether two experiments hold the same samples: one object, or the same file read twice."""
+    """Return whether two experiments hold the same samples: the same object, or the same file read twice."""
     if one is other:
         return True
     pairs = ((one.inputs, other.inputs), (one.outputs, other.outputs))
@@ -210,7 +212,7 @@ def same_data(one: Experiment, other: Experiment) -> bool:
 
 
 def same_channels(experiments: Sequence[Experiment]) -> None:
-    """Raise `IdentificationError` unless there is at least one and all have the same channels and sample rate."""
+    """Raise `IdentificationError` unless there is at least one experiment and all have the same channels and sample rate."""
     if not experiments:
         raise IdentificationError("experiments: none given, needs one at least")
     first = experiments[0]

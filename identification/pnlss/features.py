@@ -4,12 +4,12 @@ A model is linear in its features (`identification.pnlss.model`). Simulation and
 from the kernels `feature_values` and `feature_derivatives`. The fit needs derivatives at every sample: it gathers those of
 monomials beforehand and computes those of functions in `identification.pnlss.fitting.kernels`.
 
-A feature ``g(w . v + b) - g(b)`` applies a function g to a weighted sum of the variables. A further g is a line in
-`FUNCTIONS` with its code, and a branch with that code in the kernels `function_value` and `function_slope`
-(`identification.pnlss.kernels`); simulation, fit, harmonic balance, files and names take it from there.
+A feature ``g(w . v + b) - g(b)`` applies a function g to a weighted sum of the variables. To add a function g, add an entry
+with a new code to `FUNCTIONS`, and a branch with this code to the kernels `function_value` and `function_slope`
+(`identification.pnlss.kernels`). Simulation, fit, harmonic balance, files and names then support it.
 
-Monomials are those of Paduart et al., Automatica 46, 2010. With tanh the functions saturate, as the nonlinear feedback of an
-NL-LFR model does (Schoukens and Toth, IFAC-PapersOnLine 53, 2020).
+The monomials are those of Paduart et al., Automatica 46, 2010. With tanh the functions saturate, as the nonlinear feedback of
+an NL-LFR model does (Schoukens and Toth, IFAC-PapersOnLine 53, 2020).
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -31,18 +31,18 @@ Integers = NDArray[np.int64]
 
 
 class FeatureFunction(NamedTuple):
-    """A function g of weighted sums."""
+    """A function g that is applied to weighted sums."""
 
     code: int
-    """Its code in the kernels."""
+    """Code of the function in the kernels."""
     of: Callable[[Float], Float]
-    """g of an array, for its values at rest."""
+    """g evaluated on an array, for its values at rest."""
 
 
 FUNCTIONS: dict[str, FeatureFunction] = {
     "tanh": FeatureFunction(TANH, np.tanh),
 }
-"""Functions by name; the name stands in files and in the names of features."""
+"""Functions by name; the name is used in files and in the names of features."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,20 +54,20 @@ class Features:
     variables
         Number of states and inputs together.
     exponents
-        int[n_monomials, variables], powers of each monomial, of degree two at least.
+        int[n_monomials, variables], powers of each monomial; its degree is at least two.
     weights
         float[n_functions, variables + 1]: feature ``g(w . v + b) - g(b)``, zero at rest, b in the last column.
     functions
         Name of g in `FUNCTIONS` for every row of ``weights``; empty if all are ``tanh``.
     limits
-        float[variables], magnitude at which monomials hold a variable; inf for none. With limits the features are bounded;
-        within them nothing changes.
+        float[variables], magnitude at which monomials clip a variable; inf for none. Limits keep the features bounded and
+        have no effect within the limits.
 
     Raises
     ------
     IdentificationError
-        On shapes that do not agree, negative powers, monomials below degree two or given twice, limits not above zero,
-        unknown functions.
+        If shapes do not agree, powers are negative, monomials are below degree two or given twice, limits are not above zero,
+        or functions are unknown.
     """
 
     variables: int
@@ -107,7 +107,7 @@ class Features:
     def monomials(
         cls, states: int, inputs: int, degrees: Iterable[int], *, of: Sequence[int] | None = None
     ) -> "Features":
-        """All monomials of the given degrees, of all states and inputs or of the variables ``of`` alone.
+        """Return all monomials of the given degrees, of all states and inputs or of the variables ``of`` alone.
 
         ``of=range(states)`` selects the states alone. Raises `IdentificationError` on a degree below two or an unknown
         variable.
@@ -126,12 +126,12 @@ class Features:
 
     @classmethod
     def none(cls, states: int, inputs: int) -> "Features":
-        """No features: a linear equation."""
+        """Return an empty set of features, for a linear equation."""
         return cls(variables=states + inputs)
 
     @classmethod
     def saturating(cls, weights: ArrayLike) -> "Features":
-        """``tanh(w . v + b) - tanh(b)`` with weights float[n_functions, n_variables + 1], b last."""
+        """Return features ``tanh(w . v + b) - tanh(b)`` with weights float[n_functions, n_variables + 1], b last."""
         array = finite_array("weights", weights, np.float64, 2)
         return cls(variables=array.shape[1] - 1, weights=array)
 
@@ -147,7 +147,7 @@ class Features:
 
     @property
     def table(self) -> Table:
-        """The features as the kernels take them."""
+        """The features in the form that the kernels use."""
         degree = int(self.exponents.sum(axis=1).max(initial=0))
         factors = np.full((len(self.exponents), degree), -1, dtype=np.int64)
         for row, powers in zip(factors, self.exponents, strict=True):
@@ -163,7 +163,7 @@ class Features:
         return self.functions or ("tanh",) * len(self.weights)
 
     def names(self, states: int) -> tuple[str, ...]:
-        """One per feature: ``x1^2 x2``, ``u1 x1``, ``tanh 1``."""
+        """Return one name per feature: ``x1^2 x2``, ``u1 x1``, ``tanh 1``."""
         variables = [f"x{j + 1}" if j < states else f"u{j + 1 - states}" for j in range(self.variables)]
         found = []
         for powers in self.exponents:
@@ -188,7 +188,7 @@ class Features:
         return np.moveaxis(found, 0, -1)
 
     def scaled(self, scale: ArrayLike) -> tuple["Features", Float]:
-        """Features of ``v / scale``, and the factors float[n_features] that turn their values into those of these features.
+        """Return features of ``v / scale``, and factors float[n_features] from their values to the values of these features.
 
         Raises `IdentificationError` unless every variable has a scale above zero.
         """
@@ -201,7 +201,7 @@ class Features:
         return replace(self, weights=weights, limits=self.limits / size), factors
 
     def bounded(self, limits: ArrayLike) -> "Features":
-        """The same features whose monomials hold variables at ``limits`` (float[n_variables])."""
+        """Return the same features with monomials that clip variables at ``limits`` (float[n_variables])."""
         return replace(self, limits=np.asarray(limits, dtype=float))
 
     def _points(self, v: ArrayLike) -> Float:
@@ -212,7 +212,7 @@ class Features:
 
 
 def with_weights(table: Table, weights: Float) -> Table:
-    """The table with other weights (float[n_functions, n_variables + 1])."""
+    """Return the table with other weights (float[n_functions, n_variables + 1])."""
     at_rest = np.empty(len(weights))
     for function in FUNCTIONS.values():
         own = table.codes == function.code

@@ -1,7 +1,7 @@
-"""From experiments to a nonlinear state-space model in one call.
+"""Identify a nonlinear state-space model from experiments in one call.
 
 Best linear approximation -> subspace -> weighted fit over frequency -> states of variance one -> fit of all parameters over
-time: the way of Paduart et al., Automatica 46, 2010, and of Scheel et al., Section 3.3.
+time: the method of Paduart et al., Automatica 46, 2010, and of Scheel et al., Section 3.3.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -52,47 +52,47 @@ def identify_pnlss(
     Parameters
     ----------
     experiments
-        Training data; what is periodic among it gives the linear start.
+        Training data; its periodic experiments give the linear start.
     states
-        Number of states: two per mode of vibration, and more for what remembers (friction, hysteresis).
+        Number of states: two per mode of vibration, and more for elements with memory (friction, hysteresis).
     degrees, output_degrees
-        Degrees of the monomials in the state and the output equation. None: 2 and 3, but none beside saturating features,
-        which take their place; in the outputs as in the states. ``()`` for none. Saturating features alone bound what is
-        added to the linear part: the model stays bounded as long as that is stable.
+        Degrees of the monomials in the state and the output equation; ``()`` for no monomials. If ``degrees`` is None: 2 and
+        3, or no monomials if there are saturating features. If ``output_degrees`` is None: as ``degrees``. With saturating
+        features alone the nonlinear contribution is bounded, and the model stays bounded if its linear part is stable.
     variables
-        What the monomials are made of: ``all`` states and inputs that vary, ``states`` alone, or the numbers of some (states
+        Variables of the monomials: ``all`` states and the inputs that vary, ``states`` alone, or indices of variables (states
         first).
     saturating
-        Number of saturating features in the state equation, or numbers in the state and the output equation; 10 to 15 do
-        for a hysteresis. With one number the output equation has as many, unless all outputs are displacements or
-        velocities: forces do not act on those at once.
+        Number of saturating features in the state equation, or numbers in the state and the output equation; 10 to 15 suffice
+        for a hysteresis. If one number is given, the output equation has as many, unless all outputs are displacements or
+        velocities, on which forces do not act instantaneously.
     state_features, output_features
-        Features of one's own, instead of those that the settings above describe; their coefficients begin at zero.
+        User-defined features, in place of those that the settings above describe; their coefficients begin at zero.
     validation
-        Data that is not trained on and chooses the iterate.
+        Data that selects the iterate and is not used for training.
     linear
-        A linear model to begin from, its states kept as they are. None: from the best linear approximation of the periodic
-        experiments, in states of variance one that are uncorrelated.
+        Initial linear model, whose states are kept. None: a model fitted to the best linear approximation of the periodic
+        experiments, with uncorrelated states of variance one.
     band_hz
         Band of the best linear approximation; None for all excited lines.
     settings
-        Of the fit over time; None for the usual ones.
+        Settings of the fit over time; None for the defaults.
     seed
-        Of the random directions in which saturating features begin: eight starts, of which the better half goes on after
-        10, 20 and 60 iterations.
+        Seed of the random initial directions of saturating features. There are eight starts; the better half continues after
+        each of 10, 20 and 60 iterations.
     progress
-        Called after every iteration of the fit over time, and of those of starts that are compared (`FitProgress.stage`).
+        Called after every iteration of the fit over time, and of the fits of compared starts (`FitProgress.stage`).
 
     Returns
     -------
     PnlssFit
-        Notes of its model say what the linear start came to, over frequency and over time, and the nonlinear model. Ctrl-C
-        gives the best there is, ``interrupted``; before there is any fit it is passed on.
+        The notes of its model give the errors of the linear start over frequency and over time, and those of the nonlinear
+        model. Ctrl-C returns the best fit so far, marked ``interrupted``; before there is a fit it raises KeyboardInterrupt.
 
     Raises
     ------
     IdentificationError
-        Where the experiments cannot be used, or do not support so many states; see `best_linear_responses`, `fit_pnlss`.
+        If the experiments cannot be used or do not support this number of states; see `best_linear_responses`, `fit_pnlss`.
     """
     chosen = FitSettings() if settings is None else settings
     if not isinstance(states, int | np.integer) or states < 1:
@@ -131,7 +131,7 @@ def identify_pnlss(
 def _parameters(
     states: int, inputs: int, outputs: int, phi: Features, chi: Features, saturating: tuple[int, int]
 ) -> int:
-    """Number of parameters, initial states left aside: refused before a linear start is looked for, which takes longer."""
+    """Number of parameters without initial states; counted before the search for a linear start, which takes longer."""
     variables = states + inputs
     inner = sum(saturating) * (variables + 1) + phi.parameters + chi.parameters
     wide, own = (variables + f.count + count for f, count in zip((phi, chi), saturating, strict=True))
@@ -139,7 +139,7 @@ def _parameters(
 
 
 def _saturating(saturating: int | tuple[int, int], outputs: Sequence[Channel]) -> tuple[int, int]:
-    """Numbers in the state and in the output equation."""
+    """Return the numbers of saturating features in the state and in the output equation."""
     if isinstance(saturating, tuple):
         counts = saturating
     else:
@@ -151,9 +151,9 @@ def _saturating(saturating: int | tuple[int, int], outputs: Sequence[Channel]) -
 
 
 def _with_scores(found: PnlssFit, begin: PnlssModel, experiments: Sequence[Experiment]) -> PnlssFit:
-    """The fit with notes on its errors, over all training data alike, and with its linear start.
+    """Return the fit with its linear start, and with notes on the errors of both over all training data.
 
-    Nothing that goes wrong here may lose the fit.
+    A failure here must not lose the fit.
     """
     notes = []
     try:
@@ -172,7 +172,7 @@ def _with_scores(found: PnlssFit, begin: PnlssModel, experiments: Sequence[Exper
 
 
 def _unstable(model: PnlssModel) -> list[str]:
-    """A note where the linear part alone is unstable: a record that holds such a model may be followed by one that does not."""
+    """Return a note if the linear part is unstable: the model may be bounded on one record and unbounded on another."""
     poles = np.linalg.eigvals(model.a)
     worst = complex(poles[int(np.argmax(np.abs(poles)))])
     if abs(worst) < 1.0:

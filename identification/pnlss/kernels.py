@@ -23,26 +23,26 @@ __all__ = [
 ]
 
 TANH = 0
-"""Code of a function g in features ``g(w . v + b) - g(b)``; `identification.pnlss.features.FUNCTIONS` declares all of them."""
+"""Code of tanh as the function g in features ``g(w . v + b) - g(b)``; codes are listed in `features.FUNCTIONS`."""
 
 
 class Table(NamedTuple):
     """Features ``phi(v)`` of ``v = (x, u)`` as arrays; see `identification.pnlss.features.Features`."""
 
     factors: np.ndarray
-    """int[n_monomials, degree], variables that are multiplied; -1 for none, after those."""
+    """int[n_monomials, degree], indices of the variables that are multiplied, followed by -1 for unused places."""
     limits: np.ndarray
-    """float[n_variables], magnitude beyond which a variable counts as that much in monomials; inf for none."""
+    """float[n_variables], magnitude at which monomials clip a variable; inf for none."""
     weights: np.ndarray
-    """float[n_functions, n_variables + 1], ``g(w . v + b) - g(b)``; b in the last column."""
+    """float[n_functions, n_variables + 1], weights w of ``g(w . v + b) - g(b)``, with b in the last column."""
     at_rest: np.ndarray
-    """float[n_functions], ``g(b)``."""
+    """float[n_functions], values ``g(b)`` at rest."""
     codes: np.ndarray
-    """int[n_functions], which g each row has."""
+    """int[n_functions], code of the function g of each row."""
 
 
 class Matrices(NamedTuple):
-    """``x(k+1) = A x + B u + E phi(x, u)``, ``y = C x + D u + F chi(x, u)``."""
+    """Matrices of ``x(k+1) = A x + B u + E phi(x, u)``, ``y = C x + D u + F chi(x, u)``."""
 
     a: np.ndarray
     b: np.ndarray
@@ -53,27 +53,27 @@ class Matrices(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Room for what a simulation works with."""
+    """Work arrays of a simulation."""
 
     v: np.ndarray
     """float[n_variables], states and inputs."""
     x: np.ndarray
     """float[n_states], the next states."""
     phi: np.ndarray
-    """float[n_state_features]."""
+    """float[n_state_features], features of the states."""
     chi: np.ndarray
-    """float[n_output_features]."""
+    """float[n_output_features], features of the outputs."""
 
 
 def workspace(m: Matrices) -> Workspace:
-    """Room for a simulation of a model with these matrices."""
+    """Return the work arrays for a simulation of a model with these matrices."""
     n = m.a.shape[0]
     return Workspace(np.empty(n + m.b.shape[1]), np.empty(n), np.empty(m.e.shape[1]), np.empty(m.f.shape[1]))
 
 
 @inner_kernel
 def within_limits(table: Table, v: np.ndarray) -> bool:
-    """Whether no variable exceeds its limit, the usual case, in which none has to be held."""
+    """Return whether no variable exceeds its limit, the usual case, in which none has to be clipped."""
     for j in range(v.size):  # noqa: SIM110 (numba compiles no generators)
         if abs(v[j]) > table.limits[j]:
             return False
@@ -82,19 +82,19 @@ def within_limits(table: Table, v: np.ndarray) -> bool:
 
 @inner_kernel
 def function_value(code: int, s: float) -> float:
-    """``g(s)`` of the function g with this code. A further function is a branch ``if code == ...`` ahead of tanh."""
+    """Return ``g(s)`` for the function g with this code. To add a function, add a branch ``if code == ...`` ahead of tanh."""
     return float(np.tanh(s))
 
 
 @inner_kernel
 def function_slope(code: int, s: float, value: float) -> float:
-    """``g'(s)``, given ``value = g(s)``; branches as in `function_value`."""
+    """Return ``g'(s)``, given ``value = g(s)``; branches as in `function_value`."""
     return 1.0 - value**2
 
 
 @inner_kernel
 def weighted_sum(table: Table, i: int, v: np.ndarray) -> float:
-    """``w . v + b`` of row ``i`` of the weights."""
+    """Return ``w . v + b`` of row ``i`` of the weights."""
     total = table.weights[i, v.size]
     for j in range(v.size):
         total += table.weights[i, j] * v[j]
@@ -125,9 +125,9 @@ def feature_values(table: Table, v: np.ndarray, phi: np.ndarray) -> None:
 def feature_derivatives(table: Table, v: np.ndarray, slope: np.ndarray, steep: np.ndarray) -> None:
     """Write the derivatives of the features at ``v``.
 
-    ``slope`` (float[n_features, n_variables]) are those with respect to v. ``steep`` (float[n_functions, 2]) receives ``g'`` of
-    each weighted sum at its argument and at its bias: the derivative by weight j is ``steep[0] v_j``, by the bias ``steep[0] -
-    steep[1]``.
+    ``slope`` (float[n_features, n_variables]) receives the derivatives with respect to v. ``steep`` (float[n_functions, 2])
+    receives ``g'`` of each weighted sum at its argument and at its bias: the derivative with respect to weight j is
+    ``steep[0] v_j``, with respect to the bias ``steep[0] - steep[1]``.
     """
     count, degree = table.factors.shape
     slope[:] = 0.0

@@ -1,6 +1,6 @@
-"""The linear model from which the fit of a nonlinear one starts: from experiments, or given and checked.
+"""Initial linear model of a nonlinear fit: identified from experiments, or given and checked.
 
-From experiments it takes four steps: responses, subspace, weighted fit over frequency, states of variance one.
+The identification takes four steps: responses, subspace, weighted fit over frequency, states of variance one.
 """
 
 from collections.abc import Sequence
@@ -30,24 +30,24 @@ __all__ = [
 Float = NDArray[np.float64]
 
 _FIRST_ITERATIONS = 20
-"""Iterations of every candidate; the fit continues with the best."""
+"""Number of iterations for every candidate; the fit continues with the best."""
 _EDGE = 1.0 - 1e-6
 """Largest magnitude of an eigenvalue after reflection."""
 _HARDLY = 2e-3
 _DEPENDENT = 1e-12
-"""Variance of a combination of states, relative to the largest, below which the inputs do not move it."""
+"""Relative variance of a combination of states below which the inputs do not excite it."""
 
 
 def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate_hz: float) -> StateSpaceFit:
-    """Stable model with this number of states: the best of several subspace models (block rows differ), each fitted.
+    """Fit a stable model with this number of states: the best of several fits that start from different subspace models.
 
-    Weights are relative. The covariance over realisations is not used: it comes from nonlinear distortion, which the outputs
-    have in common. Its inverse puts most weight on combinations of outputs that hardly scatter, which a linear model of few
-    states cannot follow, and resonances of a nonlinear specimen are lost (virtual magnet beam at 2.6 N: misfit 0.94 against
-    0.08).
+    The subspace models differ in their number of block rows. Weights are relative. The covariance over realisations is not
+    used, because it comes from nonlinear distortion that is common to all outputs. Its inverse puts most weight on
+    combinations of outputs with little scatter, which a linear model of few states cannot represent, and the fit misses
+    resonances of a nonlinear specimen (virtual magnet beam at 2.6 N: residual 0.94 instead of 0.08).
 
-    The eigenvalues of an unstable subspace model are reflected at the unit circle first. Raises `IdentificationError` if the
-    lines are too few or too close together for this number of states, or no candidate is found.
+    The eigenvalues of an unstable subspace model are reflected at the unit circle first. Raises `IdentificationError` if
+    there are too few lines, or lines too close together, for this number of states, or if no candidate is found.
     """
     if states < 1:
         raise IdentificationError(f"states: is {states}, needs at least 1")
@@ -70,7 +70,7 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
 
 
 def _block_rows(responses: FrequencyResponseMatrix, states: int, sample_rate_hz: float) -> list[int]:
-    """Numbers of block rows to try, from the fewest that the states need to the most that the lines can resolve."""
+    """Return the numbers of block rows to try, from the fewest that the states need to the most that the lines can resolve."""
     lines, outputs, inputs = responses.value.shape
     z = np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz)
     fewest = -(-states // outputs) + 1
@@ -88,7 +88,7 @@ def _block_rows(responses: FrequencyResponseMatrix, states: int, sample_rate_hz:
 
 
 def reflected(model: StateSpace) -> StateSpace:
-    """The model with eigenvalues outside the unit circle reflected into it (1 / conj), frequencies unchanged."""
+    """Return the model with eigenvalues outside the unit circle reflected into it (1 / conj), frequencies unchanged."""
     if spectral_radius(model.a) < 1.0:
         return model
     values, vectors = np.linalg.eig(model.a)
@@ -98,10 +98,10 @@ def reflected(model: StateSpace) -> StateSpace:
 
 
 def with_independent_states(model: PnlssModel, experiments: Sequence[Experiment]) -> PnlssModel:
-    """A linear model in states of variance one, uncorrelated under the inputs of the experiments.
+    """Transform a linear model to states of variance one that are uncorrelated under the inputs of the experiments.
 
-    The remaining freedom, a rotation, makes the observability Gramian diagonal, largest first: input-balanced for the actual
-    inputs. Powers of such states depend on each other as little as possible.
+    The remaining rotation makes the observability Gramian diagonal, largest first: the model is input-balanced for the actual
+    inputs. Powers of such states are as independent as possible.
     """
     states = np.hstack([model.simulate(e.inputs).states[:, e.counted_from :] for e in experiments])
     variance, directions = np.linalg.eigh(states @ states.T / states.shape[1])
@@ -124,14 +124,14 @@ def with_independent_states(model: PnlssModel, experiments: Sequence[Experiment]
 def hardly_seen_states(model: PnlssModel, experiments: Sequence[Experiment]) -> int:
     """Number of states (`with_independent_states`) that contribute less than 0.002 of the first state's share to the outputs.
 
-    Such states follow noise or a misfit: further modes of measured structures contributed 0.01 and more.
+    Such states model noise or systematic errors; true further modes of measured structures contributed 0.01 and more.
     """
     seen = np.diag(_observability(model, experiments))
     return int(np.count_nonzero(seen < _HARDLY**2 * np.max(seen)))
 
 
 def _observability(model: PnlssModel, experiments: Sequence[Experiment]) -> Float:
-    """Observability Gramian, outputs over their RMS."""
+    """Observability Gramian, with outputs scaled by their RMS."""
     weight = 1.0 / np.sqrt(np.mean(np.hstack([e.counted_outputs for e in experiments]) ** 2, axis=1))
     seen = (model.c * weight[:, None]).T @ (model.c * weight[:, None])
     return np.asarray(solve_discrete_lyapunov(model.a.T, seen))
@@ -144,10 +144,10 @@ def linear_pnlss(
     linear: StateSpace | PnlssModel | None = None,
     band_hz: tuple[float, float] | None = None,
 ) -> PnlssModel:
-    """The linear model from which a fit starts, with notes on its accuracy.
+    """Return the initial linear model of a fit, with notes on its accuracy.
 
-    Constant inputs take no part in the best linear approximation; the fit over time finds their effect. Parameters and
-    errors are those of `identify_pnlss`.
+    Constant inputs are not part of the best linear approximation; the fit over time identifies their effect. Parameters and
+    raised errors are those of `identify_pnlss`.
     """
     same_channels(experiments)
     first = experiments[0]
@@ -190,13 +190,13 @@ def linear_pnlss(
 
 
 def varying_inputs(experiments: Sequence[Experiment]) -> list[int]:
-    """Numbers of the inputs that are not constant; all if all are constant, which a later check refuses."""
+    """Return the indices of the inputs that are not constant; all if all are constant, which a later check refuses."""
     low, high = (f([f(e.inputs, axis=1) for e in experiments], axis=0) for f in (np.min, np.max))
     return [int(i) for i in np.flatnonzero(low < high)] or list(range(low.size))
 
 
 def _given(linear: StateSpace | PnlssModel, first: Experiment, states: int) -> PnlssModel:
-    """A linear model from outside, checked."""
+    """Return a linear model given by the user, after checks."""
     matrices = linear.linear_part if isinstance(linear, PnlssModel) else linear
     n, m, outputs = states, len(first.input_channels), len(first.output_channels)
     for name, part, shape in zip("abcd", matrices, ((n, n), (n, m), (outputs, n), (outputs, m)), strict=True):

@@ -1,14 +1,15 @@
-"""Many models at once: choice of their training, validation and test data, and one job each, in processes or on a cluster.
+"""Identify many models: choose their training, validation and test data, and run one job each, in processes or on a cluster.
 
-The work goes through joblib, whose backend is the user's choice in one line::
+The work goes through joblib, whose backend the user selects in one line::
 
     from joblib import parallel_config
+
     with parallel_config(backend="dask"):
         for model in identify_many(jobs, partial(identify_pnlss, states=2)):
             ...
 
-A fit is mostly small matrices and compiled loops on one core, so that models in parallel gain more than BLAS threads
-within one: ``parallel_config("loky", inner_max_num_threads=1)`` avoids that both compete for cores.
+A fit consists mostly of small matrices and compiled loops on one core. Models in parallel therefore gain more than BLAS
+threads within a model; ``parallel_config("loky", inner_max_num_threads=1)`` keeps the two from competing for cores.
 """
 
 import time
@@ -39,13 +40,13 @@ class ModelJob:
     name
         Name of the model, unique within a study.
     training_set
-        The level at which it is trained, or ``mixed``.
+        The level at which the model is trained, or ``mixed``.
     training
         Experiments that are fitted.
     validation
-        Experiments that choose the iterate and are not fitted.
+        Experiments that select the iterate and are not fitted.
     left_out
-        Experiments that the identification never sees; they give the same-level error.
+        Experiments that the identification does not use; they give the same-level error.
     """
 
     name: str
@@ -55,7 +56,7 @@ class ModelJob:
     left_out: tuple[Experiment, ...]
 
     def seen(self, experiment: Experiment) -> bool:
-        """Whether the identification uses the samples of this experiment, for training or validation."""
+        """Return whether the identification uses the samples of this experiment, for training or validation."""
         return any(same_data(experiment, own) for own in (*self.training, *self.validation))
 
 
@@ -68,34 +69,35 @@ def realisation_combinations(
     beside: Sequence[Experiment] = (),
     beside_validation: Sequence[Experiment] = (),
 ) -> tuple[ModelJob, ...]:
-    """Jobs of different combinations of the realisations of each level, and of all levels together.
+    """Return jobs with different combinations of the realisations of each level, and of all levels together.
 
     Every model leaves one realisation out for its test and is identified from all others (four of five, nine of ten, as in
-    Scheel et al., Section 3.3), one of which chooses the iterate and is not fitted. The paper does not say how five
-    realisations give twenty models; there are just twenty ordered pairs of a realisation left out and one that chooses (ninety
-    of ten realisations, of which the paper used thirty). So model k of R realisations leaves out ``k mod R``; after every R
-    models the choosing realisation moves on by one. The first R models leave out different realisations, and all ``R (R - 1)``
-    models differ.
+    Scheel et al., Section 3.3). One of these others selects the iterate and is not fitted. The paper does not state how five
+    realisations give twenty models, but there are exactly twenty ordered pairs of a realisation left out and one that selects
+    (ninety for ten realisations, of which the paper used thirty). Model k of R realisations therefore leaves out ``k mod R``,
+    and after every R models the selecting realisation advances by one. The first R models leave out different realisations,
+    and all ``R (R - 1)`` models differ.
 
     Parameters
     ----------
     levels
         Realisations by level, from the lowest level to the highest.
     models
-        Number of models of each training set, or one number for each name, ``mixed`` among them; 0 for none.
+        Number of models of each training set, or numbers by the names of training sets, including ``mixed``; 0 for none.
     mixed
         Whether there is a training set ``mixed`` of all levels, whose model k takes combination k of each level.
     most
-        Largest number of realisations of each level that a model is fitted to, to save time: those that follow the choosing
-        one. None for all.
+        Largest number of realisations per level to which a model is fitted, to save time; those after the selecting
+        realisation are used. None for all.
     beside, beside_validation
-        Further experiments that every model fits, such as backbone segments, and further ones that help to choose its
-        iterate. Without the latter, realisations of a low level choose an iterate that ignores segments of high level.
+        Further experiments to which every model is fitted, such as backbone segments, and further ones that help to select
+        its iterate. Without the latter, realisations of a low level would select an iterate regardless of high-level
+        segments.
 
     Raises
     ------
     IdentificationError
-        With fewer than three realisations, none to be fitted, more models than combinations, a level called ``mixed``, no
+        If there are fewer than three realisations, none to fit, more models than combinations, a level called ``mixed``, no
         level or no model.
     """
     if most is not None and most < 1:
@@ -133,7 +135,7 @@ def realisation_combinations(
 
 
 def _job(training_set: str, members: Mapping[str, Sequence[Experiment]], k: int, most: int | None) -> ModelJob:
-    """Job of combination k of the realisations of every level."""
+    """Return the job of combination k of the realisations of every level."""
     training: list[Experiment] = []
     validation: list[Experiment] = []
     left_out: list[Experiment] = []
@@ -161,13 +163,13 @@ class IdentifiedModel(Generic[Fit]):
     Parameters
     ----------
     name, training_set
-        Those of the job.
+        Name and training set of the job.
     fit
         The result; None if the identification failed.
     reason
         Why it failed; empty if it did not.
     seconds
-        Wall time of the job where it ran.
+        Wall time of the job.
     """
 
     name: str
@@ -187,11 +189,11 @@ def identify_many(
 ) -> Iterator[IdentifiedModel[Fit]]:
     """Yield the models of all jobs in the order in which they finish.
 
-    ``identify`` is called as ``identify(training, validation=...)`` with the job's experiments, in another process where
-    there are several: `identification.identify_pnlss` with all else bound by `functools.partial`. ``n_jobs`` as in
-    joblib: a number of workers, -1 for all cores; None for what `joblib.parallel_config` says, else 1. Jobs whose names are
-    in ``done`` are skipped, so that an interrupted study can be continued from its stored results. ``progress``
-    is called with each result, the number of those finished and that of all.
+    ``identify`` is called as ``identify(training, validation=...)`` with the job's experiments, in another process if there
+    are several workers. It is usually `identification.identify_pnlss` with its other arguments bound by `functools.partial`.
+    ``n_jobs`` is the number of workers as in joblib: -1 for all cores; None for the setting of `joblib.parallel_config`, else
+    1. Jobs whose names are in ``done`` are skipped, so that an interrupted study can be continued from its stored results.
+    ``progress`` is called with each result, the number of finished jobs and the number of all jobs.
 
     A failed job gives a result with its reason, and the others continue. After Ctrl-C, or if the iterator is closed early,
     jobs that have not started are dropped. Raises `IdentificationError` if two jobs have the same name.
@@ -203,7 +205,7 @@ def identify_many(
         raise IdentificationError(f"jobs: the name '{twice}' is there twice")
     left = [job for job in given if job.name not in done]
     calls = (delayed(_outcome)(identify, job) for job in left)
-    # A worker holds the job it works on and one more, and results leave as they come: memory does not grow with the study.
+    # A worker holds its present job and one more, and results are yielded at once: memory does not grow with the study.
     found = Parallel(n_jobs=n_jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)(calls)
     for count, result in enumerate(found, len(given) - len(left) + 1):
         if progress is not None:

@@ -1,4 +1,4 @@
-"""Nonlinear state-space models in discrete time, polynomial ones (PNLSS) first.
+"""Nonlinear state-space models in discrete time, in particular polynomial ones (PNLSS).
 
     x(k+1) = A x(k) + B u(k) + E phi(x(k), u(k)),    y(k) = C x(k) + D u(k) + F chi(x(k), u(k)),
 
@@ -40,9 +40,9 @@ class PnlssModel:
     c, d, f
         float[n_outputs, n_states], float[n_outputs, n_inputs], float[n_outputs, n_output_features].
     state_features, output_features
-        phi and chi.
+        Features phi of the state equation and chi of the output equation.
     sample_rate_hz
-        Rate of the model.
+        Sample rate of the model.
     inputs, outputs
         Input and output channels.
     state_range, input_range
@@ -54,12 +54,12 @@ class PnlssModel:
     specimen
         Name of the test specimen.
     notes
-        What a user should know about the model, one line each.
+        Remarks on the model, one line each.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf in the matrices, and shapes that do not agree.
+        If the matrices have NaN or infinite entries, or shapes do not agree.
     """
 
     a: Float
@@ -119,7 +119,7 @@ class PnlssModel:
         specimen: str = "",
         notes: tuple[str, ...] = (),
     ) -> "PnlssModel":
-        """A linear model, without any features."""
+        """Create a linear model, without any features."""
         n, m = matrices.b.shape
         none = Features.none(n, m)
         return cls(
@@ -144,21 +144,21 @@ class PnlssModel:
 
     @property
     def linear_part(self) -> StateSpace:
-        """A, B, C and D."""
+        """The matrices A, B, C and D."""
         return StateSpace(self.a, self.b, self.c, self.d)
 
     @property
     def matrices(self) -> Matrices:
-        """The matrices as the kernels take them."""
+        """The matrices in the form that the kernels use."""
         return Matrices(*(np.ascontiguousarray(getattr(self, name)) for name in MATRICES))
 
     @property
     def nonlinear_coefficients(self) -> int:
-        """Coefficients in E and F."""
+        """Number of coefficients in E and F."""
         return int(self.e.size + self.f.size)
 
     def with_features(self, state_features: Features, output_features: Features | None = None) -> "PnlssModel":
-        """The same linear part with features whose coefficients are zero; none in the outputs if not given."""
+        """Return the linear part with features whose coefficients are zero; no output features if not given."""
         chi = Features.none(self.states, len(self.inputs)) if output_features is None else output_features
         return replace(
             self,
@@ -169,7 +169,7 @@ class PnlssModel:
         )
 
     def scaled(self, *, states: ArrayLike, inputs: ArrayLike, outputs: ArrayLike) -> "PnlssModel":
-        """The same model of ``x / states``, ``u / inputs``, ``y / outputs`` (one scale above zero for each)."""
+        """Return the same model for ``x / states``, ``u / inputs``, ``y / outputs`` (one scale above zero for each)."""
         sx, su, sy = (np.asarray(values, dtype=float) for values in (states, inputs, outputs))
         variables = np.concatenate([sx, su])
         phi, of_phi = self.state_features.scaled(variables)
@@ -189,10 +189,10 @@ class PnlssModel:
         )
 
     def bounded(self, factor: float = 1.0) -> "PnlssModel":
-        """The same model whose monomials hold every variable at ``factor`` times its trained range.
+        """Return the same model with monomials that clip every variable at ``factor`` times its trained range.
 
         Inside the trained range the model is unchanged. Beyond it the features stay finite, so a simulation stays bounded if
-        the linear part is stable; it need not be accurate. Raises `IdentificationError` where the range is unknown.
+        the linear part is stable; it need not be accurate. Raises `IdentificationError` if the range is unknown.
         """
         limits = positive("factor", factor) * np.concatenate([self.state_range, self.input_range])
         if not np.all(np.isfinite(limits)):
@@ -204,10 +204,10 @@ class PnlssModel:
         )
 
     def simulate(self, inputs: ArrayLike, *, initial_state: ArrayLike | None = None) -> Simulation:
-        """Response to ``inputs`` (float[n_inputs, n]) from an initial state (float[n_states]; rest if None).
+        """Simulate the response to ``inputs`` (float[n_inputs, n]) from an initial state (float[n_states]; rest if None).
 
         A simulation that becomes unbounded ends at that sample, and `Simulation.unbounded_at` records it. Raises
-        `IdentificationError` on NaN or inf, and on shapes that do not agree.
+        `IdentificationError` if values are NaN or infinite, or shapes do not agree.
         """
         u = finite_array("inputs", inputs, np.float64, 2)
         if u.shape[0] != len(self.inputs):
@@ -234,10 +234,10 @@ class PnlssModel:
         return np.where(np.isfinite(self.state_range) & (self.state_range > 0.0), _UNBOUNDED * self.state_range, 1e100)
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         return model_arrays(vars(self))
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "PnlssModel":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
         return cls(**model_values(arrays, attributes))

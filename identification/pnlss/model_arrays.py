@@ -1,4 +1,4 @@
-"""Fields of a nonlinear state-space model as arrays and attributes for a file, and back."""
+"""Convert the fields of a nonlinear state-space model to arrays and attributes for a file, and back."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,7 +17,7 @@ _PARTS = ("exponents", "weights", "limits")
 
 
 def model_arrays(fields: Mapping[str, Any]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Arrays by name and attributes (ready for JSON) from the fields of a `PnlssModel` by name."""
+    """Return arrays by name and JSON-able attributes from the fields of a `PnlssModel` by name."""
     arrays: dict[str, NDArray[Any]] = {name: fields[name] for name in (*MATRICES, "state_range", "input_range")}
     for name in _FEATURES:
         arrays |= {f"{name}/{part}": getattr(fields[name], part) for part in _PARTS}
@@ -35,7 +35,7 @@ def model_arrays(fields: Mapping[str, Any]) -> tuple[dict[str, NDArray[Any]], di
 
 
 def model_values(arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Inverse of `model_arrays`: fields of a `PnlssModel`; raises `IdentificationError` if something is missing."""
+    """Invert `model_arrays`: return fields of a `PnlssModel`; raise `IdentificationError` if something is missing."""
     try:
         values: dict[str, Any] = {name: arrays[name] for name in (*MATRICES, "state_range", "input_range")}
         variables = int(values["a"].shape[0] + values["b"].shape[1])

@@ -1,8 +1,8 @@
-"""Where models with saturating features begin, whose weights no linear model tells: random directions, several tries.
+"""Random starts for models with saturating features, whose weights no linear model determines.
 
-The fit is not convex in the weights. Starts end some dB apart from each other, one in ten far off, and which those are shows
-early: so several begin, and every few iterations the better half of them goes on (successive halving: Jamieson and Talwalkar,
-AISTATS 2016).
+The fit is not convex in the weights. Fits from different starts end some dB apart, one in ten far off, and the bad ones show
+early. Several fits are therefore begun, and every few iterations only the better half continues (successive halving: Jamieson
+and Talwalkar, AISTATS 2016).
 """
 
 from collections.abc import Callable, Sequence
@@ -24,9 +24,9 @@ Float = NDArray[np.float64]
 
 STARTS = 8
 _ROUNDS = (10, 20, 60)
-"""Iterations after which the better half of the starts goes on, counted from the beginning."""
+"""Numbers of iterations, counted from the beginning, after which only the better half of the starts continues."""
 _COEFFICIENT = 0.03
-"""Of what is fed back, relative to the RMS of the state or output: near the linear model, but weights count from the first."""
+"""Initial coefficients relative to the RMS of the state or output: near the linear model, but weights matter from the first."""
 
 
 def random_start(
@@ -37,9 +37,10 @@ def random_start(
     counts: tuple[int, int],
     random: np.random.Generator,
 ) -> PnlssModel:
-    """The linear model with the features of ``phi`` and ``chi`` and so many saturating ones more in each equation.
+    """Return the linear model with the features ``phi`` and ``chi`` and ``counts`` additional saturating ones in each equation.
 
-    Weights and biases are normal, of deviation one for variables of RMS one. Coefficients of the features given are zero.
+    Weights and biases are drawn from a normal distribution with standard deviation one for variables of RMS one. Coefficients
+    of the features ``phi`` and ``chi`` are zero.
     """
     states = np.hstack([linear.simulate(e.inputs).states[:, e.counted_from :] for e in experiments])
     inputs, outputs = (np.hstack([getattr(e, name) for e in experiments]) for name in ("inputs", "counted_outputs"))
@@ -63,9 +64,9 @@ def best_of_starts(
     settings: FitSettings,
     progress: Callable[[FitProgress], None] | None = None,
 ) -> tuple[PnlssModel, PnlssFit]:
-    """The start that is left when the worse half has been dropped several times, and its fit so far.
+    """Return the start that is left after dropping the worse half several times, and its fit so far.
 
-    An interrupt ends it with the best so far, or is passed on where there is none.
+    After an interrupt, returns the best fit so far, or raises KeyboardInterrupt if there is none.
     """
     fits: dict[int, PnlssFit] = {}
     left = list(range(len(starts)))
@@ -96,7 +97,7 @@ def best_of_starts(
 
 
 def interrupted(fit: PnlssFit) -> PnlssFit:
-    """The same, as one that was stopped from outside."""
+    """Return the fit, marked as interrupted."""
     return replace(fit, interrupted=True, stopped="interrupted")
 
 

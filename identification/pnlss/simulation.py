@@ -19,12 +19,12 @@ class Simulation:
     outputs
         float[n_outputs, n]; NaN from ``unbounded_at`` on.
     states
-        float[n_states, n], each before its sample's input acts; NaN from ``unbounded_at`` on.
+        float[n_states, n], states before the input of each sample acts; NaN from ``unbounded_at`` on.
     state_use, input_use
-        float[n_states], float[n_inputs]: largest magnitude over the largest in the training data; NaN where that is
-        unknown or zero. Above one the model extrapolates, which polynomials do badly.
+        float[n_states], float[n_inputs]: largest magnitude over the largest in the training data; NaN where that is unknown
+        or zero. Above one the model extrapolates, for which polynomials are unsuited.
     unbounded_at
-        First sample at which states or outputs left all bounds; None if they never did.
+        First sample at which states or outputs are unbounded; None if there is none.
     """
 
     outputs: Float

@@ -1,1 +1,1 @@
-"""Predictions from nonlinear modes: steady responses, sweeps, and their comparison with measurements."""
+"""Predictions from nonlinear modes: steady responses and sweeps, and their comparison with measurements."""

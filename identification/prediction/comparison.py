@@ -1,4 +1,4 @@
-"""How far predictions are from what was measured, or computed by other means: one row per response or sweep."""
+"""Compare predictions with measurements or other computations: one row of errors per response or sweep."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,21 +21,21 @@ Over = Literal["frequency", "phase"]
 
 @dataclass(frozen=True)
 class PredictionError:
-    """Errors of one predicted response or sweep; every error is relative: predicted over reference, minus one.
+    """Relative errors of one predicted response or sweep: predicted over reference, minus one.
 
     Parameters
     ----------
     name
-        What was predicted.
+        Name of the prediction.
     peak_error, peak_frequency_error
-        Of the largest amplitude, and of the frequency at which it occurs; NaN where the prediction was cut off before it.
+        Errors of the largest amplitude and of its frequency; NaN if the prediction was cut off before it.
     envelope_error
-        RMS of the difference of the amplitudes over the common part of both, over the reference's largest amplitude.
+        RMS difference of the amplitudes in the common range of both, over the largest amplitude of the reference.
     range_use
-        Largest modal amplitude of the prediction, or states, over the largest that the model was identified with; NaN
-        where that is unknown.
+        Largest modal amplitude, or largest states, of the prediction over the largest in the identification; NaN if that is
+        unknown.
     notes
-        What a user should know about this comparison, one line each.
+        Remarks on this comparison, one line each.
     """
 
     name: str
@@ -47,7 +47,7 @@ class PredictionError:
 
     @property
     def verdict(self) -> str:
-        """Whether the model was asked about what it was identified with."""
+        """Whether the prediction is within the identified range of the model, extrapolated or unbounded, in words."""
         if np.isnan(self.range_use):
             return "identified range unknown"
         if self.range_use == np.inf:
@@ -57,7 +57,7 @@ class PredictionError:
         return "extrapolated" if self.range_use <= FLAGGED_BEYOND else "extrapolated far"
 
     def row(self) -> dict[str, float | str | list[str] | None]:
-        """The errors by name, verdict included, ready for JSON: peak errors are None where there are none."""
+        """Return the errors and the verdict by name, JSON-able; peak errors are None if unknown."""
         return {
             "name": self.name,
             "peak_error": None if np.isnan(self.peak_error) else self.peak_error,
@@ -70,7 +70,7 @@ class PredictionError:
 
 
 def error_table(errors: Iterable[PredictionError]) -> str:
-    """Plain-text table, one line per prediction, errors in percent; raises `IdentificationError` if there are none."""
+    """Format a plain-text table, one line per prediction, errors in percent; raise `IdentificationError` if there are none."""
     rows = list(errors)
     if not rows:
         raise IdentificationError("errors: is empty, needs at least one comparison")
@@ -90,14 +90,14 @@ def error_table(errors: Iterable[PredictionError]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A predicted response beside its reference.
+    """A predicted response and its reference.
 
     Parameters
     ----------
     error
         The errors, as a row of a table.
     reference
-        What it was compared with.
+        The response with which it was compared.
     predicted_amplitude
         float[n], predicted peak amplitude at each point of the reference, in the unit of its response; NaN where the
         prediction has none.
@@ -116,27 +116,27 @@ def compare(
     over: Over = "frequency",
     phase_window_deg: float = 90.0,
 ) -> Comparison:
-    """Errors of a predicted frequency response against a measured, or otherwise computed, one.
+    """Compare a predicted frequency response with a measured or otherwise computed one.
 
     Parameters
     ----------
     prediction
         The prediction.
     reference
-        What it is held against: amplitudes in its unit, at the frequencies or phase lags of its points.
+        The reference; amplitudes are compared in its unit, at the frequencies or phase lags of its points.
     channel
-        Predicted channel that belongs to the response; the drive point if None.
+        Predicted channel that corresponds to the response; the drive point if None.
     over
-        ``frequency``: at each frequency of the reference the stable prediction; where there are two, the nearer one. A
-        response to the recorded force is compared point by point, unstable states included.
-        ``phase``: at each phase lag of the reference, which tells all branches apart, unstable ones included.
+        ``frequency``: the stable prediction at each frequency of the reference; of two, the one nearer to the reference. A
+        response to the recorded force is compared point by point, unstable states included. ``phase``: the prediction at each
+        phase lag of the reference; the phase distinguishes all branches, including unstable ones.
     phase_window_deg
-        Only points of the reference whose lag is within this of 90 degrees count for the envelope error.
+        Only points of the reference whose lag differs by at most this from 90 degrees count in the envelope error.
 
     Raises
     ------
     IdentificationError
-        If the two have no point in common, or the channel was not predicted.
+        If prediction and reference have no point in common, or the channel was not predicted.
     """
     if over not in get_args(Over):
         raise IdentificationError(f"over: is '{over}', allowed are {', '.join(get_args(Over))}")
@@ -182,7 +182,7 @@ def compare(
 
 
 def _at_lags(prediction: SteadyPrediction, amplitude: Float, channel: str | None, lag_deg: Float) -> Float:
-    """Amplitudes of the main branch at phase lags; NaN outside."""
+    """Return the amplitudes of the main branch at phase lags; NaN outside its range."""
     main = prediction.branch == 0
     lag = prediction.phase_lag_deg(channel)[main]
     order = np.argsort(lag, kind="stable")
@@ -190,7 +190,7 @@ def _at_lags(prediction: SteadyPrediction, amplitude: Float, channel: str | None
 
 
 def _at_frequencies(prediction: SteadyPrediction, amplitude: Float, reference: FrequencyResponse) -> Float:
-    """Stable amplitudes at the reference's frequencies, the nearer one to its amplitude; NaN where there is none."""
+    """Return stable amplitudes at the frequencies of the reference; of two, the nearer to it; NaN if there is none."""
     measured = np.abs(reference.response)
     best = np.full(measured.size, np.nan)
     frequency, stable = prediction.frequency_hz, prediction.stable

@@ -5,12 +5,12 @@ With ``s = i W``, the voltage V at the amplifier's input, the displacements X_d 
     F = g_e V - Z X_a,    X_a = X_d + r_s F,    r_s = (1 / k_s) / (1 + s T),
     g_e = g / (1 + s tau),    Z = s^2 m + s c + k + s b / (1 + s tau),
 
-g the force per volt of the blocked exciter at low frequency (amplifier gain times G / R), tau = L / R the coil's time
-constant, m moving mass, c and k suspension, b = G^2 / R what the back-EMF damps, 1 / k_s the stinger's compliance, T its
-damping over its stiffness. A current amplifier is the case b = 0.
+with g the force per volt of the blocked exciter at low frequency (amplifier gain times G / R), tau = L / R the time constant
+of the coil, m the moving mass, c and k damping and stiffness of the suspension, b = G^2 / R the damping by back-EMF, 1 / k_s
+the compliance of the stinger, and T its damping over its stiffness. For a current amplifier b = 0.
 
-The voltage that a recording holds is a number given to a converter, and the inputs have filters of their own.
-`VoltagePath` says what becomes of it.
+The recorded voltage is the number sent to a converter, and the inputs that measure force and motion have filters.
+`VoltagePath` models the path from this number to the amplifier.
 """
 
 from collections.abc import Mapping
@@ -43,19 +43,19 @@ PARAMETERS = (
 
 @dataclass(frozen=True)
 class VoltagePath:
-    """From the recorded voltage to the one at the amplifier, as inputs with their filters show it.
+    """Transfer factor from the recorded voltage to the voltage at the amplifier, relative to the filtered inputs.
 
-    A number held for a sampling interval T weakens line f by ``sinc(f T)`` and comes half a sample late. A recording pairs
-    inputs with the voltage that was on the converter only up to whole samples of latency; the rest, the delay of anti-alias
-    filters and what the images of the held output fold into the readings are one delay D at low frequency, with a first
-    correction. Force and motion have the coupling of their conditioners in common, which the voltage has not:
+    The zero-order hold of a sampling interval T attenuates line f by ``sinc(f T)`` and delays it by half a sample. A
+    recording compensates the latency between voltage and inputs only by whole samples. The remaining latency, the delay of
+    anti-aliasing filters, and the aliases of the images of the held output act at low frequency as one delay D with a first
+    correction. Force and motion pass the same AC coupling of their conditioners, the voltage does not:
 
         factor = sinc(f T) exp(-s D + s^3 D_3) s / (s + 2 pi f_c).
 
     Parameters
     ----------
     sample_rate_hz
-        Rate of the converter; infinite where the voltage was measured at the amplifier.
+        Sample rate of the converter; infinite if the voltage was measured at the amplifier.
     delay_s, dispersion_s3
         D and D_3.
     coupling_hz
@@ -84,7 +84,7 @@ class VoltagePath:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Exciter:
-    """Amplifier, exciter and stinger of one rig; see the module's head for the equations.
+    """Amplifier, exciter and stinger of one rig; the module docstring has the equations.
 
     Parameters
     ----------
@@ -101,22 +101,22 @@ class Exciter:
     stinger_damping_time_s
         T; zero for one without damping.
     covariance
-        float[8, 8], of the parameters in the order of `PARAMETERS`; zero where a value was given, NaN if unknown.
+        float[8, 8], covariance of the parameters in the order of `PARAMETERS`; zero where a value was given, NaN if unknown.
     lowest_hz, highest_hz
-        Band that the parameters were found in.
+        Band in which the parameters were identified.
     fit_residual
-        Root of the mean square of misfit over expected error; 1 where nothing but noise is left; NaN if unknown.
+        RMS of residual over expected error; 1 if only noise is left; NaN if unknown.
     path
-        What becomes of a recorded voltage.
+        Path of a recorded voltage to the amplifier.
     source
-        Rig and exciter that the parameters belong to; they hold for no other.
+        Rig and exciter of the parameters, which are not valid for any other.
     notes
-        What a user should know about these numbers, one line each.
+        Remarks on the quality of the parameters, one line each.
 
     Raises
     ------
     IdentificationError
-        On a value that is not finite, a force per volt that is zero, a covariance of another shape.
+        If a value is not finite, the force per volt is zero, or the covariance has a wrong shape.
     """
 
     force_per_volt_n_v: float
@@ -160,29 +160,29 @@ class Exciter:
         return dict(zip(PARAMETERS, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
 
     def force_per_volt(self, s: ArrayLike) -> Complex:
-        """complex, like ``s`` (rad/s): ``g_e``, N/V, of the blocked exciter."""
+        """complex, like ``s`` (rad/s): force per volt ``g_e`` of the blocked exciter, N/V."""
         return np.asarray(self.force_per_volt_n_v / (1.0 + np.asarray(s) * self.coil_time_constant_s))
 
     def dynamic_stiffness(self, s: ArrayLike) -> Complex:
-        """complex, like ``s`` (rad/s): ``Z``, N/m, force that the armature's displacement takes away."""
+        """complex, like ``s`` (rad/s): dynamic stiffness ``Z``, N/m, the force lost per armature displacement."""
         s = np.asarray(s, dtype=np.complex128)
         back_emf = self.back_emf_damping_n_s_m / (1.0 + s * self.coil_time_constant_s)
         mechanical = (s * self.moving_mass_kg + self.suspension_damping_n_s_m) * s + self.suspension_stiffness_n_m
         return np.asarray(mechanical + s * back_emf)
 
     def stinger_compliance(self, s: ArrayLike) -> Complex:
-        """complex, like ``s`` (rad/s): ``r_s``, m/N, what the stinger gives way."""
+        """complex, like ``s`` (rad/s): compliance ``r_s`` of the stinger, m/N."""
         return np.asarray(self.stinger_compliance_m_n / (1.0 + np.asarray(s) * self.stinger_damping_time_s))
 
     @property
     def damping_n_s_m(self) -> tuple[float, float]:
-        """``c + b`` at low frequency and its standard error, N s/m: known well even where the two are not told apart."""
+        """``c + b`` at low frequency and its standard error, N s/m; accurate even if c and b cannot be separated."""
         both = [PARAMETERS.index("suspension_damping_n_s_m"), PARAMETERS.index("back_emf_damping_n_s_m")]
         variance = float(np.sum(np.asarray(self.covariance)[np.ix_(both, both)]))
         return float(np.sum(self.values[both])), float(np.sqrt(max(variance, 0.0)))
 
     def force(self, voltage: ArrayLike, acceleration: ArrayLike, frequency_hz: ArrayLike) -> Complex:
-        """complex: force (N) for amplitudes of recorded voltage (V) and drive-point acceleration (m/s^2); they broadcast.
+        """complex: force (N) for amplitudes of recorded voltage (V) and drive-point acceleration (m/s^2), broadcast together.
 
         ``(1 + Z r_s) F = g_e V - Z A / s^2``; the voltage is passed through ``path``.
         """
@@ -194,7 +194,7 @@ class Exciter:
         return np.asarray((driving - reaction) / (1.0 + stiffness * self.stinger_compliance(s)))
 
     def electrical(self, amplifier_gain: float) -> dict[str, float]:
-        """Force factor, resistance and inductance for a known gain of a voltage amplifier (V/V).
+        """Return force factor, resistance and inductance for a known gain of a voltage amplifier (V/V).
 
         ``G = b gain / g``, ``R = b (gain / g)^2``, ``L = tau R``.
         """
@@ -207,7 +207,7 @@ class Exciter:
         }
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         numbers = (self.lowest_hz, self.highest_hz, self.fit_residual)
         path = np.array(astuple(self.path))
         arrays = {"values": self.values, "covariance": np.asarray(self.covariance), "fit": np.array(numbers)}
@@ -215,7 +215,7 @@ class Exciter:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Exciter":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
         try:
             values = finite_array("values", arrays["values"], np.float64, 1)
             if values.size != len(PARAMETERS):

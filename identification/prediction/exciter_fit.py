@@ -1,13 +1,13 @@
-"""Parameters of an exciter from a multisine: voltage, force and drive-point acceleration, line by line.
+"""Identify the parameters of an exciter from a multisine: voltage, force and drive-point acceleration, line by line.
 
 Every line k of every realisation obeys, for parameters p and ``s = 2 pi i f_k``, times ``1 + s tau``
 
     e(p) = (1 + s tau + P r_s) F + P A / s^2 - g V = 0,    P = (1 + s tau) (s^2 m + s c + k) + s b,
 
-whatever the structure does, nonlinear or not: force and motion are both measured. Only sensor noise is left, in both,
-and where the force drops at a resonance it is as large as the force itself. The maximum-likelihood cost for noise in all
-channels is ``sum |e(p)|^2 / var e(p)`` (Pintelon and Schoukens, *System Identification*, 2nd ed., 9.10 and 9.11) with the
-noise covariance taken from the scatter of the periods. The start is the linear regression
+for any structure, linear or nonlinear, because force and motion are both measured. Only the sensor noise in both causes a
+residual. Where the force drops at a resonance, this noise is as large as the force itself. The maximum-likelihood cost for
+noise in all channels is ``sum |e(p)|^2 / var e(p)`` (Pintelon and Schoukens, *System Identification*, 2nd ed., 9.10 and 9.11)
+with the noise covariance taken from the scatter of the periods. The start is the linear regression
 
     F = g V - s tau F - c3 s A - c2 A - c1 A / s - c0 A / s^2.
 """
@@ -54,42 +54,44 @@ def identify_exciter(
     amplifier_gain: float = 1.0,
     source: str = "",
 ) -> Exciter:
-    """Exciter from a multisine's spectra.
+    """Identify an exciter from the spectra of a multisine.
 
     Parameters
     ----------
     spectra
-        At least two periods, with the channel ``voltage``, one of role ``force`` and one of role ``drive`` (where the
-        stinger is fixed). The band should reach well below and well above the suspension's resonance: from a narrow one
-        the mass comes out wrong by half.
+        At least two periods, with the channel ``voltage``, one of role ``force`` and one of role ``drive`` (where the stinger
+        is fixed). The band should reach well below and well above the suspension's resonance: a narrow band may give a mass
+        with an error of 50 %.
     lowest_hz, highest_hz
         Part of the band to use, both ends included.
     voltage
-        Name of the channel that holds the voltage.
+        Name of the voltage channel.
     sample_rate_hz
-        Rate of the converter that held the voltage; None where the voltage was measured at the amplifier. Delay, dispersion
-        and coupling of the `VoltagePath` are estimated along.
+        Sample rate of the converter that put out the voltage; None if the voltage was measured at the amplifier. Delay,
+        dispersion and coupling of the `VoltagePath` are estimated too.
     stinger_stiffness_n_m
-        k_s if it is known (E A / l); else it is estimated, and taken as rigid where the data do not tell it.
+        Stinger stiffness k_s if it is known (E A / l). If None, it is estimated; the stinger is taken as rigid if the data do
+        not determine k_s.
     resistance_ohm, amplifier_gain
-        Resistance R of coil, cable and amplifier, if a meter has told it, and gain of a voltage amplifier (V/V). Then
-        ``b = g^2 R / gain^2``. Without R, suspension damping and back-EMF are told apart by the coil's inductance alone,
-        which takes a band of several hundred hertz; their sum is found either way, and is all that a prediction needs.
+        Measured resistance R of coil, cable and amplifier, and gain of a voltage amplifier (V/V). They give
+        ``b = g^2 R / gain^2``. Without R, only the inductance of the coil separates suspension damping from back-EMF, which
+        requires a band of several hundred hertz. Their sum is identified in either case and suffices for predictions.
     source
-        Rig and exciter that the result belongs to.
+        Rig and exciter for which the result is valid.
 
     Returns
     -------
     Exciter
-        With the covariance of its parameters from noise, times the mean square of misfit over noise where that is above
-        one, which takes in a converter's steps: they repeat from period to period and differ from line to line. It does not
-        cover what the model leaves out. With stinger stiffness and resistance given, on the shipped rigs that is 0.002 %
-        (coil time constant 0.1 %, stinger damping 9 %); without them, twice to three times the error of the mass, c and b.
+        The exciter with the covariance of its parameters from noise. If the mean square of residual over noise is above one,
+        the covariance is multiplied by it, to include the steps of a converter, which repeat from period to period and differ
+        from line to line. The covariance does not include model errors. On the shipped rigs these are 0.002 % (coil time
+        constant 0.1 %, stinger damping 9 %) with stinger stiffness and resistance given; otherwise two to three times the
+        standard error of the mass, c and b.
 
     Raises
     ------
     IdentificationError
-        For a single period, too few lines, missing channels, a voltage that is zero.
+        If there is a single period, too few lines, a channel is missing, or the voltage is zero.
     """
     rate = np.inf if sample_rate_hz is None else positive("sample_rate_hz", sample_rate_hz, "Hz")
     data = _lines(spectra, voltage, rate, lowest_hz, highest_hz)
@@ -135,7 +137,7 @@ def identify_exciter(
 
 
 def _refuse_unphysical(values: Float) -> None:
-    """Refuse masses, stiffnesses and dampings that no exciter has; c and b alone may trade against each other."""
+    """Raise an error if a mass, a stiffness or the sum of both dampings is not positive; c or b alone may be negative."""
     found = {
         "moving mass (kg)": values[_MASS],
         "suspension stiffness (N/m)": values[_STIFFNESS],
@@ -150,7 +152,7 @@ def _refuse_unphysical(values: Float) -> None:
 
 
 def beside_resonance(values: Float, lowest_hz: float, highest_hz: float) -> tuple[str, ...]:
-    """A note where the band does not enclose the resonance of mass and suspension."""
+    """Return a note if the band does not enclose the resonance of mass and suspension."""
     resonance_hz = np.sqrt(values[_STIFFNESS] / values[_MASS]) / (2.0 * np.pi)
     if lowest_hz < resonance_hz < highest_hz:
         return ()
@@ -161,13 +163,13 @@ def beside_resonance(values: Float, lowest_hz: float, highest_hz: float) -> tupl
 
 
 def _is_told(values: Float, covariance: Float, index: int) -> bool:
-    """Whether a parameter that cannot be negative is at least twice its standard error."""
+    """Return whether a parameter that cannot be negative is at least twice its standard error."""
     return bool(values[index] >= np.sqrt(covariance[index, index]) / _UNSURE)
 
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Force, acceleration and voltage (complex[3, n_realisations, n_lines]) and their noise (complex[n_lines, 3, 3])."""
+    """Force, acceleration and voltage (complex[3, n_realisations, n_lines]), and noise covariance (complex[n_lines, 3, 3])."""
 
     frequency_hz: Float
     signals: Complex
@@ -176,11 +178,11 @@ class _Lines:
 
     @cached_property
     def s(self) -> Complex:
-        """complex[n_lines], rad/s."""
+        """complex[n_lines]: ``2 pi i f``, rad/s."""
         return np.asarray(2j * np.pi * self.frequency_hz)
 
     def coefficients(self, p: Float) -> Complex:
-        """complex[3, n_lines]: what force, acceleration and voltage are multiplied with in ``e``."""
+        """complex[3, n_lines]: coefficients of force, acceleration and voltage in ``e``."""
         g, tau, m, c, k, b, compliance, time = p[: len(PARAMETERS)]
         s, path = self.s, VoltagePath(self.rate_hz, *_path(p))
         stiffness = (1.0 + s * tau) * ((s * m + c) * s + k) + s * b
@@ -197,14 +199,14 @@ class _Lines:
 
 
 def _path(p: Float) -> list[float]:
-    """Delay, dispersion and coupling of the voltage's path, the last of the parameters of the fit."""
+    """Return delay, dispersion and coupling of the voltage path, the last parameters of the fit."""
     return [float(value) for value in p[len(PARAMETERS) :]]
 
 
 def _lines(
     spectra: PeriodicSpectra, voltage: str, rate_hz: float, lowest: float | None, highest: float | None
 ) -> _Lines:
-    """The excited lines of the band; the motion as acceleration."""
+    """Return the excited lines of the band, with the motion as acceleration."""
     low, high = 0.0 if lowest is None else lowest, np.inf if highest is None else highest
     used = spectra.excited & (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high) & (spectra.frequency_hz > 0)
     if np.count_nonzero(used) < _FEWEST_LINES:
@@ -229,7 +231,7 @@ def _lines(
 
 
 def _pooled(noise: Complex, force: Complex) -> Complex:
-    """Mean of the noise covariance over neighbouring lines; of a recording without noise, a trifle of the force's power."""
+    """Mean noise covariance over neighbouring lines, with a small part of the force's power added in case there is no noise."""
     window = min(_POOLED_LINES, noise.shape[0])
     kernel = np.full(window, 1.0)
     counts = np.convolve(np.ones(noise.shape[0]), kernel, mode="same")
@@ -240,7 +242,7 @@ def _pooled(noise: Complex, force: Complex) -> Complex:
 
 
 def _regression(data: _Lines) -> Float:
-    """Start of the fit: linear least squares, which noise biases."""
+    """Return the start of the fit by linear least squares, which noise biases."""
     delay = 0.5 / data.rate_hz
     f, a, v = data.signals
     s, v = data.s, v * VoltagePath(data.rate_hz, delay).factor(data.frequency_hz)
@@ -255,15 +257,15 @@ def _regression(data: _Lines) -> Float:
 
 
 def _fit(data: _Lines, start: Float, free: list[int], back_emf_per_square: float | None) -> tuple[Float, Float, float]:
-    """Maximum-likelihood values, covariance (zero where not free), and root of the mean squared weighted residual.
+    """Return maximum-likelihood values, their covariance (zero if not free), and the RMS of the weighted residual.
 
-    ``back_emf_per_square`` is ``R / gain^2`` of a back-EMF that follows from g.
+    ``back_emf_per_square`` is ``R / gain^2``, from which b follows as ``g^2 R / gain^2``; None if b is free.
     """
     from scipy.optimize import least_squares
 
     scale = np.abs(start)
     top = 2.0 * np.pi * data.frequency_hz[-1]
-    # What a hundredth of a radian at the top, or of the mass's inertia, or of a turn at the bottom would take.
+    # Each scale has an effect of 1 %: of the mass's inertia, or of a radian, at the highest line, or of the lowest frequency.
     scale[_COMPLIANCE:] = 0.01 / (scale[2] * top**2), 0.01 / top, 0.01 / top, 0.01 / top**3, 0.01 * data.frequency_hz[0]
     scale = np.maximum(scale, 1e-300)
 

@@ -34,35 +34,35 @@ def frequency_response(
     points: int = 401,
     lowest_share: float = 0.05,
 ) -> SteadyPrediction:
-    """Steady response of a nonlinear mode to a constant force, all branches.
+    """Predict the steady response of a nonlinear mode to a constant force, on all branches.
 
     Parameters
     ----------
     mode
-        The nonlinear mode as identified.
+        The identified nonlinear mode.
     force_n
-        Force held, N: the peak of its fundamental, or its RMS where ``force`` is ``rms``.
+        Held force, N: the peak of its fundamental, or its RMS if ``force`` is ``rms``.
     force
-        What "constant" means. ``fundamental``: |F_1| is held, and the force has the harmonics that the exciter gave it
-        when the mode was identified, whose power is in the damping. ``rms``: the same with the RMS of the whole force held;
-        the ratio of fundamental to RMS is interpolated over q as recorded at phase resonance, and a note says so.
-        ``pure-sine``: a force without harmonics, with the damping from the total power.
+        Quantity that is constant. ``fundamental``: |F_1| is held, and the force has the harmonics that the exciter caused
+        when the mode was identified; their power is included in the damping. ``rms``: the RMS of such a force is held; the
+        ratio of fundamental to RMS recorded at phase resonance is interpolated over q, and a note states this. ``pure-sine``:
+        a force without harmonics, with the damping from the total power.
     modes
-        Linear modes, for the responses at their other channels (the tested mode's shape, scaled by the drive point's
-        response), and for the contribution of the other modes.
+        Linear modes. They provide the responses at their other channels (the shape of the tested mode, scaled by the response
+        of the drive point) and the contribution of the other modes.
     residuals
         Whether to add the linear response of the other modes of ``modes`` to the force.
     allow_extrapolation
-        Whether to answer beyond twice the largest modal amplitude identified.
+        Whether to predict beyond twice the largest modal amplitude identified.
     points
-        Points on each branch.
+        Number of points on each branch.
     lowest_share
         Modal amplitude at both ends of the main branch, over its largest.
 
     Raises
     ------
     IdentificationError
-        On forces that are not above zero, properties that the mode lacks, fewer than 20 points.
+        If the force is not above zero, the mode lacks properties, or ``points`` is below 20.
     ExtrapolationError
         If the response needs more than twice the largest modal amplitude identified.
     """
@@ -118,7 +118,7 @@ def steady_predictions(
     residuals: bool = True,
     allow_extrapolation: bool = False,
 ) -> tuple[SteadyPrediction, ...]:
-    """`frequency_response` at several forces; the message of an error names the force."""
+    """Predict the `frequency_response` at several forces; the message of an error names the force."""
     return tuple(
         frequency_response(
             mode, force_n, force=force, modes=modes, residuals=residuals, allow_extrapolation=allow_extrapolation
@@ -128,7 +128,7 @@ def steady_predictions(
 
 
 def _fundamental(mode: NonlinearMode, level: float, force: HeldForce) -> Callable[[Float], Float]:
-    """Peak of the fundamental of the force over q."""
+    """Return the peak of the fundamental of the force as a function of q."""
     if force != "rms":
         return partial(np.full_like, fill_value=level)
     share = np.abs(mode.force_harmonics[:, 1]) / np.linalg.norm(mode.force_harmonics[:, 1:], axis=1)
@@ -142,7 +142,7 @@ def _fundamental(mode: NonlinearMode, level: float, force: HeldForce) -> Callabl
 
 
 def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
-    """Branches of solutions; `ExtrapolationError` where one that begins in the identified range leaves the allowed."""
+    """Return the branches of solutions; raise `ExtrapolationError` if a branch from the identified range exceeds the limit."""
     largest = one.properties.q_range[1]
     limit = min(one.properties.highest_q, _FARTHEST * largest)
     paths, opened = one.paths(limit)
@@ -165,14 +165,14 @@ def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
 
 
 def _parameters(one: OneMode, path: Path, points: int, lowest_share: float) -> Float:
-    """Path parameters of the points of a branch, without those that no frequency belongs to."""
+    """Return the path parameters of the points of a branch, without those at which there is no frequency."""
     first = 0.0 if path.closed else float(np.arcsin(lowest_share))
     s = np.linspace(first, 2.0 * np.pi if path.closed else np.pi - first, points)
     return np.asarray(s[np.isfinite(one.omega(*path.at(s)))])
 
 
 def _folds(one: OneMode, path: Path, s: Float) -> Float:
-    """float[n_folds, 2]: q and W where the determinant of the slow flow vanishes along a branch."""
+    """float[n_folds, 2]: q and W where the determinant of the slow flow changes sign along a branch."""
     from scipy.optimize import brentq
 
     def determinant(at: float) -> float:

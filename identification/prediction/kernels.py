@@ -1,4 +1,4 @@
-"""Compiled slow flow of one nonlinear mode: amplitude over time, step by step."""
+"""Compiled slow flow of one nonlinear mode, integrated step by step."""
 
 import numpy as np
 
@@ -12,13 +12,13 @@ DIVERGED = 1
 
 @kernel
 def cubic(t: float, coefficients: np.ndarray, k: int) -> float:
-    """Cubic of interval k, t beyond its beginning."""
+    """Evaluate the cubic of interval k at t beyond the beginning of the interval."""
     return float(((coefficients[0, k] * t + coefficients[1, k]) * t + coefficients[2, k]) * t + coefficients[3, k])
 
 
 @kernel
 def inverse(z: complex) -> complex:
-    """``1 / z`` without the care for overflow that costs a compiled division most of its time."""
+    """Return ``1 / z`` without protection against overflow, which takes most of the time of a compiled division."""
     scale = 1.0 / (z.real * z.real + z.imag * z.imag)
     return complex(z.real * scale, -z.imag * scale)
 
@@ -36,10 +36,11 @@ def modal_rate(
     shape_of: np.ndarray,
     tail: np.ndarray,
 ) -> complex:
-    """Rate ``Q' = (phi (N - N' D'' / (2 G)) - D Q) / G``, ``G = D' - D D'' / (2 D')``, of the complex modal amplitude.
+    """Return ``Q' = (phi (N - N' D'' / (2 G)) - D Q) / G``, ``G = D' - D D'' / (2 D')``, of the complex modal amplitude.
 
-    ``D(s) = w^2 + 2 z w s + s^2 + phi^2 load[0]``; ``load`` [3] is what is coupled to the drive point (N/m) with its
-    first two derivatives by s; ``drive`` is N (N), ``change`` its N' (N/s). The properties are those of `ModalProperties`.
+    ``D(s) = w^2 + 2 z w s + s^2 + phi^2 load[0]``; ``load`` [3] is the dynamic stiffness coupled to the drive point (N/m) and
+    its first two derivatives with respect to s; ``drive`` is N (N), ``change`` its rate N' (N/s). The properties are those of
+    `ModalProperties`.
     """
     size = np.sqrt(q.real * q.real + q.imag * q.imag)
     last = breakpoints[breakpoints.size - 1]
@@ -78,10 +79,10 @@ def slow_flow(
     out: np.ndarray,
     rate: np.ndarray,
 ) -> tuple[int, int]:
-    """Classical Runge-Kutta steps over the instants of ``s``, ``drive``, ``change`` [2 n - 1] and ``load`` [2 n - 1, 3].
+    """Integrate by classical Runge-Kutta steps over ``s``, ``drive``, ``change`` [2 n - 1] and ``load`` [2 n - 1, 3].
 
-    ``step_s`` lies between every other instant, so that those between serve as midpoints. Fills ``out`` and ``rate`` [n];
-    returns a code and the number of instants filled: `DIVERGED` where the amplitude exceeds ``largest``.
+    A step ``step_s`` spans two intervals of the instants, so that every other instant serves as a midpoint. Fills ``out`` and
+    ``rate`` [n]. Returns a code, `DIVERGED` if the amplitude exceeds ``largest``, and the number of filled entries.
     """
     q = start
     count = out.size

@@ -1,4 +1,4 @@
-"""Predictions of one model beside what they are compared with."""
+"""Predictions of one model together with their references."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,27 +29,27 @@ _PARTS: dict[str, type] = {
     "runs": SimulatedRun,
 }
 _LATER = ("runs",)
-"""What earlier files do not have."""
+"""Parts that files of earlier versions do not have."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Predictions:
-    """Steady responses and sweeps; references and errors are None where there was nothing to compare with.
+    """Predicted steady responses and sweeps; references and errors are None where there is no reference.
 
     Parameters
     ----------
     steady, steady_references, steady_errors
-        Predicted frequency responses; for each the measured one and its errors.
+        Predicted frequency responses, with the measured one and the errors for each.
     steady_bands
-        Their uncertainty where it is known; empty for none at all.
+        Uncertainty bands of the frequency responses, None if unknown; empty if all are unknown.
     sweeps, sweep_references, sweep_errors
-        Predicted sweeps; for each the recorded one and its errors.
+        Predicted sweeps, with the recorded one and the errors for each.
     runs
-        Recorded experiments that a nonlinear state-space model simulated.
+        Simulations of recorded experiments by a nonlinear state-space model.
     specimen
         Name of what was tested.
     notes
-        What a user should know about these numbers, one line each.
+        Remarks on the predictions, one line each.
 
     Raises
     ------
@@ -84,11 +84,11 @@ class Predictions:
 
     @property
     def errors(self) -> tuple[PredictionError, ...]:
-        """Every comparison, steady responses first."""
+        """Errors of all comparisons, steady responses first."""
         return tuple(error for error in (*self.steady_errors, *self.sweep_errors) if error is not None)
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         arrays: dict[str, NDArray[Any]] = {}
         attributes: dict[str, Any] = {"specimen": self.specimen, "notes": list(self.notes)}
         for name in _PARTS:
@@ -98,7 +98,7 @@ class Predictions:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Predictions":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
         present = {name: kind for name, kind in _PARTS.items() if name in attributes or name not in _LATER}
         parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in present.items()}
         return cls(**parts, specimen=str(attributes.get("specimen", "")), notes=tuple(attributes.get("notes", ())))

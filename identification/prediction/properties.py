@@ -1,11 +1,11 @@
-"""Modal properties as functions of the modal amplitude: inside the identified range, and outside it as far as is safe.
+"""Modal properties as functions of the modal amplitude, inside the identified range and, with limits, outside it.
 
-Inside, modal frequency w, damping ratio z and drive shape are monotone cubic (PCHIP) over the modal amplitude q, so
-that they invent no extrema between levels. Below the lowest level they are constant. Above the highest, ``w^2`` is
-linear in ``q^2`` (what an amplitude-dependent stiffness ``k0 + k2 q^2`` gives) and z is linear in q and never falls: a
-cubic continued would invent branches, a falling z would let a response grow without bound. Both slopes are those of a
-straight line through the levels above half the highest q, at least three: a difference of two levels is mostly noise,
-and with a fixed number it would depend on how densely the test was stepped.
+Inside the range, modal frequency w, damping ratio z and drive shape are monotone cubic (PCHIP) in the modal amplitude q, so
+that the interpolation adds no extrema between levels. Below the lowest level they are constant. Above the highest level,
+``w^2`` is linear in ``q^2`` (as for an amplitude-dependent stiffness ``k0 + k2 q^2``), and z is linear in q and never falls.
+A continued cubic would cause spurious branches, and a falling z would let a response grow without bound. Both slopes are
+those of a straight line through the levels above half the highest q, at least three. The difference of two levels would be
+mostly noise, and a fixed number of levels would make the slope depend on the spacing of the test levels.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ Damping = Literal["fundamental", "total-power"]
 FLAGGED_BEYOND = 1.25
 REFUSED_BEYOND = 2.0
 HIGHER_LEVELS = "measure higher levels, or allow extrapolation (`allow_extrapolation`)"
-"""What to do about an `ExtrapolationError`, from Python and at the command line."""
+"""Advice of an `ExtrapolationError`, for Python and the command line."""
 _TAIL_FROM = 0.5
 _FEWEST_TAIL_LEVELS = 3
 _SAME_LEVEL = 0.02
@@ -35,17 +35,17 @@ _DAMPING_FIELD = {"fundamental": "damping_ratio", "total-power": "damping_ratio_
 
 
 class ExtrapolationError(IdentificationError):
-    """A model is asked beyond twice the modal amplitude it was identified up to, and extrapolation was not allowed."""
+    """A model is evaluated beyond twice its largest identified modal amplitude, and extrapolation was not allowed."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModalProperties:
     """Modal frequency, damping ratio and drive shape of one mode over its modal amplitude.
 
-    The arrays are all that a compiled kernel needs: with k the last breakpoint not above q, ``t = q - modal_amplitude[k]``
-    and column k of the coefficients, a property is ``((c0 t + c1) t + c2) t + c3``; below the first breakpoint it is
-    that at the breakpoint, above the last ``w^2 = max(tail[0], tail[1] + tail[2] (q^2 - q_max^2))``,
-    ``z = tail[3] + tail[4] (q - q_max)`` and the drive shape is ``tail[5]``.
+    A compiled kernel needs only these arrays. With k the last breakpoint not above q, ``t = q - modal_amplitude[k]`` and
+    column k of the coefficients, a property is ``((c0 t + c1) t + c2) t + c3``. Below the first breakpoint it has the value
+    at that breakpoint. Above the last, ``w^2 = max(tail[0], tail[1] + tail[2] (q^2 - q_max^2))``, ``z = tail[3] + tail[4] (q
+    - q_max)`` and the drive shape is ``tail[5]``.
 
     Parameters
     ----------
@@ -54,11 +54,11 @@ class ModalProperties:
     omega_rad_s, damping, drive_shape_at
         float[n], w, z and the drive shape (kg^-1/2: ``|X_d| = drive_shape q``) at the breakpoints.
     omega_coefficients, damping_coefficients, drive_shape_coefficients
-        float[4, max(n - 1, 1)], cubics of each interval, highest power first.
+        float[4, max(n - 1, 1)], coefficients of the cubic in each interval, highest power first.
     tail
-        float[6], continuation above the last breakpoint.
+        float[6], coefficients of the continuation above the last breakpoint.
     allow_extrapolation
-        Whether values beyond twice the last breakpoint are given at all.
+        Whether values beyond twice the last breakpoint are allowed.
     """
 
     modal_amplitude: Float
@@ -75,23 +75,23 @@ class ModalProperties:
     def of(
         cls, mode: NonlinearMode, *, damping: Damping = "fundamental", allow_extrapolation: bool = False
     ) -> "ModalProperties":
-        """Properties of an identified mode.
+        """Compute the properties of an identified mode.
 
         Parameters
         ----------
         mode
-            In any order of levels, repeats included: levels whose q lies within 2 % of each other are averaged. Where
-            modal amplitudes are unknown but apparent masses m are (stepped sine), ``q = |X| sqrt(m)`` and the drive
-            shape is ``1 / sqrt(m)`` of the measured point, m being interpolated from level to level like w and z.
+            The mode. Levels may be in any order and repeated; levels whose q differs by less than 2 % are averaged. If modal
+            amplitudes are unknown but apparent masses m are known (stepped sine), ``q = |X| sqrt(m)`` and the drive shape is
+            ``1 / sqrt(m)`` of the measured point, m being interpolated from level to level like w and z.
         damping
-            From the power of the fundamental alone, or of all harmonics.
+            Whether damping is computed from the power of the fundamental alone or of all harmonics.
         allow_extrapolation
-            Whether to give values beyond twice the largest q identified.
+            Whether values beyond twice the largest identified q are allowed.
 
         Raises
         ------
         IdentificationError
-            If no level has all of amplitude, frequency and damping, or w or z is not positive at one.
+            If no level has amplitude, frequency and damping, or if w or z is not positive at a level.
         """
         if damping not in _DAMPING_FIELD:
             raise IdentificationError(f"damping: is '{damping}', allowed are {', '.join(_DAMPING_FIELD)}")
@@ -118,7 +118,7 @@ class ModalProperties:
         *,
         allow_extrapolation: bool = False,
     ) -> "ModalProperties":
-        """Properties from values [n] at rising modal amplitudes; the drive shape may be one number."""
+        """Compute properties from values [n] at rising modal amplitudes; the drive shape may be a single number."""
         q = finite_array("modal_amplitude", modal_amplitude, np.float64, 1)
         omega = finite_array("omega_rad_s", omega_rad_s, np.float64, 1)
         z = finite_array("damping", damping, np.float64, 1)
@@ -161,11 +161,11 @@ class ModalProperties:
 
     @property
     def highest_q(self) -> float:
-        """Largest modal amplitude for which values are given; infinite where extrapolation is allowed."""
+        """Largest allowed modal amplitude; infinite if extrapolation is allowed."""
         return np.inf if self.allow_extrapolation else REFUSED_BEYOND * self.q_range[1]
 
     def range_use(self, q: ArrayLike) -> Float:
-        """Modal amplitude over the largest identified; above 1 is extrapolation, above 1.25 to be flagged."""
+        """Modal amplitude over the largest identified; values above 1 are extrapolations, above 1.25 they are flagged."""
         return np.asarray(np.asarray(q, dtype=np.float64) / self.q_range[1])
 
     def frequency_rad_s(self, q: ArrayLike) -> Float:
@@ -181,12 +181,12 @@ class ModalProperties:
         return np.where(beyond, self.tail[3] + self.tail[4] * (q - self.q_range[1]), inside)
 
     def drive_shape(self, q: ArrayLike) -> Float:
-        """Drive-point displacement per modal amplitude, kg^-1/2, like q; the same goes for the force."""
+        """Drive-point displacement per modal amplitude, kg^-1/2, like q; also the modal force per drive-point force."""
         _, beyond, inside = self._inside(q, self.drive_shape_coefficients)
         return np.where(beyond, self.tail[5], inside)
 
     def slopes(self, q: ArrayLike) -> tuple[Float, Float, Float]:
-        """Derivatives of w, z and the drive shape by q, each like q."""
+        """Derivatives of w, z and the drive shape with respect to q, each like q."""
         q, beyond, omega = self._inside(q, _differentiated(self.omega_coefficients))
         z = self._inside(q, _differentiated(self.damping_coefficients))[2]
         shape = self._inside(q, _differentiated(self.drive_shape_coefficients))[2]
@@ -201,7 +201,7 @@ class ModalProperties:
         )
 
     def _inside(self, q: ArrayLike, coefficients: Float) -> tuple[Float, NDArray[np.bool_], Float]:
-        """Amplitudes as an array, where they lie above the last breakpoint, and the cubics inside."""
+        """Return the amplitudes as an array, whether each lies above the last breakpoint, and the values of the cubics."""
         amplitude = np.asarray(q, dtype=np.float64)
         if amplitude.size and not np.max(amplitude) <= self.highest_q:
             raise ExtrapolationError(
@@ -217,7 +217,7 @@ class ModalProperties:
 
 
 def _merged(table: Float) -> Float:
-    """Columns in the order of the first row, with those averaged whose first entries lie within 2 % of each other."""
+    """Sort columns by the first row and average those whose first entries differ by at most 2 %."""
     table = table[:, np.argsort(table[0], kind="stable")]
     groups: list[list[int]] = []
     for column, q in enumerate(table[0]):
@@ -229,7 +229,7 @@ def _merged(table: Float) -> Float:
 
 
 def _pchip(q: Float, values: Float) -> Float:
-    """float[m, 4, max(n - 1, 1)]: cubics of the monotone interpolation of [n, m] values, highest power first."""
+    """float[m, 4, max(n - 1, 1)]: coefficients of the monotone cubics through [n, m] values, highest power first."""
     if q.size == 1:
         return np.concatenate([np.zeros((values.shape[1], 3, 1)), values.T[:, :, None]], axis=1)
     from scipy.interpolate import PchipInterpolator
@@ -246,6 +246,6 @@ def _slope(x: Float, y: Float) -> float:
 
 
 def _differentiated(coefficients: Float) -> Float:
-    """Cubics whose values are the derivatives of the given ones."""
+    """Return the coefficients of the derivatives of cubics."""
     c0, c1, c2, _ = coefficients
     return np.array([np.zeros_like(c0), 3.0 * c0, 2.0 * c1, c2])

@@ -1,7 +1,7 @@
-"""The response of a nonlinear mode to the force that a stepped-sine test really had.
+"""Predict the response of a nonlinear mode to the recorded force of a stepped-sine test.
 
-No controller holds the force exactly: near resonance it drops or overshoots by ten percent and more. Predicting the
-response to each point's own force keeps that out of what is said about the model.
+No controller holds the force exactly: near resonance it drops or overshoots by ten percent and more. Predicting the response
+to the recorded force of each point removes this effect from the assessment of the model.
 """
 
 from functools import partial
@@ -34,30 +34,30 @@ def recorded_force_response(
     residuals: bool = True,
     allow_extrapolation: bool = False,
 ) -> SteadyPrediction:
-    """Steady response at every frequency of a measurement to the fundamental of the force that was measured there.
+    """Predict the steady response at every frequency of a measurement to the fundamental of the force measured there.
 
-    Points are in the order of the measurement. A force admits up to three states or more, and which of them the test held
-    depends on what was controlled. Where it was the force, only stable states come into question: taken is the one nearest
-    to the state of the point before, as for a test that is stepped slowly; at the first point the smallest. Anything else,
-    as a constant voltage, also holds states that are unstable under constant force. Then all come into question: taken is
-    the one whose phase lag is nearest to the measured lag, and where lags lie within 1 degree of that, the one nearest to
-    the state before. At a fold the smallest error of model or force decides whether a state exists: there it is enough that
-    the force is within 2 % of one that has it.
+    Points are in the order of the measurement. At one force and frequency there may be three states or more; the quantity
+    controlled in the test decides which of them occurs. Under force control only stable states are considered. The state
+    nearest to that of the previous point is chosen, as in a slowly stepped test; at the first point the smallest. Under other
+    control, such as constant voltage, states that are unstable under constant force also occur. All states are then
+    considered, and the one with the phase lag nearest to the measured lag is chosen; among lags within 1 degree of the best,
+    the state nearest to the previous one. Near a fold, small errors of model or force decide whether a state exists. A state
+    is therefore accepted there if it exists at a force within 2 % of the recorded one.
 
     Parameters
     ----------
     mode
-        The nonlinear mode as identified.
+        The identified nonlinear mode.
     reference
-        Frequencies and forces, what was controlled, and phase lags where that was not the force.
+        Measured frequencies and forces, the controlled quantity, and phase lags unless the force was controlled.
     modes, residuals, allow_extrapolation
         As for `frequency_response`.
 
     Returns
     -------
     SteadyPrediction
-        With ``force`` as ``recorded``, ``force_n`` the median of the forces and no folds; ``stable`` is that under constant
-        force all the same.
+        Its ``force`` is ``recorded``, ``force_n`` is the median of the forces, and there are no folds. ``stable`` refers to
+        constant force nevertheless.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def recorded_force_response(
 
 
 def _states(properties: ModalProperties, reference: FrequencyResponse, stable_only: bool) -> list[Float]:
-    """Modal amplitudes of the states at each point, rising; `ExtrapolationError` where there are none."""
+    """Return the modal amplitudes of the states at each point, rising; raise `ExtrapolationError` if there are none."""
     limit = min(properties.highest_q, _FARTHEST * properties.q_range[1])
     states = []
     for point, (frequency_hz, force) in enumerate(zip(reference.frequency_hz, reference.force_n, strict=True)):
@@ -124,17 +124,17 @@ def _states(properties: ModalProperties, reference: FrequencyResponse, stable_on
 
 
 def _stable(properties: ModalProperties, q: Float, omega: Float) -> NDArray[np.bool_]:
-    """bool[n]: under constant force; the size of it does not enter once q and W are known."""
+    """bool[n]: stability under constant force, which follows from q and W alone."""
     return OneMode(properties, np.ones_like).stable(q, omega)
 
 
 def _apart_deg(motion: Complex, lag_deg: Float) -> Float:
-    """float[n]: how far the lags of predicted displacements are from measured ones, 0 to 180."""
+    """float[n]: difference between predicted and measured phase lags, 0 to 180 degrees."""
     return np.abs(np.degrees(np.angle(motion * np.exp(1j * np.radians(lag_deg)))))
 
 
 def _chosen(point: NDArray[np.int64], q: Float, apart_deg: Float) -> NDArray[np.int64]:
-    """int[n_points]: of each point's states the one nearest to the state before, among those of nearly the best lag."""
+    """int[n_points]: chosen state of each point, the nearest to the previous state among those with nearly the best lag."""
     chosen: list[int] = []
     for here in range(int(point[-1]) + 1):
         states = np.flatnonzero(point == here)

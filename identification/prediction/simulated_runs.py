@@ -20,7 +20,7 @@ class SimulatedRun:
     Parameters
     ----------
     name, level
-        Those of the experiment.
+        Name and level of the experiment.
     outputs
         Names of the outputs.
     error
@@ -30,8 +30,8 @@ class SimulatedRun:
         Largest state or input over the largest in the training data; beyond 1 the model extrapolates. inf for an
         unbounded run, NaN where the range is unknown.
     unbounded_at_s
-        Time at which the simulation became unbounded, counted from the first sample of the record, whether or not that
-        sample counts; None if it never did.
+        Time at which the simulation became unbounded, from the first sample of the record (even if that sample does not
+        count); None if it stayed bounded.
     use
         Use of the experiment: ``training``, ``validation`` or ``test``.
     """
@@ -58,7 +58,7 @@ class SimulatedRun:
         return self.unbounded_at_s is None
 
     def row(self) -> dict[str, object]:
-        """Numbers by name, ready for JSON; None for numbers that are unknown or not finite."""
+        """Return JSON-able numbers by name; None for numbers that are unknown or not finite."""
         errors = {name: _finite(value) for name, value in zip(self.outputs, self.error, strict=True)}
         return {
             "name": self.name,
@@ -78,14 +78,14 @@ class ErrorSpectra:
     Parameters
     ----------
     name
-        Of the experiment.
+        Name of the experiment.
     outputs
         Names of the outputs.
     frequency_hz
         float[n_lines].
     measured, linear_error, error
-        float[n_outputs, n_lines], of the measurement, of the linear start's error and of the model's; the errors NaN where
-        there is no linear start, or a run is unbounded.
+        float[n_outputs, n_lines], amplitudes of the measurement, of the error of the linear start, and of the error of the
+        model. Errors are NaN if there is no linear start or a run is unbounded.
     """
 
     name: str

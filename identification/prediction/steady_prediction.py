@@ -16,10 +16,10 @@ _NEAR_THE_TOP = 0.9
 
 
 def peak_of(amplitude: Float, *columns: Float) -> tuple[float, ...]:
-    """Largest amplitude of a curve and the other columns there, by a parabola through the three highest points.
+    """Return the largest amplitude of a curve, by a parabola through the three highest points, and the other columns there.
 
-    Points are taken as evenly spaced along the curve. The result is the largest point itself if one of its
-    neighbours is missing, or lies so far below that the curve jumps there or is too coarsely sampled.
+    Points are taken as evenly spaced along the curve. The result is the largest point itself if one of its neighbours is
+    missing or is so much smaller that the curve jumps there or is too coarsely sampled.
     """
     top = int(np.argmax(amplitude))
     values = np.column_stack([amplitude, *columns])
@@ -36,7 +36,7 @@ def peak_of(amplitude: Float, *columns: Float) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Peak:
-    """Largest amplitude of a response: peak displacement, where it occurs, and its modal amplitude."""
+    """Largest amplitude of a response: peak displacement, its frequency and phase lag, and the modal amplitude."""
 
     amplitude_m: float
     frequency_hz: float
@@ -51,30 +51,31 @@ class SteadyPrediction:
     Parameters
     ----------
     force_n
-        Force held: peak of its fundamental (N), or its RMS (N) where ``force`` is ``rms``; where it is ``voltage``, the
-        amplitude of the voltage (V).
+        Held level: peak of the fundamental of the force (N), its RMS (N) if ``force`` is ``rms``, or the amplitude of the
+        voltage (V) if ``force`` is ``voltage``.
     force
-        What is held: ``fundamental`` (its harmonics as recorded, or as the exciter makes them), ``rms`` (likewise),
-        ``pure-sine`` (no harmonics), ``voltage`` (a sine of voltage); or ``recorded``: each point has the force that it had
-        in a test, and ``force_n`` is their median.
+        Held quantity. ``fundamental`` and ``rms``: that of a force with harmonics as recorded or as the exciter causes them.
+        ``pure-sine``: a force without harmonics. ``voltage``: a sine of voltage. ``recorded``: each point has its recorded
+        force, and ``force_n`` is the median of these forces.
     channels
-        Names of the points, the drive point first.
+        Names of the measurement points, the drive point first.
     frequency_hz, modal_amplitude, fundamental_n
-        float[n], frequency of the vibration, q (kg^1/2 m; NaN where it is unknown), peak of the fundamental of the force.
+        float[n], frequency of the vibration (Hz), q (kg^1/2 m; NaN if unknown), peak of the fundamental of the force (N).
     displacement_m
         complex[n, n_channels], fundamental of the displacement, peak, against the phase of the force.
     stable
-        bool[n], under constant force and frequency, by the eigenvalues of the slow flow, or of the disturbed vibration.
+        bool[n], stability under constant force and frequency, by the eigenvalues of the slow flow or of the disturbed
+        vibration.
     branch
-        int[n], 0 for the response that begins at rest, 1 and on for detached ones; or, where the first leaves what a model
-        knows, for the part that is reached from the other end of the band.
+        int[n], 0 for the response that begins at rest, 1 and above for detached branches, or for the part reached from the
+        other end of the band if the first response leaves the allowed range of the model.
     range_use
         float[n], modal amplitude over the largest identified, or states over the largest in the training data; NaN where
         that is unknown.
     fold_frequency_hz, fold_amplitude_m, fold_modal_amplitude
         float[n_folds], points where the response turns back in frequency; amplitude of the drive point.
     notes
-        What a user should know about these numbers, one line each.
+        Remarks on the prediction, one line each.
     complete
         Whether every path reached the far end of the band; else it was cut off, and a note says where and why.
     """
@@ -104,7 +105,7 @@ class SteadyPrediction:
         return f"{self.force_n:g} N{kind}"
 
     def motion_m(self, channel: str | None = None) -> Complex:
-        """complex[n]: fundamental of the displacement at a channel, the drive point if None."""
+        """complex[n]: fundamental of the displacement at a channel; at the drive point if None."""
         if channel is None:
             return np.asarray(self.displacement_m[:, 0])
         if channel not in self.channels:
@@ -112,11 +113,11 @@ class SteadyPrediction:
         return np.asarray(self.displacement_m[:, self.channels.index(channel)])
 
     def amplitude_m(self, channel: str | None = None) -> Float:
-        """float[n]: peak displacement at a channel, the drive point if None."""
+        """float[n]: peak displacement at a channel; at the drive point if None."""
         return np.abs(self.motion_m(channel))
 
     def acceleration_m_s2(self, channel: str | None = None) -> Complex:
-        """complex[n]: fundamental of the acceleration at a channel, the drive point if None."""
+        """complex[n]: fundamental of the acceleration at a channel; at the drive point if None."""
         return np.asarray(-((2.0 * np.pi * self.frequency_hz) ** 2) * self.motion_m(channel))
 
     def phase_lag_deg(self, channel: str | None = None) -> Float:
@@ -124,19 +125,19 @@ class SteadyPrediction:
         return np.asarray(np.degrees(-np.angle(self.motion_m(channel))) % 360.0)
 
     def peak(self, channel: str | None = None) -> Peak:
-        """Largest amplitude on the main branch, by a parabola through the three highest points.
+        """Return the largest amplitude on the main branch, by a parabola through the three highest points.
 
-        If the response was cut off, this is a peak only with `peak_reached`.
+        If the response was cut off, this is a peak only if `peak_reached` is true.
         """
         main = self.branch == 0
         columns = (self.amplitude_m(channel), self.frequency_hz, self.phase_lag_deg(channel), self.modal_amplitude)
         return Peak(*peak_of(*(column[main] for column in columns)))
 
     def peak_reached(self, channel: str | None = None, *, order: int = 0) -> bool:
-        """Whether the largest amplitude is a peak, and not the end of a response that was cut off on its way up.
+        """Return whether the largest amplitude is a peak, and not the end of a response that was cut off on its way up.
 
-        It is no peak if the largest value of the displacement differentiated ``order`` times, over all branches, is the last
-        point of a branch, or lies off the main branch, which alone `peak` describes.
+        The displacement is differentiated ``order`` times. Its largest value over all branches is no peak if it is the last
+        point of a branch, or if it lies on another branch than the main branch, which `peak` describes.
         """
         if self.complete:
             return True

@@ -1,18 +1,18 @@
 """All steady states of one nonlinear mode under a constant force, their stability, and the motion of the channels.
 
-The founding paper's steady slow flow, ``(w^2 - W^2 + 2 i W w z) q = L exp(i psi)`` with the modal force ``L = phi_d F``
-and w, z (and L, where the force's harmonics or the shape depend on the level) functions of q, is explicit in the
-frequency W of the vibration:
+The founding paper's steady slow flow, ``(w^2 - W^2 + 2 i W w z) q = L exp(i psi)`` with the modal force ``L = phi_d F`` and
+w, z functions of q (L too, if the harmonics of the force or the shape depend on the level), can be solved for the frequency W
+of the vibration:
 
     W^2 = w^2 (1 - 2 z^2) +- sqrt(P),    P = (L / q)^2 - 4 w^4 z^2 (1 - z^2).
 
-So P >= 0 says at which amplitudes there are solutions. From rest up to the first zero of P they are the response that
-a test finds; further intervals of q with P >= 0 are detached branches (isolas). On each the curve is followed by a path
-parameter s with ``q = q_end sin s`` (main branch) or ``q = middle - half cos s`` (detached), lower sign first, which
-meets the ends of the interval without a corner.
+Solutions exist at amplitudes with P >= 0. The solutions from rest up to the first zero of P are the response that a test
+measures; further intervals of q with P >= 0 are detached branches (isolas). Each branch is parameterised by s, with
+``q = q_end sin s`` (main branch) or ``q = middle - half cos s`` (detached), lower sign first, so that the curve is smooth at
+the ends of the interval.
 
-Stability is that of the complex slow flow ``2 (i W + z w) Q' = L exp(i psi) - D(|Q|) Q``, ``D = w^2 - W^2 + 2 i W w z``
-under constant force and frequency: with a disturbance ``u + i v`` of ``Q = q``,
+Stability is that of the complex slow flow ``2 (i W + z w) Q' = L exp(i psi) - D(|Q|) Q``, ``D = w^2 - W^2 + 2 i W w z`` under
+constant force and frequency. With a disturbance ``u + i v`` of ``Q = q``,
 
     2 (i W + z w) (u + i v)' = -(D + q dD/dq - (q D / L) dL/dq) u - i D v,
 
@@ -40,21 +40,21 @@ _GRID = 4000
 
 
 def modal_stiffness(properties: ModalProperties, q: Float, omega: Float) -> Complex:
-    """complex[n]: ``D = w^2 - W^2 + 2 i W w z``; its angle is the lag of the modal coordinate behind the force."""
+    """complex[n]: ``D = w^2 - W^2 + 2 i W w z``; its angle is the phase lag of the modal coordinate behind the force."""
     w, z = properties.frequency_rad_s(q), properties.damping_ratio(q)
     return np.asarray(w**2 - omega**2 + 2j * omega * w * z)
 
 
 @dataclass(frozen=True)
 class Path:
-    """One connected branch of solutions: amplitudes from ``lowest`` to ``highest``; closed if detached from rest."""
+    """One connected branch of solutions with amplitudes from ``lowest`` to ``highest``; closed if detached from rest."""
 
     lowest: float
     highest: float
     closed: bool
 
     def at(self, s: Float) -> tuple[Float, Float]:
-        """Modal amplitude and sign of the square root at path parameters in [0, pi] (main) or [0, 2 pi] (closed)."""
+        """Return modal amplitude and sign of the square root at path parameters in [0, pi] (main) or [0, 2 pi] (closed)."""
         if not self.closed:
             return self.highest * np.sin(s), np.where(s <= 0.5 * np.pi, -1.0, 1.0)
         middle, half = 0.5 * (self.highest + self.lowest), 0.5 * (self.highest - self.lowest)
@@ -77,16 +77,16 @@ class OneMode:
     fundamental_n: Callable[[Float], Float]
 
     def modal_force(self, q: Float) -> Float:
-        """float[n]: L, kg^1/2 m/s^2."""
+        """float[n]: modal force L, kg^1/2 m/s^2."""
         return np.asarray(self.properties.drive_shape(q) * self.fundamental_n(q))
 
     def discriminant(self, q: Float) -> Float:
-        """float[n]: P, (rad/s)^4."""
+        """float[n]: discriminant P, (rad/s)^4."""
         w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
         return np.asarray((self.modal_force(q) / q) ** 2 - 4.0 * w**4 * z**2 * (1.0 - z**2))
 
     def paths(self, highest_q: float) -> tuple[list[Path], float | None]:
-        """All branches of solutions up to ``highest_q``, and where one begins that is still open there (else None)."""
+        """Return all branches up to ``highest_q``, and the amplitude at which a branch begins that is still open there."""
         from scipy.optimize import brentq
 
         grid = highest_q * np.geomspace(_LOWEST_SHARE, 1.0, _GRID)
@@ -102,10 +102,10 @@ class OneMode:
         return [Path(low, high, low > 0.0) for low, high in zip(ends[::2], ends[1::2], strict=True)], opened
 
     def amplitudes(self, omega: float, highest_q: float, *, missed: float = 0.0) -> Float:
-        """float[n]: all modal amplitudes up to ``highest_q`` that are steady states at the frequency ``omega``, rising.
+        """float[n]: modal amplitudes of all steady states up to ``highest_q`` at the frequency ``omega``, rising.
 
-        With ``missed`` those too at which the force misses a pair of solutions, just beyond their fold, by less than that
-        share of itself: once for the pair.
+        With ``missed``, a pair of solutions just beyond its fold is included too, as one amplitude, if a change of the force
+        by less than this share would create the pair.
         """
         from scipy.optimize import brentq
 
@@ -125,13 +125,13 @@ class OneMode:
         return np.sort([*found, *(grid[near + 1] * (grid[1] / grid[0]) ** shift)])
 
     def omega(self, q: Float, sign: Float) -> Float:
-        """float[n]: frequency W of the vibration, rad/s; NaN where that branch has none (below its static deflection)."""
+        """float[n]: frequency W of the vibration, rad/s; NaN where the branch has none (below its static deflection)."""
         w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
         squared = w**2 * (1.0 - 2.0 * z**2) + sign * np.sqrt(np.maximum(self.discriminant(q), 0.0))
         return np.asarray(np.sqrt(np.where(squared > 0.0, squared, np.nan)))
 
     def jacobian(self, q: Float, omega: Float) -> tuple[Float, Float]:
-        """Trace and determinant, float[n] each, of the slow flow linearised at the solutions."""
+        """Return trace and determinant, float[n] each, of the slow flow linearised at the solutions."""
         w, z = self.properties.frequency_rad_s(q), self.properties.damping_ratio(q)
         dw, dz, _ = self.properties.slopes(q)
         stiffness = modal_stiffness(self.properties, q, omega)
@@ -160,7 +160,7 @@ def fundamental_motion(
     modes: LinearModes | None,
     residuals: bool,
 ) -> tuple[tuple[str, ...], Complex]:
-    """Names of the channels, drive point first, and complex[n, n_channels] displacement against the force.
+    """Return the names of the channels, drive point first, and their displacement complex[n, n_channels] relative to the force.
 
     Parameters
     ----------
@@ -169,7 +169,8 @@ def fundamental_motion(
     q, omega, fundamental_n
         float[n], modal amplitude, frequency W (rad/s) and peak of the fundamental of the force (N) of each state.
     modes
-        Linear modes for the other channels, whose tested mode is scaled by the drive point's; None for the drive point alone.
+        Linear modes for the other channels: the shape of the tested mode is scaled by the drive-point displacement. None for
+        the drive point alone.
     residuals
         Whether to add the linear response of all modes but the tested one.
     """
@@ -200,7 +201,7 @@ def _turn_rad(mode: NonlinearMode, q: Float) -> Float:
 
 
 def range_notes(properties: ModalProperties, q: Float) -> list[str]:
-    """Notes on a response outside the identified range, one line each."""
+    """Return notes on a response outside the identified range, one line each."""
     use = float(properties.range_use(np.max(q)))
     notes = []
     if use > REFUSED_BEYOND:

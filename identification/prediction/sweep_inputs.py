@@ -1,4 +1,4 @@
-"""What drives a sweep: frequency and complex amplitude over time, from a recording or as designed, on even instants."""
+"""Input of a sweep: frequency and complex amplitude over time, recorded or designed, at equidistant instants."""
 
 from dataclasses import dataclass, replace
 
@@ -17,7 +17,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 BY_ZERO_CROSSINGS = "force by zero crossings"
-"""Origin of a force whose phase is not the sweep's: what follows from it has no phase to compare."""
+"""Origin of a force without the phase of the sweep; predictions from it have no phase to compare."""
 
 _INSTANTS_PER_PERIOD = 16
 _FEWEST_PER_PERIOD = 8
@@ -27,9 +27,10 @@ _UNEVEN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SweepInput:
-    """Frequency (float[n], Hz) and amplitude (complex[n], peak, N or V, against the sweep's phase) at even instants.
+    """Frequency (float[n], Hz) and amplitude (complex[n], peak, N or V, against the sweep's phase) at equidistant instants.
 
-    ``window_periods`` is what the amplitude was already smoothed over, 0 for nothing; ``origin`` says where it is from.
+    ``window_periods`` is the window over which the amplitude was already smoothed, 0 if it was not; ``origin`` names its
+    source.
     """
 
     time_s: Float
@@ -40,11 +41,11 @@ class SweepInput:
 
     @property
     def step_s(self) -> float:
-        """Distance of the instants."""
+        """Time between instants, s."""
         return float(self.time_s[-1] - self.time_s[0]) / (self.time_s.size - 1)
 
     def thinned(self, longest_step_s: float) -> "SweepInput":
-        """Every so many-th instant: no further apart than ``longest_step_s``, at least eight per shortest period."""
+        """Keep every n-th instant: at most ``longest_step_s`` apart, and at least eight per shortest period."""
         longest = min(longest_step_s, 1.0 / (_FEWEST_PER_PERIOD * float(self.frequency_hz.max())))
         every = slice(0, None, max(1, int(longest / self.step_s)))
         return replace(
@@ -54,14 +55,14 @@ class SweepInput:
 
 @dataclass(frozen=True)
 class VoltageSweep:
-    """A sweep of constant voltage that is yet to be made; it begins settled at ``start_hz``.
+    """A planned sweep of constant voltage; it begins in the steady state at ``start_hz``.
 
     Parameters
     ----------
     start_hz, stop_hz
         First and last frequency.
     rate_hz_per_s
-        Rate, linear in time, above zero whichever way it goes.
+        Constant rate, above zero in both directions.
     level_v
         Peak of the recorded voltage, V.
     """
@@ -79,17 +80,17 @@ class VoltageSweep:
 
     @property
     def name(self) -> str:
-        """What it is, for tables."""
+        """Description for tables."""
         return f"{self.level_v:g} V, {self.start_hz:g} to {self.stop_hz:g} Hz, {self.rate_hz_per_s:g} Hz/s"
 
     @property
     def duration_s(self) -> float:
-        """How long the sweep takes, s."""
+        """Duration of the sweep, s."""
         return abs(self.stop_hz - self.start_hz) / self.rate_hz_per_s
 
 
 def voltage_input(source: Transient | VoltageSweep, channel: str) -> SweepInput:
-    """The voltage of a recorded or a designed sweep."""
+    """Return the voltage of a recorded or a designed sweep."""
     if isinstance(source, Transient):
         return _even(source, source.fundamental(channel), 0, "recorded voltage")
     time_s = _instants(0.0, source.duration_s, max(source.start_hz, source.stop_hz))
@@ -101,7 +102,7 @@ def voltage_input(source: Transient | VoltageSweep, channel: str) -> SweepInput:
 
 
 def force_input(source: Transient | HalfPeriods) -> SweepInput:
-    """The force of a recorded sweep: fundamentals, or (half) periods joined by monotone cubics with a phase of zero."""
+    """Return the force of a recorded sweep: fundamentals, or (half) periods joined by monotone cubics, with a phase of zero."""
     if isinstance(source, Transient):
         force = source.fundamentals[find_role(source.channels, "force")]
         return _even(source, force, source.window_periods, "force by demodulation")
@@ -115,7 +116,7 @@ def force_input(source: Transient | HalfPeriods) -> SweepInput:
 
 
 def _instants(start_s: float, stop_s: float, highest_hz: float) -> Float:
-    """Even instants, sixteen per shortest period."""
+    """Return equidistant instants, sixteen per shortest period."""
     wanted = (stop_s - start_s) * highest_hz * _INSTANTS_PER_PERIOD
     if not 2.0 <= wanted <= _MOST_INSTANTS:
         raise IdentificationError(
@@ -126,7 +127,7 @@ def _instants(start_s: float, stop_s: float, highest_hz: float) -> Float:
 
 
 def _even(source: Transient, amplitude: Complex, window_periods: int, origin: str) -> SweepInput:
-    """As recorded where the instants are even and close enough, else by splines."""
+    """Return a recorded sweep as it is if its instants are equidistant and dense enough, else interpolated by splines."""
     time_s, frequency = source.time_s, source.frequency_hz
     if time_s.size < 4:
         raise IdentificationError(f"sweep: has {time_s.size} instants, needs at least 4")

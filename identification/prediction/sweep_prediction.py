@@ -1,4 +1,4 @@
-"""A predicted sweep, and how far it is from a recorded one."""
+"""A predicted sweep, and its errors against a recorded one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,32 +25,32 @@ _ATTRIBUTES = ("largest_identified", "window_periods", "origin", "simulated_rang
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SweepPrediction:
-    """Fundamentals of a predicted sweep over time, peak values, against the phase of what was imposed.
+    """Fundamentals of a predicted sweep over time, peak values, against the phase of the imposed force or voltage.
 
     Parameters
     ----------
     time_s, frequency_hz
-        float[n], instants of the input, and its momentary frequency.
+        float[n], instants of the input, and its instantaneous frequency.
     modal_amplitude
-        complex[n], Q, kg^1/2 m.
+        complex[n], modal amplitude Q, kg^1/2 m.
     drive_m, drive_m_s, drive_m_s2
-        complex[n], displacement, velocity and acceleration of the drive point. In a fast sweep ``|A|`` is not ``W^2 |X|``:
-        the phase of X moves, by percents of the frequency.
+        complex[n], displacement, velocity and acceleration of the drive point. In a fast sweep ``|A|`` differs from
+        ``W^2 |X|``, because the phase of X changes at a rate of some percent of the frequency.
     force
         complex[n], force at the drive point, N.
     largest_identified
-        Largest modal amplitude that the model was identified with.
+        Largest modal amplitude in the identification of the model.
     window_periods
-        What the input had been smoothed over, periods; the prediction then is smoothed as well.
+        Window over which the input was smoothed, in periods; the prediction is then smoothed too.
     origin
-        What was imposed.
+        Name of the imposed input.
     notes
-        What a user should know about this prediction, one line each.
+        Remarks on this prediction, one line each.
     simulated_range_use
-        Of a nonlinear state-space model, whose modal amplitude is NaN: largest state or input over the largest in its
+        For a nonlinear state-space model, whose modal amplitude is NaN: largest state or input over the largest in its
         training data; inf for an unbounded run. None for nonlinear modes.
     unbounded_at_s
-        When the simulated run left all bounds, before which the prediction ends; None if it never did.
+        Time at which the simulated run became unbounded, before which the prediction ends; None if it stayed bounded.
     """
 
     time_s: Float
@@ -80,10 +80,10 @@ class SweepPrediction:
         others: Complex | None,
         notes: tuple[str, ...],
     ) -> "SweepPrediction":
-        """What follows from the modal amplitude and its rate (complex[n], at the instants ``every`` of the input).
+        """Compute a prediction from the modal amplitude and its rate (complex[n], at the instants ``every`` of the input).
 
-        ``F = N - phi (L Q + L' Q')``, ``X_d = phi Q + r F + r' F'``, velocity ``(s + d/dt) X_d``; ``others`` holds r
-        and r' of the other modes (complex[n, 2]), None where the force is imposed.
+        ``F = N - phi (L Q + L' Q')``, ``X_d = phi Q + r F + r' F'``, velocity ``(s + d/dt) X_d``; ``others`` holds r and r'
+        of the other modes (complex[n, 2]); None if the force is imposed.
         """
         s = 2j * np.pi * given.frequency_hz[every]
         step = 2.0 * given.step_s
@@ -115,27 +115,28 @@ class SweepPrediction:
         return float(np.max(np.abs(self.modal_amplitude))) / self.largest_identified
 
     def peak(self, sweep: Transient | None = None) -> tuple[float, float]:
-        """Largest displacement of the drive point (m), and the frequency (Hz) at which it occurs.
+        """Return the largest displacement of the drive point (m) and its frequency (Hz).
 
-        With the recorded ``sweep`` that is the sweep's own frequency at that instant: the one between zero crossings jumps.
+        If the recorded ``sweep`` is given and the force is by zero crossings, it is the frequency of the sweep at that
+        instant, because the frequency between zero crossings jumps.
         """
         where = int(np.argmax(np.abs(self.drive_m)))
         return float(abs(self.drive_m[where])), float(self.swept_hz(sweep)[where])
 
     def swept_hz(self, sweep: Transient | None = None) -> Float:
-        """float[n]: frequency at each instant, Hz; that of the recorded ``sweep`` where the force is by zero crossings."""
+        """float[n]: frequency at each instant, Hz; that of the recorded ``sweep`` if the force is by zero crossings."""
         if sweep is None or self.origin != BY_ZERO_CROSSINGS:
             return self.frequency_hz
         return np.asarray(np.interp(self.time_s, sweep.time_s, sweep.frequency_hz))
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         attributes = {name: getattr(self, name) for name in _ATTRIBUTES}
         return {name: getattr(self, name) for name in _ARRAYS}, {**attributes, "notes": list(self.notes)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "SweepPrediction":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
         try:
             values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
             return cls(**values, **{**attributes, "notes": tuple(attributes["notes"])})
@@ -143,7 +144,7 @@ class SweepPrediction:
             raise IdentificationError(f"sweep prediction: {error} is missing or unknown") from None
 
     def smoothed(self, values: Complex, window_periods: int) -> Complex:
-        """``values`` (complex[n]) as `identification.demodulate` would show them: a mean over half the window, twice."""
+        """Smooth ``values`` (complex[n]) as `identification.demodulate` does: a mean over half the window, twice."""
         turned = np.concatenate([[0.0], np.cumsum(0.5 * (self.frequency_hz[1:] + self.frequency_hz[:-1]))])
         turned *= (self.time_s[-1] - self.time_s[0]) / max(self.time_s.size - 1, 1)
         reach = 0.25 * window_periods
@@ -156,10 +157,10 @@ class SweepPrediction:
 
 
 def as_recorded(prediction: SweepPrediction, sweep: Transient) -> tuple[Float, Float, Float]:
-    """Amplitudes that can be held against each other: of a recorded sweep, and of its prediction as a recording shows it.
+    """Return comparable amplitudes of a recorded sweep and of its prediction.
 
-    Returns the drive point's displacement (m) as recorded, at the instants of ``sweep``, that predicted, and the force (N)
-    predicted, both at the instants of ``prediction``, smoothed like the recording. See `compare_sweep`.
+    These are the recorded drive-point displacement (m) at the instants of ``sweep``, the predicted one, and the predicted
+    force (N), both at the instants of ``prediction`` and smoothed like the recording. See `compare_sweep`.
     """
     row = find_role(sweep.channels, "drive")
     order = MOTION_ORDER[sweep.channels[row].motion]
@@ -174,15 +175,15 @@ def as_recorded(prediction: SweepPrediction, sweep: Transient) -> tuple[Float, F
 
 
 def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = "") -> PredictionError:
-    """Errors of a predicted sweep against the recorded one it belongs to, on the same time axis.
+    """Compare a predicted sweep with the corresponding recorded one, on the same time axis.
 
-    Compared is the fundamental of the drive channel, be it displacement, velocity or acceleration, over that power of the
-    momentary W that makes it a displacement. The prediction is smoothed like the recording, which lowers a fast
-    sweep's peak. Where the force is by zero crossings, frequency and phase jump: there the predicted displacement is taken
-    as it is, and the sweep's own frequency at the instant of its peak.
+    The fundamental of the drive channel (displacement, velocity or acceleration) is divided by the power of the instantaneous
+    W that converts it to a displacement. The prediction is smoothed like the recording, which lowers the peak of a fast
+    sweep. If the force is by zero crossings, its frequency and phase jump. The predicted displacement is then not smoothed,
+    and the peak frequency is that of the recorded sweep at the instant of the peak.
 
-    Errors of an unbounded run are NaN. Raises `IdentificationError` where they have no time in common, or the recording no
-    drive channel.
+    Errors of an unbounded run are NaN. Raises `IdentificationError` if the two have no time in common, or the recording has
+    no drive channel.
     """
     if prediction.unbounded_at_s is not None:
         nothing = float("nan")

@@ -1,24 +1,24 @@
-"""Sweeps through the resonance of a nonlinear mode by slow flow: force imposed, or exciter coupled and voltage imposed.
+"""Predict sweeps through the resonance of a nonlinear mode by slow flow, with imposed force or with coupled exciter.
 
-Near resonance the complex modal amplitude Q against the sweep's phase theta (``W = theta'``, ``s = i W``) obeys
+Near resonance the complex modal amplitude Q, relative to the phase theta of the sweep (``W = theta'``, ``s = i W``), obeys
 
     D(s + d/dt) Q = phi N(s + d/dt) u,    D(s) = s^2 + 2 z w s + w^2 + phi^2 L(s),
 
-w, z at ``|Q|``. With the force imposed (founding paper, slow-flow equations) u is the force, N = 1 and L = 0. With the
-exciter coupled u is the voltage; from ``X_a = phi Q + r F`` and ``F = g_e V - Z X_a`` follow
+with w and z at ``|Q|``. With imposed force (founding paper, slow-flow equations) u is the force, N = 1 and L = 0. With
+coupled exciter u is the voltage; from ``X_a = phi Q + r F`` and ``F = g_e V - Z X_a`` follow
 
     N = g_e / (1 + Z r),    L = Z / (1 + Z r),    F = N V - L phi Q,
 
-r the receptance of the other modes plus the stinger's compliance.
+where r is the receptance of the other modes plus the compliance of the stinger.
 
-Slow flow. D has a root lambda near s, ``D = (s - lambda) G(s)`` with smooth G, so that ``(d/dt + s - lambda) Q`` is
-``phi N/G`` of the input, exactly so for a linear system, transients included, whatever theta does; what is left out is
-``(N/G)'' W'`` and smaller. One step of Halley's method gives ``s - lambda = D / G`` with ``G = D' - D D'' / (2 D')``,
-and expansion of N/G to first order
+Slow flow. D has a root lambda near s, ``D = (s - lambda) G(s)`` with smooth G, so that ``(d/dt + s - lambda) Q`` equals
+``phi N/G`` applied to the input. For a linear system this is exact for any theta, including transients. The neglected terms
+are of the order of ``(N/G)'' W'``. One step of Halley's method gives ``s - lambda = D / G`` with ``G = D' - D D'' / (2 D')``,
+and an expansion of N/G to first order gives
 
     Q' = [phi (N u + N' u' - D''/(2 G) N u') - D Q] / G.
 
-The founding paper's is that with ``G = 2 i W`` and without u'.
+The equation of the founding paper is the same with ``G = 2 i W`` and without u'.
 """
 
 from typing import Literal
@@ -52,10 +52,10 @@ Float = NDArray[np.float64]
 _Tables = tuple[Float, Float, Float, Float, Float]
 
 _TABLE_SIZE = 1024
-_UNBOUNDED = 1e3  # times the identified range: there the integration of an imposed force ends
+_UNBOUNDED = 1e3  # times the identified range: the integration ends there if extrapolation is allowed
 _AT_REST = 1e-3
 _SETTLED = 12.0  # time constants
-_STEP_RAD = 0.4  # turn of the amplitude against its steady state within one step of Runge-Kutta
+_STEP_RAD = 0.4  # rotation of the amplitude relative to its steady state within one Runge-Kutta step
 _LEAST_DECAY = 1e-4
 
 
@@ -69,38 +69,39 @@ def predict_sweep(
     damping: Literal["fundamental", "total-power"] = "fundamental",
     allow_extrapolation: bool = False,
 ) -> SweepPrediction:
-    """Response of one nonlinear mode to a sweep.
+    """Predict the response of one nonlinear mode to a sweep.
 
     Parameters
     ----------
     mode
-        Identified mode, or its properties over the modal amplitude (``damping`` and ``allow_extrapolation`` are theirs then).
+        Identified mode, or its properties over the modal amplitude, which then determine ``damping`` and
+        ``allow_extrapolation``.
     sweep
-        Without ``exciter`` the force is imposed: fundamentals (`Transient`) or (half) periods of the recorded force. With
-        it the voltage is: that of a recording (`Transient`), or a `VoltageSweep` that is yet to be made.
+        Without ``exciter``, the recorded force is imposed: its fundamentals (`Transient`) or its (half) periods. With
+        ``exciter``, the voltage is imposed: that of a recording (`Transient`) or of a planned `VoltageSweep`.
     exciter
-        Exciter of this very rig.
+        Exciter identified on the same rig.
     modes
-        Linear modes of the structure; the others than the tested one take part with their receptance. With a hung or
-        otherwise soft structure they matter by several percent.
+        Linear modes of the structure; all but the tested one contribute by their receptance. For a suspended or otherwise
+        soft structure their contribution is several percent.
     voltage
-        Name of the voltage's channel.
+        Name of the voltage channel.
     damping
         Damping ratio to use, see `ModalProperties.of`.
     allow_extrapolation
-        Whether to go on beyond twice the modal amplitude that was identified.
+        Whether to continue beyond twice the largest identified modal amplitude.
 
     Returns
     -------
     SweepPrediction
-        From the first instant of the input on, settled there.
+        Prediction from the first instant of the input, in the steady state there.
 
     Raises
     ------
     ExtrapolationError
-        Where the modal amplitude exceeds twice the identified one, and that was not allowed.
+        If the modal amplitude exceeds twice the largest identified one and extrapolation is not allowed.
     IdentificationError
-        Where input and exciter do not go together.
+        If input and exciter do not match.
     """
     properties = mode
     if isinstance(mode, NonlinearMode):
@@ -122,7 +123,7 @@ def predict_sweep(
 
 
 def _imposed(given: SweepInput) -> tuple[Complex, Complex, Complex]:
-    """Force, its rate, and no load (complex[n], complex[n], complex[n, 3])."""
+    """Return the force, its rate, and zero load (complex[n], complex[n], complex[n, 3])."""
     rate = np.gradient(given.amplitude, given.step_s) if given.window_periods else np.zeros_like(given.amplitude)
     return given.amplitude, rate, np.zeros((given.time_s.size, 3), np.complex128)
 
@@ -132,7 +133,8 @@ def _coupled(
 ) -> tuple[Complex, Complex, Complex, Complex]:
     """``N V + N' V'`` and ``N V'`` (complex[n]), the load L (complex[n, 3]), and r of the other modes (complex[n, 2]).
 
-    All are smooth functions of frequency: they and their derivatives by s are read from a fine table, on straight lines.
+    All are smooth functions of frequency. They and their derivatives with respect to s are interpolated linearly in a fine
+    table.
     """
     low, high = float(given.frequency_hz.min()), float(given.frequency_hz.max())
     table_hz = np.linspace(low * (1.0 - 1e-6), high * (1.0 + 1e-6), _TABLE_SIZE)
@@ -165,7 +167,7 @@ def _integrate(
     others: Complex | None,
     notes: tuple[str, ...],
 ) -> SweepPrediction:
-    """The slow flow over every other instant, and what follows from it."""
+    """Integrate the slow flow over every other instant and return the resulting prediction."""
     p = properties
     kept = slice(0, 2 * ((given.time_s.size - 1) // 2) + 1)
     s = 2j * np.pi * given.frequency_hz[kept]
@@ -202,7 +204,7 @@ def _integrate(
 
 
 def _settled(p: ModalProperties, s: complex, drive: complex, load: Complex, tables: _Tables) -> complex:
-    """Steady amplitude under a constant input, from rest, by steps that the detuning at the smallest amplitude allows."""
+    """Return the steady amplitude under a constant input, integrated from rest with a step set by the detuning."""
     small = 1e-3 * p.q_range[0]
     detuning = -modal_rate(small + 0j, s, 0j, 0j, load, *tables) / small
     step_s = _STEP_RAD / abs(detuning)

@@ -1,8 +1,8 @@
-"""What the standard errors of a nonlinear mode mean for the responses predicted from it, by Monte Carlo.
+"""Uncertainty of predicted responses from the standard errors of a nonlinear mode, by Monte Carlo.
 
-The mode's frequencies and damping ratios are drawn about their values, independently at each level. An error of the
-mass-normalised drive shape, common to all levels, cancels at the drive point: q, phi_d and z change so that the
-predicted displacement per force stays.
+The modal frequencies and damping ratios are drawn about their values, independently at each level. An error of the
+mass-normalised drive shape is common to all levels and cancels at the drive point: q, phi_d and z change so that the
+predicted displacement per force remains the same.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ class ResponseBand:
     Parameters
     ----------
     phase_lag_deg
-        float[n], lags of the displacement, rising.
+        float[n], phase lags of the displacement, rising.
     amplitude_m, frequency_hz
         float[2, n], ends of the 95 % intervals at each lag.
     peak_amplitude_std_m, peak_frequency_std_hz
@@ -56,7 +56,7 @@ def response_band(
     seed: int = 0,
     allow_extrapolation: bool = False,
 ) -> ResponseBand:
-    """Monte Carlo over the standard errors of modal frequency and damping, those of the total power's damping alike.
+    """Propagate the standard errors of modal frequency and damping to a predicted response, by Monte Carlo.
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ def response_band(
     draws
         Number of draws, at least 20.
     seed
-        Of the random numbers.
+        Seed of the random numbers.
 
     Raises
     ------
     IdentificationError
-        If a level has no standard error, or on fewer than 20 draws.
+        If a level has no standard error, or ``draws`` is below 20.
     """
     if draws < 20:
         raise IdentificationError(f"draws: is {draws}, needs at least 20")
@@ -103,7 +103,7 @@ def response_band(
 
 
 def _drawn(mode: NonlinearMode, random: np.random.Generator) -> NonlinearMode:
-    """One draw of the mode; damping ratios stay above a twentieth of their value."""
+    """Return one draw of the mode; damping ratios stay above a twentieth of their value."""
     levels = mode.force_n.size
     moved = mode.damping_ratio_std * random.standard_normal(levels)
     return replace(

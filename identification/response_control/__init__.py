@@ -1,1 +1,1 @@
-"""Response-controlled tests: the force over frequency and response level, and curves at constant force cut from it."""
+"""Response-controlled tests: force over frequency and response level, and curves at constant force from it."""

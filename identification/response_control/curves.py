@@ -17,29 +17,29 @@ __all__ = ["ConstantForceCurve", "Section", "cut"]
 Float = NDArray[np.float64]
 
 _LAG_STEP_DEG = 0.5
-"""Half step of the differences that tell where the frequency falls with the lag."""
+"""Half step of the finite differences that show where the frequency falls with the lag."""
 
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """What the levels of a surface say at one lag: frequency (rad/s) and ``ln |F|`` over ``ln X``, each [n_levels]."""
+    """Levels of a surface at one lag: frequency W (rad/s) and ``ln |F|`` over ``ln X``, each [n_levels]."""
 
     lag: float
     log_amplitude: Float
     omega: Float
     log_force: Float
     covariance: Float
-    """Of W and ``ln |F|`` of every level [n_levels, 2, 2]; levels are independent."""
+    """Covariance of W and ``ln |F|`` of every level [n_levels, 2, 2]; levels are independent."""
 
     def thinned(self) -> "Section":
-        """Every second level and the last."""
+        """Return every second level and the last."""
         keep = np.arange(self.omega.size) % 2 == 0
         keep[-1:] = True
         arrays = ("log_amplitude", "omega", "log_force", "covariance")
         return replace(self, **{name: getattr(self, name)[keep] for name in arrays})
 
     def doubts(self) -> Float:
-        """How far each level's ``ln |F|`` is from what its neighbours say [n_levels]; zero at the ends."""
+        """Deviation of each level's ``ln |F|`` from the interpolation of the other levels [n_levels]; zero at the ends."""
         doubts = np.zeros(self.omega.size)
         for k in range(1, self.omega.size - 1):
             others = np.delete(self.log_amplitude, k), np.delete(self.log_force, k)
@@ -59,7 +59,7 @@ class Section:
         return float(self._omega(log_amplitude, 1)), float(self._log_force(log_amplitude, 1))
 
     def amplitudes_at(self, log_force: float) -> Float:
-        """All ``ln X`` of a force, within the levels."""
+        """All ``ln X`` at which the force has a value, within the levels."""
         if self.omega.size < 2:
             return np.empty(0)
         roots = self._log_force.solve(log_force, extrapolate=False)
@@ -73,7 +73,7 @@ class Section:
         """Variances of W and of ``ln X`` at constant force, from those of the levels."""
         shares = _linear_shares(self.log_amplitude, log_amplitude)
         by_amplitude, force_slope = self.slopes(log_amplitude)
-        # at constant force d ln X = -d ln|F| / slope, and W moves along
+        # at constant force d ln X = -d ln|F| / slope, and W changes with ln X
         change = np.array([[1.0, -by_amplitude / force_slope], [0.0, -1.0 / force_slope]])
         covariance = change @ np.einsum("l,lij->ij", shares**2, self.covariance) @ change.T
         return float(covariance[0, 0]), float(covariance[1, 1])
@@ -84,24 +84,26 @@ class ConstantForceCurve:
     """A frequency response at constant force cut from a force surface; points in the order of the lag."""
 
     response: FrequencyResponse
-    """Frequency, force and displacement at the drive point [n], the phase of the displacement zero."""
+    """Frequency, force and displacement at the drive point [n]; the phase of the displacement is zero."""
     frequency_std_hz: Float
     """Standard error [n] from the scatter of the measured points about the fits of their levels."""
     amplitude_std_m: Float
-    """The same of the displacement [n]."""
+    """Standard error of the displacement [n], from the same scatter."""
     frequency_change_hz: Float
-    """Change [n] if every second level is left out; NaN where too few remain. An upper bound of what the
-    interpolation between levels costs, in practice by far."""
+    """Change of the frequency [n] if every second level is left out; NaN where too few levels remain.
+
+    It is an upper bound of the error of the interpolation between levels, in practice by a large margin.
+    """
     amplitude_change: Float
-    """The same of the displacement [n], relative."""
+    """Relative change of the displacement [n] if every second level is left out."""
     stable: NDArray[np.bool_]
-    """Whether constant force and frequency hold the point [n]: the frequency grows with the lag."""
+    """Whether the point [n] is stable under constant force and frequency: the frequency rises with the lag."""
     notes: tuple[str, ...] = ()
-    """Where the curve ends and why."""
+    """Notes on where the curve ends and why."""
 
 
 def cut(section_at: Callable[[float], Section], force_n: float, lags_deg: Float, specimen: str) -> ConstantForceCurve:
-    """The curve at ``force_n`` through the sections at ``lags_deg``; `IdentificationError` where there is none."""
+    """Return the curve at ``force_n`` through the sections at ``lags_deg``; raise `IdentificationError` if there is none."""
     target = float(np.log(positive("force_n", force_n, "N")))
     sections = [section_at(float(lag)) for lag in lags_deg]
     amplitude, several = _followed(sections, target, int(np.argmin(np.abs(lags_deg - 90.0))))
@@ -130,7 +132,7 @@ def cut(section_at: Callable[[float], Section], force_n: float, lags_deg: Float,
 
 
 def _followed(sections: list[Section], target: float, first: int) -> tuple[Float, tuple[str, ...]]:
-    """``ln X`` at every lag, nearest to that of the lag before, from resonance outwards; and what else there was."""
+    """Return ``ln X`` at every lag, followed from resonance outwards by continuity, and a note on further solutions."""
     roots = [section.amplitudes_at(target) for section in sections]
     amplitude = np.full(len(sections), np.nan)
     for order in (range(first, len(sections)), range(first - 1, -1, -1)):
@@ -147,14 +149,14 @@ def _followed(sections: list[Section], target: float, first: int) -> tuple[Float
 
 
 def _nearest(roots: Float, known: float) -> float:
-    """The root nearest to ``known``, the largest without it; NaN without any."""
+    """Return the root nearest to ``known``, or the largest if ``known`` is NaN; NaN if there are no roots."""
     if not roots.size:
         return float("nan")
     return float(roots[np.argmin(np.abs(roots - known))] if np.isfinite(known) else np.max(roots))
 
 
 def _rising(section_at: Callable[[float], Section], target: float, lags_deg: Float, amplitude: Float) -> Any:
-    """Whether the frequency grows with the lag along the curve [n], by differences about every point."""
+    """Return whether the frequency rises with the lag along the curve [n], by finite differences at every point."""
     rising = np.ones(lags_deg.size, dtype=np.bool_)
     for k, (lag, known) in enumerate(zip(lags_deg, amplitude, strict=True)):
         ends = []
@@ -167,7 +169,7 @@ def _rising(section_at: Callable[[float], Section], target: float, lags_deg: Flo
 
 
 def _left(lags_deg: Float, on: NDArray[np.int64]) -> tuple[str, ...]:
-    """What is said of lags at which the force meets no level."""
+    """Return a note on lags at which no measured level has the force."""
     off = np.delete(lags_deg, on)
     if not off.size:
         return ()
@@ -178,7 +180,7 @@ def _left(lags_deg: Float, on: NDArray[np.int64]) -> tuple[str, ...]:
 
 
 def _reach(sections: list[Section]) -> str:
-    """The forces that the levels hold at the lag that was measured best."""
+    """Describe the range of forces at the lag with the most levels."""
     best = max(sections, key=lambda one: one.omega.size)
     if best.omega.size < 2:
         return "fewer than two levels were measured at any of the lags"
@@ -187,7 +189,7 @@ def _reach(sections: list[Section]) -> str:
 
 
 def _linear_shares(x: Float, at: float) -> Float:
-    """Shares of the two neighbours of ``at`` in ``x``, as a line through them has."""
+    """Weights of the two neighbours of ``at`` in ``x`` in a linear interpolation."""
     upper = int(np.clip(np.searchsorted(x, at), 1, x.size - 1))
     shares = np.zeros(x.size)
     shares[upper] = (at - x[upper - 1]) / (x[upper] - x[upper - 1])
@@ -196,10 +198,10 @@ def _linear_shares(x: Float, at: float) -> Float:
 
 
 def _interpolant(x: Float, values: Float) -> Any:
-    """Monotone piecewise cubic through ``values`` [n, ...] over rising ``x`` (Fritsch & Carlson 1980).
+    """Return the monotone piecewise cubic through ``values`` [n, ...] over rising ``x`` (Fritsch & Carlson 1980).
 
-    Joints that begin to slip leave kinks in the force over the amplitude, beside which a spline swings: in the friction
-    beam by twice the error. A force that rises from level to level is met once.
+    Joints that begin to slip cause kinks in the force over the amplitude, next to which a spline oscillates; on the friction
+    beam this doubles the error. Where the force rises from level to level, each force has a single solution.
     """
     from scipy.interpolate import PchipInterpolator
 

@@ -1,13 +1,13 @@
 """The force surface of a response-controlled test, and frequency responses at constant force cut from it.
 
-A test that holds the displacement amplitude X of the drive point has no folds: at every level the structure answers as a
-linear one. The levels together are a surface, the harmonic force over frequency and amplitude, and its contours are
-the frequency responses at constant force, turning points and unstable branches included, though no loop ever held
-them (Karaagacli & Ozguven, Mech. Syst. Signal Process. 2021, harmonic force surfaces from response-controlled tests).
+A test that holds the displacement amplitude X of the drive point has no folds: at every level the structure responds like a
+linear one. The levels together form a surface, the harmonic force over frequency and amplitude. Its contours are the
+frequency responses at constant force, including turning points and unstable branches, although no controller stabilised these
+(Karaagacli & Ozguven, Mech. Syst. Signal Process. 2021, harmonic force surfaces from response-controlled tests).
 
-Here the surface is spanned by amplitude and phase lag, not by amplitude and frequency: at one lag the frequency and
-``ln |F|`` are smooth and single-valued in ``ln X``, also where the resonance moves by many of its widths between two
-levels. Levels are fitted one by one (`levels`); in between the two are interpolated at the same lag.
+Here the surface is spanned by amplitude and phase lag instead of amplitude and frequency. At one lag the frequency and
+``ln |F|`` are smooth and single-valued in ``ln X``, even if the resonance shifts by many bandwidths between two levels.
+Levels are fitted one by one (`levels`); between levels, frequency and ``ln |F|`` are interpolated at the same lag.
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ class ForceSurface:
     """Force and frequency over response level and phase lag, as fitted level by level; built by `force_surface`."""
 
     levels: tuple[LevelFit, ...]
-    """Smallest amplitude first."""
+    """Fits of the levels, smallest amplitude first."""
     specimen: str = ""
 
     @property
@@ -46,11 +46,11 @@ class ForceSurface:
 
     @property
     def fit_residual(self) -> Float:
-        """float[n_levels]: RMS of what the fit of each level leaves, relative."""
+        """float[n_levels]: relative RMS residual of the fit of each level."""
         return np.array([level.residual for level in self.levels])
 
     def section(self, phase_lag_deg: float) -> Section:
-        """Frequency and force of the levels that were measured at a lag of the displacement behind the force."""
+        """Return frequency and force, at a lag of the displacement behind the force, of the levels measured at that lag."""
         lag = float(np.radians(phase_lag_deg))
         found = [(level.amplitude_m, *level.at_lag(lag)) for level in self.levels]
         known = [one for one in found if np.isfinite(one[1])]
@@ -59,7 +59,7 @@ class ForceSurface:
         return Section(lag, np.log(amplitude), omega, stiffness + np.log(amplitude), covariance)
 
     def at_lag(self, phase_lag_deg: float = 90.0) -> FrequencyResponse:
-        """One point per level at one lag, by default phase resonance: a backbone, for `single_point_mode`."""
+        """Return one point per level at one lag, by default at phase resonance: a backbone, for `single_point_mode`."""
         section = self.section(phase_lag_deg)
         if not section.omega.size:
             raise IdentificationError(f"phase_lag_deg: is {phase_lag_deg:g}, no level was measured there")
@@ -70,10 +70,10 @@ class ForceSurface:
         return FrequencyResponse(frequency, force, amplitude, "displacement", "none", level, label, self.specimen)
 
     def next_level_m(self) -> float:
-        """Displacement at which one more level tells most: in the gap whose ends their neighbours foretell worst.
+        """Displacement at which one more level is most informative: in the gap whose ends are interpolated worst.
 
-        Where the force has kinks over the amplitude, half of the levels evenly spaced and the rest by this do better than
-        all of them evenly spaced.
+        If the force has kinks over the amplitude, spacing half of the levels evenly and choosing the rest by this method is
+        better than spacing all evenly.
         """
         worst, where = 0.0, float("nan")
         for section in (self.section(lag) for lag in _LAGS_DEG[:: _LAGS_DEG.size // 8]):
@@ -89,7 +89,7 @@ class ForceSurface:
         return where
 
     def constant_force(self, force_n: float, phase_lags_deg: ArrayLike | None = None) -> ConstantForceCurve:
-        """Frequency response at a constant fundamental force, from below to above resonance.
+        """Compute the frequency response at a constant fundamental force, from below to above resonance.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class ForceSurface:
         Raises
         ------
         IdentificationError
-            On values that are not allowed, and where the force meets no measured level at any of the lags.
+            If a value is out of its range, or no measured level has this force at any of the lags.
         """
         lags = np.atleast_1d(np.asarray(_LAGS_DEG if phase_lags_deg is None else phase_lags_deg, dtype=np.float64))
         if lags.ndim != 1 or not np.all((lags > 0.0) & (lags < 180.0)) or np.any(np.diff(lags) <= 0.0):
@@ -110,19 +110,19 @@ class ForceSurface:
 
 
 def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
-    """Force surface of the response-controlled levels of a test.
+    """Fit the force surface of the response-controlled levels of a test.
 
     Parameters
     ----------
     responses
-        Measured levels at the drive point, by frequency or by lag, in any order; levels of the same nominal value are
-        taken together (up and down). Those not response-controlled are refused. Amplitudes that missed their level are
-        brought to it along the slope of the surface at the same lag.
+        Measured levels at the drive point, by frequency or by lag, in any order; levels of the same nominal value (up and
+        down) are combined. Levels that are not response-controlled raise an error. Points whose amplitude deviates from their
+        level are corrected along the slope of the surface at the same lag.
 
     Raises
     ------
     IdentificationError
-        On fewer than three levels, levels of fewer than four points or on one side of resonance only.
+        If there are fewer than three levels, or if a level has fewer than four points or lies on one side of resonance only.
     """
     for response in responses:
         if response.controlled != "response":
@@ -139,7 +139,7 @@ def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
 
 
 def _by_level(responses: Sequence[FrequencyResponse]) -> list[LevelPoints]:
-    """Points of every level, those of equal levels together."""
+    """Return the points of every level, with equal levels combined."""
     groups: list[list[FrequencyResponse]] = []
     for response in sorted(responses, key=lambda one: one.level):
         if groups and response.level <= groups[-1][0].level * (1.0 + _SAME_LEVEL):
@@ -169,7 +169,7 @@ def _fits(points: Sequence[LevelPoints]) -> tuple[LevelFit, ...]:
 
 
 def _at_level(surface: ForceSurface, points: LevelPoints) -> LevelPoints:
-    """Points with their deviations from the level's amplitude taken out, each along its own lag."""
+    """Correct the points for their deviations from the level's amplitude, each along its own lag."""
     level = float(np.log(np.median(points.amplitude_m)))
     off = np.log(points.amplitude_m) - level
     moves = np.zeros((2, off.size))
@@ -177,5 +177,5 @@ def _at_level(surface: ForceSurface, points: LevelPoints) -> LevelPoints:
         section = surface.section(float(np.degrees(np.angle(points.stiffness[k]))))
         if section.omega.size > 1:
             moves[:, k] = section.slopes(float(np.clip(level, *section.log_amplitude[[0, -1]])))
-    # the slope of ln|F| less that of ln X is that of ln|S|
+    # the slope of ln|S| is the slope of ln|F| minus that of ln X, which is one
     return points.moved(moves[0] * off, np.where(moves[0] == 0.0, 0.0, moves[1] - 1.0) * off)

@@ -1,10 +1,10 @@
 """Dynamic stiffness of one response level, as a polynomial of the frequency.
 
-Where the amplitude of the response is held, the dynamic stiffness ``S = F / X`` of a nonlinear structure is that of a
-quasi-linear one: ``phi_d^2 S = w^2 - W^2 + 2 i W w z`` with w and z of that amplitude, and a small share of the other
-modes. Over the half-power range all of it is a polynomial of low degree in W, linear in its coefficients; the degree is
-that with the smallest leave-one-out error over all levels. Equations are weighted by ``1 / |S|``: noise in proportion
-to the force.
+If the amplitude of the response is held, the dynamic stiffness ``S = F / X`` of a nonlinear structure is that of a
+quasi-linear one: ``phi_d^2 S = w^2 - W^2 + 2 i W w z``, with w and z at that amplitude, plus a small contribution of the
+other modes. Within the half-power bandwidth S is well approximated by a polynomial of low degree in W, linear in its
+coefficients. The degree is the one with the smallest leave-one-out error over all levels. Equations are weighted by
+``1 / |S|``, which suits noise in proportion to the force.
 """
 
 from collections.abc import Sequence
@@ -25,12 +25,12 @@ Complex = NDArray[np.complex128]
 HIGHEST_DEGREE = 4
 _LEAST_POINTS = 4
 _SPARE_POINTS = 2
-"""Points beyond the degree that are left to tell the scatter from: one more than coefficients."""
+"""Number of points beyond the degree that a fit needs to estimate the scatter: one more than coefficients."""
 _GRID = 201
 _NEWTON = 2
-"""Steps from the grid's lag to the exact one."""
+"""Number of Newton steps from the lag on the grid to the exact one."""
 _MARGIN = 0.02
-"""How far a lag may lie beyond the measured points, over half their range of frequency: noise moves the ends."""
+"""Margin for lags beyond the measured points, over half their frequency range: noise shifts the ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,35 +42,37 @@ class LevelPoints:
     amplitude_m: Float
 
     def moved(self, omega: Float, log_stiffness: Float) -> "LevelPoints":
-        """The points with changes of frequency and of ``ln |S|`` taken off, their lags as they are."""
+        """Return the points with changes of frequency and of ``ln |S|`` subtracted, their lags unchanged."""
         return LevelPoints(self.omega - omega, self.stiffness * np.exp(-log_stiffness), self.amplitude_m)
 
 
 @dataclass(frozen=True, eq=False)
 class LevelFit:
-    """``S(W) = sum_j c_j x^j, x = (W - centre) / half_range``, within ``|x| <= 1``."""
+    """Polynomial ``S(W) = sum_j c_j x^j, x = (W - centre) / half_range``, within ``|x| <= 1``."""
 
     amplitude_m: float
     centre: float
     half_range: float
     coefficients: Complex
-    """[degree + 1], lowest power first."""
+    """Coefficients [degree + 1], lowest power first."""
     covariance: Float
-    """Covariance of their real and of their imaginary parts [2, degree + 1, degree + 1], over the scatter of each.
+    """Covariance of the real and of the imaginary parts of the coefficients [2, degree + 1, degree + 1].
 
-    They differ: a wrong amplitude moves the resonance, and with it the real part."""
+    It is computed from the scatter of each part. They differ, because an amplitude error shifts the resonance, and with it
+    the real part.
+    """
     residual: float
-    """RMS of what the fit leaves, relative."""
+    """Relative RMS residual of the fit."""
 
     @cached_property
     def _lags(self) -> tuple[Float, Float]:
-        """Grid of x, and the lags there, rising."""
+        """Return a grid of x and the lags there, rising."""
         x = np.linspace(-1.0 - _MARGIN, 1.0 + _MARGIN, _GRID)
         lags = np.unwrap(np.angle(np.polynomial.polynomial.polyval(x, self.coefficients)))
         return x, np.maximum.accumulate(lags)
 
     def at_lag(self, lag_rad: float) -> tuple[float, float, Float]:
-        """W, ``ln |S|`` and their covariance [2, 2] where the displacement lags by ``lag_rad``; NaN out of the points."""
+        """Return W, ``ln |S|`` and their covariance [2, 2] at the displacement lag ``lag_rad``; NaN beyond the points."""
         x, lags = self._lags
         if not lags[0] <= lag_rad <= lags[-1]:
             return np.nan, np.nan, np.full((2, 2), np.nan)
@@ -82,13 +84,13 @@ class LevelFit:
         value, at_powers = float(np.real(turned @ at**powers)), at**powers
         turn = np.array([[np.cos(lag_rad), np.sin(lag_rad)], [-np.sin(lag_rad), np.cos(lag_rad)]])
         scatter = turn @ np.diag(at_powers @ self.covariance @ at_powers) @ turn.T
-        # Im(dS + S' dx) = 0 in the turned plane; ln|S| changes by the real part over |S|.
+        # Im(dS + S' dx) = 0 in the rotated plane; ln|S| changes by the real part over |S|.
         change = np.array([[0.0, -self.half_range / slope.imag], [1.0 / value, -slope.real / slope.imag / value]])
         return self.centre + at * self.half_range, float(np.log(value)), change @ scatter @ change.T
 
 
 def check_level(points: LevelPoints, name: str) -> None:
-    """Raise `IdentificationError` with too few points, at one frequency, on one side of resonance."""
+    """Raise `IdentificationError` if points are too few, at a single frequency, or on one side of resonance only."""
     omega = points.omega
     if omega.size < _LEAST_POINTS:
         raise IdentificationError(f"{name}: {omega.size} points, needs at least {_LEAST_POINTS}")
@@ -103,21 +105,21 @@ def check_level(points: LevelPoints, name: str) -> None:
 
 
 def best_degree(levels: Sequence[LevelPoints]) -> int:
-    """The degree with the smallest leave-one-out error over all levels; their points allow for at least one."""
+    """Return the degree with the smallest leave-one-out error over all levels, which must have enough points for one."""
     highest = min(HIGHEST_DEGREE, min(one.omega.size for one in levels) - _SPARE_POINTS)
     errors = [sum(_scaled(one, degree).left_out ** 2 for one in levels) for degree in range(1, highest + 1)]
     return 1 + int(np.argmin(errors))
 
 
 def fit_level(points: LevelPoints, degree: int) -> LevelFit:
-    """Polynomial of one level."""
+    """Fit the polynomial of one level."""
     fit = _scaled(points, degree)
     amplitude = float(np.median(points.amplitude_m))
     return LevelFit(amplitude, *_centre(points.omega), fit.coefficients, fit.covariance, fit.residual)
 
 
 class _Fit(NamedTuple):
-    """Leave-one-out error, coefficients, covariance and residual, relative."""
+    """Leave-one-out error, coefficients, covariance and relative residual of a fit."""
 
     left_out: float
     coefficients: Complex

@@ -1,1 +1,1 @@
-"""From sampled signals to what they hold: Fourier coefficients, transients over time, sweeps, fewer samples."""
+"""Evaluate sampled signals: Fourier coefficients, transients over time, sweeps, decimation."""

@@ -1,4 +1,4 @@
-"""Slower copies of recordings: low-pass and decimation by a rational factor."""
+"""Resample recordings at a lower rate: low-pass filter and decimation by a rational factor."""
 
 from fractions import Fraction
 from typing import Any
@@ -13,35 +13,36 @@ from identification.validation import finite_array, positive
 __all__ = ["EDGE_SAMPLES", "decimated"]
 
 EDGE_SAMPLES = 32
-"""Samples of the slower signal at either end that feel what lies beyond the record."""
+"""Number of samples of the slower signal at either end that are affected by values beyond the record."""
 LARGEST_FACTOR = 1000
 _KAISER_BETA = 8.6  # 87 dB
-_CORNER = 0.91  # of the new Nyquist frequency: middle of a transition that ends there
+_CORNER = 0.91  # of the new Nyquist frequency: middle of the transition band, which ends at that frequency
 
 
 def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray[np.float64]:
-    """Signals at a lower rate, for instance 5000 Hz -> 800 Hz (by 4/25).
+    """Resample signals at a lower rate, for instance 5000 Hz -> 800 Hz (by 4/25).
 
     Parameters
     ----------
     signals
-        float[n] or float[n_channels, n], evenly sampled.
+        float[n] or float[n_channels, n], uniformly sampled.
     rate_hz, new_rate_hz
-        Samples per second before and after; their ratio must be one of whole numbers up to 1000.
+        Samples per second before and after; their ratio must be a quotient of integers up to 1000.
 
     Returns
     -------
     float[ceil(n new/old)] or float[n_channels, ceil(n new/old)]; its first sample is at the instant of the first one given.
-        The filter has linear phase and no delay (`scipy.signal.resample_poly`, Kaiser window): flat within 1e-4 up to
-        0.82 of the new Nyquist frequency, 87 dB down from the new Nyquist frequency on, so that nothing folds back.
+        The filter has linear phase and no delay (`scipy.signal.resample_poly`, Kaiser window): flat within 1e-4 up to 0.82 of
+        the new Nyquist frequency and 87 dB down above the new Nyquist frequency, which prevents aliasing.
 
-    The record counts as zero beyond its ends: ``EDGE_SAMPLES`` samples of the result at either end are wrong by as much as
-    the signal is not zero there, and are to be left out, or the recorded vibration to be begun and ended in rest.
+    The record is taken as zero beyond its ends. Where the signal is not zero there, ``EDGE_SAMPLES`` samples of the result at
+    either end are in error. Discard them, or begin and end the recording at rest.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, more than two dimensions, a rate that is not lower, or a ratio that is not one of small whole numbers.
+        If values are NaN or infinite, there are more than two dimensions, the new rate is higher, or the ratio is not a
+        quotient of small integers.
     """
     array = finite_array("signals", signals, np.float64, 1 if np.ndim(signals) < 2 else 2)
     old, new = positive("rate_hz", rate_hz, "Hz"), positive("new_rate_hz", new_rate_hz, "Hz")

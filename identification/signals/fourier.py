@@ -1,14 +1,15 @@
-"""Fourier coefficients of every channel by least squares on the oscillator's own phase.
+"""Fourier coefficients of every channel by least squares on the phase of the oscillator.
 
-The record is ``y(t) = Re sum_h Y_h exp(i h theta(t))`` plus what is left over, with the recorded phase theta, so that a
-wandering frequency smears nothing and no whole number of samples per period is needed. A slow drift of the fundamental,
-``(t - t_mid) Re(Z exp(i theta))``, is fitted along as a nuisance. It does not move the fundamental itself (over whole
-periods the two are orthogonal), but without it a drift leaks into the static part and the higher harmonics, which are
-often a thousand times smaller, and counts as noise in the residual. Its size is reported.
+The record is ``y(t) = Re sum_h Y_h exp(i h theta(t))`` plus a residual, with the recorded phase theta. A varying frequency
+therefore causes no smearing, and a period need not be a whole number of samples. A slow drift of the fundamental,
+``(t - t_mid) Re(Z exp(i theta))``, is fitted as a nuisance term. It does not change the fundamental itself (over whole
+periods the two are orthogonal). Without it, however, a drift would leak into the static part and the higher harmonics, which
+are often a thousand times smaller, and would count as noise in the residual. The fitted drift is reported.
 
-A detector's ripple swings the oscillator's phase within every period. A periodic vibration is a Fourier series in time,
-that is in an even phase: on the swinging one, harmonics leak into each other (a swing of one milliradian takes 0.1 % of
-F_2 for F_1). What repeats within every period is therefore taken out of the phase first; slow wander stays.
+The ripple of a detector modulates the phase of the oscillator within every period. A periodic vibration is a Fourier series
+in time, that is, in a uniformly advancing phase; with a modulated phase, harmonics leak into each other (a modulation of one
+milliradian assigns 0.1 % of F_2 to F_1). The part of the phase that repeats within every period is therefore removed first;
+slow variations remain.
 """
 
 from collections.abc import Sequence
@@ -32,7 +33,7 @@ _MAX_BATCHES = 20
 _MIN_BATCHES = 4
 _MANY = 50
 _MOST_LOST = 0.05
-_SAMPLES_TO_SPARE = 3  # that many more are needed to be sure of the last period
+_SAMPLES_TO_SPARE = 3  # largest number of samples beyond the last whole period that is left out without a warning
 
 
 def periodic_vibration(
@@ -47,7 +48,7 @@ def periodic_vibration(
     phase_lag_target_deg: float = 90.0,
     settled: bool = True,
 ) -> PeriodicVibration:
-    """Periodic vibration in a settled record.
+    """Compute the periodic vibration in a settled record.
 
     Parameters
     ----------
@@ -62,26 +63,26 @@ def periodic_vibration(
     harmonics
         Highest harmonic H.
     resolution
-        float[n_channels], step of each channel's converter in the unit of the channel, 0 for none; left out if unknown.
+        float[n_channels], step of each channel's converter in the unit of the channel, 0 for none; None if unknown.
     lost
-        bool[n], true where a sample was lost: what stands in ``samples`` there (NaN, say) takes no part. None: all are there.
+        bool[n], true where a sample was lost: values of ``samples`` there, such as NaN, are ignored. None: no sample was
+        lost.
     phase_lag_target_deg, settled
-        Handed on to the result.
+        Passed to the result.
 
     Returns
     -------
     PeriodicVibration
-        From the whole periods at the start of the record. ``harmonics_std`` is the scatter of the residual's
-        coefficients over up to 20 batches of whole periods, which counts coloured noise and slow wander at its full
-        weight; below four periods it takes the residual for white noise. With ``resolution``, what rounding repeats in every
-        period is counted beside (`identification.signals.rounding`). It knows nothing of calibration or of
-        run-to-run scatter.
+        The vibration over the whole periods from the start of the record. ``harmonics_std`` is the scatter of the residual's
+        coefficients over up to 20 batches of whole periods, which fully includes coloured noise and slow variations. Below
+        four periods it takes the residual as white noise. With ``resolution`` it includes the rounding error that repeats in
+        every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run scatter.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, unequal lengths, fewer than one period, a phase that falls, too few samples per period for H, more
-        than 5 % of the samples lost.
+        If values are NaN or infinite, lengths differ, there is less than one period, the phase falls, there are too few
+        samples per period for H, or more than 5 % of the samples are lost.
     """
     theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
     gone = _lost(lost, theta.size)
@@ -97,7 +98,7 @@ def periodic_vibration(
     frequency_hz, periods, count, warnings = _whole_periods(theta, rate_hz, harmonics)
     theta, data, gone = _without_ripple(theta[:count], harmonics), data[:, :count], gone[:count]
     design = _design(theta, harmonics)
-    design[gone] = 0.0  # rows of zeros, in the data as well: no part in the sums of least squares
+    design[gone] = 0.0  # rows of zeros, in the data as well: no effect on the sums of least squares
     solution = _least_squares(design, data.T)
     residual = data.T - design @ solution
     coefficients, residual_rms = (
@@ -121,7 +122,7 @@ def periodic_vibration(
 
 
 def _lost(lost: ArrayLike | None, size: int) -> NDArray[np.bool_]:
-    """bool[n]: samples that take no part."""
+    """bool[n]: samples that are ignored."""
     if lost is None:
         return np.zeros(size, np.bool_)
     gone = finite_array("lost", lost, np.bool_, 1)
@@ -135,7 +136,7 @@ def _lost(lost: ArrayLike | None, size: int) -> NDArray[np.bool_]:
 
 
 def _steps(resolution: ArrayLike | None, channels: int) -> Float:
-    """float[n_channels]: converter steps; zeros where they are not known."""
+    """float[n_channels]: converter steps; zero where unknown."""
     if resolution is None:
         return np.zeros(channels)
     steps = finite_array("resolution", resolution, np.float64, 1)
@@ -147,15 +148,15 @@ def _steps(resolution: ArrayLike | None, channels: int) -> Float:
 
 
 def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float, int, int, tuple[str, ...]]:
-    """Mean frequency, whole periods, samples within them, and warnings."""
+    """Return mean frequency, number of whole periods, number of samples in them, and warnings."""
     if theta.size < 2:
         raise IdentificationError(f"theta_rad: has {theta.size} samples, needs one whole period")
     if np.any(np.diff(theta) <= 0.0):
         where = int(np.argmax(np.diff(theta) <= 0.0))
         raise IdentificationError(f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time")
     step = (theta[-1] - theta[0]) / (theta.size - 1)
-    # The last sample stands for one sampling interval. Periods seldom hold a whole number of samples, and a
-    # recorder may end up to one sample early: least squares does not mind, and a whole period would be lost.
+    # The last sample covers one sampling interval. A period is seldom a whole number of samples, and a recorder may end up to
+    # one sample early. Least squares tolerates this; otherwise a whole period would be lost.
     covered = theta.size * step / (2.0 * np.pi)
     periods = int(covered + step / (2.0 * np.pi) + 1e-6)
     if periods < 1:
@@ -177,9 +178,10 @@ def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float,
 
 
 def _without_ripple(theta: Float, harmonics: int) -> Float:
-    """``theta`` less what of it repeats within every period, harmonics 1..H; unchanged below four periods.
+    """Remove the part of ``theta`` that repeats within every period, harmonics 1..H; unchanged below four periods.
 
-    What repeats is fitted to the phase's deviation from its own mean over one period, so that slow wander stays.
+    The repeating part is fitted to the deviation of the phase from its moving mean over one period, so that slow variations
+    remain.
     """
     if theta[-1] - theta[0] < 2.0 * np.pi * (_MIN_BATCHES - 0.5):
         return theta
@@ -188,14 +190,14 @@ def _without_ripple(theta: Float, harmonics: int) -> Float:
     mean = np.convolve(theta - straight, np.full(period, 1.0 / period), mode="valid")
     inside = slice(period // 2, period // 2 + mean.size)
     columns = _design(straight, harmonics)[:, 1 : 2 * harmonics + 1]
-    weight = np.hanning(mean.size)  # else the ends of a slow wander leak into the fit
+    weight = np.hanning(mean.size)  # without it the ends of a slow variation leak into the fit
     swing = (theta - straight)[inside] - mean
     fitted = _least_squares(columns[inside] * weight[:, None], swing * weight)
     return np.asarray(theta - columns @ fitted)
 
 
 def _least_squares(columns: Float, values: Float) -> Float:
-    """Least squares by the normal equations: the columns are harmonics, as good as orthogonal, and there are few of them.
+    """Solve by the normal equations, which suffice for the few columns of harmonics, as these are nearly orthogonal.
 
     Columns of zeros get a coefficient of zero.
     """
@@ -203,9 +205,9 @@ def _least_squares(columns: Float, values: Float) -> Float:
 
 
 def _design(theta: Float, harmonics: int) -> Float:
-    """float[n, 2 H + 3]: 1, cosines, minus sines (they belong to Re and Im of Y_h), and the drift of the fundamental.
+    """float[n, 2 H + 3]: 1, cosines and minus sines (for Re and Im of Y_h), and the drift of the fundamental.
 
-    The drift is left out (its columns are zero) below four periods, where it cannot be told from the harmonics.
+    The drift is left out (its columns are zero) below four periods, where it cannot be separated from the harmonics.
     """
     columns = np.zeros((theta.size, 2 * harmonics + 3))
     columns[:, 0] = 1.0
@@ -223,7 +225,7 @@ def _design(theta: Float, harmonics: int) -> Float:
 
 
 def _coefficients(solution: Float, harmonics: int) -> Complex:
-    """complex[n_channels, H + 1] from the columns of the least-squares solution."""
+    """complex[n_channels, H + 1]: coefficients from the columns of the least-squares solution."""
     result = np.zeros((solution.shape[1], harmonics + 1), dtype=np.complex128)
     result[:, 0] = solution[0]
     result[:, 1:] = (solution[1 : harmonics + 1] + 1j * solution[harmonics + 1 : 2 * harmonics + 1]).T
@@ -239,7 +241,7 @@ def _relative_drift(solution: Float, harmonics: int) -> Complex:
 
 
 def batches_of(periods: int) -> int:
-    """Batches that standard errors from so many periods come from; below four periods, where all samples count, many."""
+    """Number of batches behind standard errors from ``periods`` periods; a large number below four, where all samples count."""
     return min(_MAX_BATCHES, periods) if periods >= _MIN_BATCHES else _MANY
 
 
@@ -257,7 +259,7 @@ def _standard_errors(theta: Float, design: Float, residual: Float, periods: int,
     means = np.empty((batches, columns, residual.shape[1]))
     for batch, (start, stop) in enumerate(pairwise(edges)):
         means[batch] = design[start:stop].T @ residual[start:stop] / max((~gone[start:stop]).sum(), 1)
-    # Cosine and sine means are half the amplitude; residual means vanish over the record, so batches - 1 are free.
+    # Means of cosine and sine are half the amplitude; the residual's mean over the record is zero: batches - 1 are free.
     squared = np.sum(means**2, axis=0) / ((batches - 1) * batches)
     result = np.empty((residual.shape[1], harmonics + 1))
     result[:, 0] = np.sqrt(squared[0])

@@ -1,8 +1,8 @@
-"""Momentary frequency and magnitude of a force from its zero crossings, as the founding paper took them.
+"""Instantaneous frequency and magnitude of a force from its zero crossings, as in the founding paper.
 
-Scheel et al., prediction of transients under swept sine: the frequency from the time between successive zero crossings,
-the magnitude as the largest value between them. Both suffer where harmonics or noise make a good part of the signal, as
-they do in the force near resonance: then `identification.demodulate` is the better choice.
+Scheel et al., prediction of transients under swept sine: the frequency from the time between successive zero crossings, the
+magnitude as the largest value between them. Both are inaccurate if harmonics or noise are a large part of the signal, as in
+the force near resonance; `identification.demodulate` is then the better choice.
 """
 
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class HalfPeriods:
-    """What lies between successive zero crossings of a signal: half periods, or whole ones.
+    """Half or whole periods of a signal between successive zero crossings.
 
     Parameters
     ----------
     time_s
-        float[n], middle between two crossings, from the first sample on.
+        float[n], time midway between two crossings, relative to the first sample.
     frequency_hz
-        float[n], one over the time between crossings in the same direction; of half periods half of one over the time.
+        float[n], inverse of the time between crossings in the same direction; for half periods, half the inverse of the time.
     magnitude
-        float[n], largest absolute sample between them, in the unit of the signal.
+        float[n], largest absolute sample between two crossings, in the unit of the signal.
     """
 
     time_s: Float
@@ -38,14 +38,15 @@ class HalfPeriods:
 
 
 def zero_crossings(signal: ArrayLike, *, sample_rate_hz: float, whole_periods: bool = False) -> HalfPeriods:
-    """Periods of ``signal``, float[n]; a crossing lies on the straight line between the samples around it.
+    """Find the periods of ``signal``, float[n], between zero crossings, which are interpolated linearly between samples.
 
-    With ``whole_periods`` the upward crossings count alone: what makes both halves of a period unequal, a mean or an even
-    harmonic, then leaves the frequency alone. Raises `IdentificationError` on NaN or inf, or fewer than two crossings.
+    With ``whole_periods`` only upward crossings count. A mean or an even harmonic, which makes both halves of a period
+    unequal, then does not affect the frequency. Raises `IdentificationError` if values are NaN or infinite, or there are
+    fewer than two crossings.
     """
     values = finite_array("signal", signal, np.float64, 1)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
-    moved = np.flatnonzero(values)  # a sample of exactly zero neither is a crossing nor hides one
+    moved = np.flatnonzero(values)  # drop samples of exactly zero: they neither count as crossings nor hide them
     value = values[moved]
     before = np.flatnonzero(np.diff(value > 0.0))
     if whole_periods:

@@ -1,14 +1,14 @@
-"""What a converter's rounding does to Fourier coefficients.
+"""Effect of a converter's rounding on Fourier coefficients.
 
 A sample is rounded to a whole number of steps q. Over a settled vibration the rounding error ``e(x)`` repeats with the
-period, so that more periods do not average it out; noise before the converter does: under Gaussian noise of standard
-deviation sigma its mean is (Widrow & Kollar, Quantization Noise, the expansion of the sawtooth)
+period, so that more periods do not average it out. Noise ahead of the converter does: under Gaussian noise of standard
+deviation sigma the mean of the error is (Widrow & Kollar, Quantization Noise, the expansion of the sawtooth)
 
     e(x) = sum_n (-1)^n q/(pi n) exp(-2 (pi n sigma/q)^2) sin(2 pi n x/q).
 
-With ``G_n,h`` the Fourier coefficients of ``exp(2 pi i n x(theta)/q)``, and with nothing known of where between two steps
-the vibration is centred, harmonic h gets an error of variance ``sum_n (q/(pi n))^2 exp(-4 (pi n sigma/q)^2)
-(|G_n,h|^2 + |G_n,-h|^2)``, half of it in each of its two parts. Above about half a step of noise nothing is left of it.
+``G_n,h`` denotes the Fourier coefficients of ``exp(2 pi i n x(theta)/q)``. If the position of the vibration between two steps
+is unknown, harmonic h has an error of variance ``sum_n (q/(pi n))^2 exp(-4 (pi n sigma/q)^2) (|G_n,h|^2 + |G_n,-h|^2)``, half
+of it in each of its two parts. With noise above about half a step the error vanishes.
 """
 
 import numpy as np
@@ -19,13 +19,13 @@ __all__ = ["rounding_errors"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_INSTANTS = 16384  # of a period: enough for vibrations of some hundred steps, beyond which the error is negligible
+_INSTANTS = 16384  # per period: enough for vibrations of some hundred steps, beyond which the error is negligible
 _ORDERS = 6
 _NEGLIGIBLE = 1e-3
 
 
 def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) -> Float:
-    """Standard error of real part and imaginary part of each coefficient that rounding leaves.
+    """Standard error of the real and of the imaginary part of each coefficient due to rounding.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) 
     resolution
         float[n_channels], step q of the converter in the unit of the channel; 0 for none.
     residual_rms
-        float[n_channels], what the harmonics leave of the record: noise and the rounding's own ``q^2/12``.
+        float[n_channels], RMS residual of the harmonics: noise plus the rounding's own variance ``q^2/12``.
 
     Returns
     -------

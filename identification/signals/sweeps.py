@@ -1,9 +1,9 @@
-"""What an uncontrolled sweep through resonance says: how far the force drops, how far it overshoots, how far it moves.
+"""Force drop-out in an uncontrolled sweep through resonance: how far the force drops and overshoots, and the largest motion.
 
-A shaker that is driven with a constant voltage gives way to a resonant structure: the fundamental of the force falls to a
-few per cent and, where the sweep is fast, overshoots afterwards. Both are told as fractions of the force off resonance,
-which is not one number: the mass of the armature and the suspension make it rise or fall over the band. Which part of the
-sweep counts as off resonance is therefore part of the result.
+A shaker that is driven with a constant voltage yields to a resonant structure. The fundamental of the force falls to a few
+per cent and, in a fast sweep, overshoots afterwards. Both are given as fractions of the force off resonance. That force is
+not a single number, because the mass of the armature and the suspension make it rise or fall over the band. The result
+therefore states which part of the sweep counts as off resonance.
 """
 
 from collections.abc import Sequence
@@ -31,21 +31,21 @@ class ForceDropOut:
     Parameters
     ----------
     off_resonance_n
-        Force off resonance: median over each of ``off_resonance_hz``, and the mean of these.
+        Force off resonance: the mean of its medians over the bands ``off_resonance_hz``.
     off_resonance_hz
         Frequency bands that count as off resonance.
     minimum_n, minimum_time_s, minimum_frequency_hz
-        Smallest force, and where.
+        Smallest force, and its time and frequency.
     overshoot_n, overshoot_time_s, overshoot_frequency_hz
-        Largest force after that, and where.
+        Largest force after the minimum, and its time and frequency.
     peak, peak_channel, peak_unit
-        Largest fundamental of the response channel in its unit; its name.
+        Largest fundamental of the response channel; name and unit of this channel.
     peak_m
-        The same as a displacement, m.
+        Largest fundamental of the response channel as a displacement, m.
     peak_time_s, peak_frequency_hz
-        Where.
+        Time and frequency of that peak.
     window_periods
-        What the fundamentals were smoothed over: a wider window sees a shallower minimum in a fast sweep.
+        Window over which the fundamentals were smoothed; a wider window gives a shallower minimum in a fast sweep.
     """
 
     off_resonance_n: float
@@ -66,12 +66,12 @@ class ForceDropOut:
 
     @property
     def minimum_ratio(self) -> float:
-        """Smallest force over the one off resonance."""
+        """Smallest force over the force off resonance."""
         return self.minimum_n / self.off_resonance_n
 
     @property
     def overshoot_ratio(self) -> float:
-        """Largest force after the minimum over the one off resonance."""
+        """Largest force after the minimum over the force off resonance."""
         return self.overshoot_n / self.off_resonance_n
 
 
@@ -82,24 +82,24 @@ def force_drop_out(
     off_resonance_hz: Sequence[Band] | None = None,
     resonance_hz: Band | None = None,
 ) -> ForceDropOut:
-    """Drop-out of the force in a sweep.
+    """Evaluate the drop-out of the force in a sweep.
 
     Parameters
     ----------
     sweep
         Fundamentals of the sweep.
     response
-        Channel whose largest fundamental is looked for; the one of role ``drive`` if None.
+        Channel whose largest fundamental is evaluated; the channel of role ``drive`` if None.
     off_resonance_hz
-        Bands of the momentary frequency that count as off resonance. If None: the first 15 % of the sweep's range, that
-        is before the resonance for a sweep upwards.
+        Bands of the instantaneous frequency that count as off resonance. If None: the first 15 % of the sweep's range, which
+        is before the resonance.
     resonance_hz
-        Band in which minimum and peak are looked for; everything beyond the first and the last 15 % if None.
+        Band in which minimum and peak are sought; if None, the range without its first and last 15 %.
 
     Raises
     ------
     IdentificationError
-        For a band without values, no such channel, a force that is zero off resonance.
+        If a band has no values, the channel does not exist, or the force off resonance is zero.
     """
     frequency, force = sweep.frequency_hz, np.abs(sweep.force)
     start, end = float(frequency[0]), float(frequency[-1])
@@ -141,7 +141,7 @@ def _sorted(one: float, other: float) -> Band:
 
 
 def _within(frequency: Float, band: Band, name: str) -> NDArray[np.bool_]:
-    """Which instants lie in ``band``; refuses one without any."""
+    """Return which instants lie in ``band``; raise `IdentificationError` if none does."""
     inside = (frequency >= band[0]) & (frequency <= band[1])
     if not inside.any():
         raise IdentificationError(

@@ -1,10 +1,10 @@
-"""Fundamentals of a transient over time, by complex demodulation with the phase of the oscillator itself.
+"""Fundamentals of a transient over time, by complex demodulation with the phase of the oscillator.
 
-The signal is ``y(t) = Re sum_h Y_h(t) exp(i h theta(t))`` with coefficients that change slowly against the period. Times
-``2 exp(-i theta)`` the fundamental stands still and everything else turns at least once per period. A mean over whole
-periods of the phase takes that away: the static part and the harmonics vanish from it where their coefficients are
-constant, whatever the frequency does. The mean is taken twice, which squares what is left of them: the weight is a
-triangle, centred in phase, so that nothing is delayed. The bandwidth follows the frequency f: with means over P periods, a
+The signal is ``y(t) = Re sum_h Y_h(t) exp(i h theta(t))`` with coefficients that change slowly compared with the period.
+Multiplied by ``2 exp(-i theta)``, the fundamental becomes constant, and all other terms rotate at least once per period. A
+mean over whole periods of the phase removes them: if their coefficients are constant, the static part and the harmonics
+vanish for any course of the frequency. The mean is applied twice, which squares the remainder. The resulting weight is a
+triangle, centred in phase, and causes no delay. The bandwidth follows the frequency f: with means over P periods, a
 modulation at m Hz passes with ``sinc(P m / f)^2``.
 """
 
@@ -26,7 +26,7 @@ Float = NDArray[np.float64]
 _MIN_SAMPLES_PER_PERIOD = 8.0
 _POINTS_PER_PERIOD = 16
 _STRETCH = 65536  # samples that are demodulated at once
-_MARGIN = 64  # samples beyond a stretch that its splines are made with
+_MARGIN = 64  # samples beyond a stretch that its splines include
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,18 +38,18 @@ class Transient:
     channels
         One per row of ``fundamentals``; exactly one of role ``force``. A voltage is a channel of role ``monitor``.
     time_s
-        float[n], rising; from the first sample of the record on.
+        float[n], rising; time since the first sample of the record.
     frequency_hz
-        float[n], momentary frequency of the oscillator: mean over the period around each instant.
+        float[n], instantaneous frequency of the oscillator: mean over the period around each instant.
     fundamentals
         complex[n_channels, n], peak, in the unit of each channel, against the phase of the oscillator.
     window_periods
-        Length of the triangle that each value is a weighted mean over, in periods.
+        Length in periods of the triangular window over which each value is averaged.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, shapes that do not agree, no single force channel, times that do not rise.
+        If values are NaN or infinite, shapes do not agree, there is not exactly one force channel, or times do not rise.
     """
 
     channels: tuple[Channel, ...]
@@ -96,7 +96,7 @@ def demodulate(
     periods: int = 1,
     every: int | None = None,
 ) -> Transient:
-    """Fundamentals over time of a record whose oscillator's phase is known.
+    """Compute the fundamentals over time of a record with known phase of the oscillator.
 
     Parameters
     ----------
@@ -109,20 +109,21 @@ def demodulate(
     sample_rate_hz
         Samples per second.
     periods
-        Periods P that each of the two means is taken over. One shows fast changes best; more leave less noise, and fill
-        up a narrow minimum that is passed fast.
+        Number of periods P of each of the two means. One period resolves fast changes best; more periods leave less noise,
+        but raise a narrow minimum that is passed fast.
     every
         Spacing of the result in samples; about sixteen values per shortest period if None.
 
     Returns
     -------
     Transient
-        Without the first P and the last P periods, where the window would not be whole.
+        Fundamentals without the first P and the last P periods, where the window would be incomplete.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, unequal lengths, a phase that falls, fewer than 8 samples per period, a record that is too short.
+        If values are NaN or infinite, lengths differ, the phase falls, there are fewer than 8 samples per period, or the
+        record is too short.
     """
     theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
     single = np.asarray(samples).dtype == np.float32  # as recorded; stretches are computed in double precision
@@ -152,7 +153,7 @@ def demodulate(
 
 
 def _largest_step(theta: Float, periods: int) -> float:
-    """Largest advance of the phase from one sample to the next, rad; refuses phases that are of no use."""
+    """Return the largest advance of the phase per sample, rad; raise `IdentificationError` if the phase cannot be used."""
     steps = np.diff(theta)
     if np.any(steps <= 0.0):
         where = int(np.argmax(steps <= 0.0))
@@ -170,7 +171,7 @@ def _largest_step(theta: Float, periods: int) -> float:
 
 
 def _whole_windows(theta: Float, known: slice, reach: float) -> slice:
-    """The samples whose window, ``reach`` of phase to either side, lies within the samples ``known``."""
+    """Return the samples whose window, ``reach`` of phase to either side, lies within the samples ``known``."""
     first = int(np.searchsorted(theta, theta[known.start] + reach))
     end = int(np.searchsorted(theta, theta[known.stop - 1] - reach, side="right"))
     return slice(first, end)
@@ -179,7 +180,8 @@ def _whole_windows(theta: Float, known: slice, reach: float) -> slice:
 def _fundamental(theta: Float, signal: Float, at: NDArray[np.intp], reach: float) -> Complex:
     """complex[len(at)]: fundamental of ``signal`` at the samples ``at``, stretch by stretch.
 
-    The splines of a whole record would take half a kilobyte a sample; what a cut does to them fades by 0.27 a sample.
+    The splines of a whole record would take half a kilobyte per sample; the effect of a cut on them decays by 0.27 per
+    sample.
     """
     out = np.empty(at.size, np.complex128)
     step = max(1, _STRETCH // max(1, int(at[1] - at[0]))) if at.size > 1 else 1
@@ -194,8 +196,8 @@ def _fundamental(theta: Float, signal: Float, at: NDArray[np.intp], reach: float
 def _of_stretch(theta: Float, signal: Float, at: NDArray[np.intp], reach: float) -> Complex:
     """complex[len(at)]: fundamental of a stretch of a signal.
 
-    A mean is a difference of the antiderivative of an interpolating spline: windows end between samples, as seldom a
-    whole number of them makes a period.
+    A mean is a difference of the antiderivative of an interpolating spline. Windows end between samples, because a period is
+    seldom a whole number of samples.
     """
     from scipy.interpolate import CubicSpline  # a third of a second, for sweeps alone
 
@@ -207,7 +209,7 @@ def _of_stretch(theta: Float, signal: Float, at: NDArray[np.intp], reach: float)
 
 
 def _momentary_frequency_hz(theta: Float, at: NDArray[np.intp], rate_hz: float) -> Float:
-    """float[len(at)]: mean frequency over the period around each sample; exact where the frequency rises evenly."""
+    """float[len(at)]: mean frequency over the period around each sample; exact if the frequency changes linearly."""
     half = np.pi / np.gradient(theta)[at]  # half a period, in samples
     here = np.arange(theta.size)
     advance = np.interp(at + half, here, theta) - np.interp(at - half, here, theta)

@@ -1,8 +1,8 @@
-"""Continuous backbone: the level is ramped up and down without ever waiting, and every instant is a measurement.
+"""Continuous backbone: the level is ramped up and down without waiting, and every instant is a measurement.
 
-Joints with memory do not know a state by its amplitude alone: while the level rises they dissipate otherwise than while it
-falls. To first order in the rate the two deviations are opposite, so that their mean at equal amplitude is that of the
-settled vibration. Half of what lies between the two, as far as it stands out of the noise, is given as systematic error.
+The amplitude alone does not determine the state of joints with memory: they dissipate differently while the level rises than
+while it falls. To first order in the rate the two deviations are opposite, so that their mean at equal amplitude is the value
+of the settled vibration. Half the difference between the two, as far as it exceeds the noise, is the systematic error.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ Float = NDArray[np.float64]
 
 _DEGREE, _NOISY_DEGREE = 2, 1
 _NOISE_SPAN = 1.0  # in the logarithm of the amplitude
-_MEDIAN = 0.839  # over the mean, of chi-square with four degrees of freedom
+_MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees of freedom
 _FEWEST_INSTANTS = 8
 _NEIGHBOURS = 2
 _WIDEN = 1.25
@@ -41,15 +41,15 @@ class ContinuousBackbone:
     Parameters
     ----------
     backbone
-        The settled vibrations at phase resonance that have the mean properties, one per level: a backbone like any other.
+        Settled vibrations at phase resonance with the mean properties of both ramps, one per level, as an ordinary backbone.
     amplitude_m
         float[n], levels: peak of the fundamental of the displacement at the drive point.
     stiffness, damping_1_s
-        float[2, n], k (1/s^2) and c (1/s) found on the way up and on the way down.
+        float[2, n], k (1/s^2) and c (1/s) on the ramp up and on the ramp down.
     stiffness_std, damping_std_1_s
-        float[2, n], their random standard errors.
+        float[2, n], random standard errors of stiffness and damping.
     periods
-        Periods of both ramps together.
+        Number of periods of both ramps together.
     """
 
     backbone: Backbone
@@ -71,9 +71,9 @@ class ContinuousBackbone:
         return np.asarray(self.damping_1_s / (2.0 * np.sqrt(self.stiffness)))
 
     def nonlinear_mode(self, **options: Any) -> NonlinearMode:
-        """The nonlinear mode; ``options`` are those of `identification.nonlinear_mode`.
+        """Identify the nonlinear mode; ``options`` are those of `identification.nonlinear_mode`.
 
-        What lies between up and down is counted as a systematic error of modal frequency, damping and force.
+        The difference between up and down counts as a systematic error of modal frequency, damping and force.
         """
         mode = nonlinear_mode(self.backbone, **options)
         frequency = _beyond_noise(self.stiffness, self.stiffness_std) / (8.0 * np.pi**2 * mode.modal_frequency_hz)
@@ -97,29 +97,29 @@ def continuous_backbone(
     accuracy: float = 0.008,
     specimen: str = "",
 ) -> ContinuousBackbone:
-    """Backbone from a ramp of the level up and one down, in any order.
+    """Compute a backbone from a ramp of the level up and one down, in any order.
 
     Parameters
     ----------
     up, down
         Slow flows of the two ramps: parts of one (`SlowFlow.between`), or of two records.
     levels_m
-        Amplitudes of the drive point's displacement, m; if None, in equal ratios over what both ramps cover.
+        Amplitudes of the drive-point displacement, m; if None, in equal ratios over the range that both ramps cover.
     number
-        How many of them, then.
+        Number of levels if ``levels_m`` is None.
     bandwidth
-        Half width in ln(amplitude) of what is taken together at a level (parabolic weights, properties quadratic in the
-        amplitude); wider where a ramp has fewer than eight instants there. What bends within it is smoothed.
+        Half width in ln(amplitude) of the local fit at a level (parabolic weights, properties quadratic in the amplitude);
+        wider where a ramp has fewer than eight instants there. Sharper changes of the properties are smoothed.
     accuracy
-        Relative random standard error of one ramp's damping above which properties are taken for linear in the amplitude,
-        over more than the bandwidth where that is not enough, up to one in ln(amplitude).
+        Relative random standard error of a ramp's damping above which the local fit is linear in the amplitude. If that is
+        not enough, the width is increased up to one in ln(amplitude).
     specimen
         Name of what was tested.
 
     Raises
     ------
     IdentificationError
-        On channels or mode shapes that differ, ramps without common amplitudes, levels beyond them.
+        If channels or mode shapes differ, the ramps have no common amplitudes, or levels lie beyond these.
     """
     if up.channels != down.channels or up.drive_mode_shape != down.drive_mode_shape:
         raise IdentificationError("up, down: channels or drive_mode_shape differ")
@@ -165,7 +165,7 @@ _PROPERTIES = ("stiffness", "damping")
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """One ramp: a fit, its standard errors, amplitudes, and the periods taken, per level."""
+    """One ramp: the fit, its standard errors, the amplitudes and the number of periods of each level."""
 
     fits: list[LocalFit]
     errors: Float
@@ -189,7 +189,7 @@ def _levels(up: SlowFlow, down: SlowFlow, levels_m: ArrayLike | None, number: in
 
 
 def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float, list[LocalFit]]:
-    """Widths and fits at every level of one ramp, over the bandwidth or what takes in enough instants."""
+    """Return widths and fits at every level of one ramp, over the bandwidth or a width with enough instants."""
     size = np.log(flow.amplitude_m)
     widths = np.array([_wide_enough(size, level, bandwidth) for level in np.log(levels)])
     return widths, [
@@ -198,11 +198,11 @@ def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float,
 
 
 def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
-    """Variances of the noise of the sensors, the same at all levels: from the lowest, where it stands out best.
+    """Variances of the sensor noise, equal at all levels; estimated at the lowest levels, where it dominates.
 
-    That of the force is seen between its harmonics, and is the median's there (squares of two degrees of freedom in mean,
-    four in all, have 0.839 of their mean for a median), as some instants see ends of the record. What else is left over is
-    the motion's.
+    The noise of the force is measured between its harmonics, by the median, because some instants are affected by the ends of
+    the record (with four degrees of freedom the median is 0.839 of the mean). The rest of the residual is the noise of the
+    motion.
     """
     lowest = [_lowest(flow) for flow in (up, down)]
     force = float(np.median(np.concatenate([flow.force_noise for flow in lowest]))) / _MEDIAN
@@ -225,7 +225,7 @@ def _lowest(flow: SlowFlow) -> SlowFlow:
 
 
 def _noise(fits: list[list[LocalFit]]) -> list[Float]:
-    """Variances of the noise at every level, from the fits of both ramps near it."""
+    """Variances of the noise at every level, from the fits of both ramps at neighbouring levels."""
     count = len(fits[0])
     near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(count)]
     return [noise_variances([fit for way in fits for fit in way[some]]) for some in near]
@@ -240,7 +240,7 @@ def _along(
     sensors: Float,
     accuracy: float,
 ) -> _Way:
-    """One ramp: where the noise of the sensors leaves too little of the damping, fits of fewer unknowns, over more."""
+    """Evaluate one ramp; where sensor noise makes the damping too inaccurate, fit fewer unknowns over a larger width."""
     found, periods, errors = [], [], []
     step = float(np.median(np.diff(flow.phase_periods)))
     for n, level in enumerate(np.log(levels)):
@@ -260,7 +260,7 @@ def _along(
 
 
 def _errors(fit: LocalFit, degree: int, noise: Float, sensors: Float) -> Float:
-    """float[2], standard errors: what a ramp leaves over where the level is high is more than noise of the sensors."""
+    """float[2]: standard errors; residuals at high levels contain more than sensor noise."""
     by_sensors = np.array(fit.standard_errors(sensors))
     if degree == _DEGREE:
         return np.asarray(np.maximum(fit.standard_errors(noise), by_sensors))
@@ -270,14 +270,14 @@ def _errors(fit: LocalFit, degree: int, noise: Float, sensors: Float) -> Float:
 
 
 def _around(flow: SlowFlow, level: float, width: float) -> tuple[SlowFlow, Float, Float]:
-    """The instants around ``ln X = level``, their places (linear in X) and weights."""
+    """Return the instants around ``ln X = level``, their places (linear in X) and weights."""
     distance = (np.log(flow.amplitude_m) - level) / width
     near = np.abs(distance) < 1.0
     return flow.select(near), (flow.amplitude_m[near] * np.exp(-level) - 1.0) / width, 1.0 - distance[near] ** 2
 
 
 def _wide_enough(size: Float, level: float, bandwidth: float) -> float:
-    """The bandwidth, or as much more as takes in enough instants."""
+    """Return the bandwidth, or the next larger width with enough instants."""
     width = bandwidth
     while np.count_nonzero(np.abs(size - level) < width) < _FEWEST_INSTANTS:
         width *= _WIDEN
@@ -289,9 +289,9 @@ def _wide_enough(size: Float, level: float, bandwidth: float) -> float:
 
 
 def _beyond_noise(values: Float, std: Float) -> Float:
-    """float[n]: half the difference of up and down, less what noise makes of it.
+    """float[n]: half the difference between up and down, beyond the contribution of noise.
 
-    Root of the mean square over neighbouring levels: where the two curves happen to cross, nothing is known any better.
+    It is the RMS over neighbouring levels, because the error is not smaller where the two curves happen to cross.
     """
     square = 0.25 * (values[0] - values[1]) ** 2 - 0.25 * np.sum(std**2, axis=0)
     near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(square.size)]
@@ -299,7 +299,7 @@ def _beyond_noise(values: Float, std: Float) -> Float:
 
 
 def _with_systematic(mode: NonlinearMode, further: dict[str, Float]) -> NonlinearMode:
-    """The mode with further systematic standard errors, independent of those it has."""
+    """Return the mode with additional, independent systematic standard errors."""
     changes: dict[str, Any] = {}
     systematic, intervals = mode.systematic_std.copy(), mode.interval_95.copy()
     for name, std in further.items():

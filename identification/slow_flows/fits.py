@@ -1,13 +1,13 @@
-"""Real least squares for stiffness and damping, and what noise does to them.
+"""Real least squares for stiffness and damping, and the effect of noise on them.
 
-At every instant ``g = k + c b`` with ``g = (phi_d^2 F - A) / X`` and ``b = V / X``: complex data, real unknowns, each a
-polynomial of a place (time, or level) that is zero where they are wanted.
+At every instant ``g = k + c b`` with ``g = (phi_d^2 F - A) / X`` and ``b = V / X``: complex data and real unknowns. Each
+unknown is a polynomial of a place (time or level), which is zero where the unknowns are wanted.
 
-Noise stands in ``e = g X``, alike in its real and imaginary part and at all instants. It has two parts, for white noise
-of two sensors: that of the force comes as the window of the demodulation lets it; that of the motion, which is in A, V and
-X alike, cancels but for its rate of change (`identification.slow_flows.signals`). The second averages out much faster, so
-that one must know how much there is of each: the residuals' sum of squares, plain and smoothed, tells (moments equated to
-their expectations).
+The noise is that of ``e = g X``, equal in its real and imaginary part and at all instants. It has two parts, from white noise
+of two sensors. The noise of the force is filtered by the window of the demodulation. The noise of the motion is common to A,
+V and X and cancels except for its rate of change (`identification.slow_flows.signals`). The second part averages out much
+faster, so that both variances must be known. They follow from the residuals' sum of squares, plain and smoothed, by equating
+these moments to their expectations.
 """
 
 from collections.abc import Sequence
@@ -28,8 +28,8 @@ Float = NDArray[np.float64]
 class LocalFit:
     """Stiffness k (1/s^2) and damping c (1/s) where the place is zero.
 
-    ``spread`` float[2, 2]: variance of k and c per unit variance of either part of the noise; ``moments`` float[2] of the
-    residuals and ``expected`` float[2, 2], what either part of the noise contributes to them.
+    ``spread`` float[2, 2] is the variance of k and c per unit variance of each part of the noise. ``moments`` float[2] are
+    moments of the residuals, and ``expected`` float[2, 2] are the contributions of each part of the noise to them.
     """
 
     stiffness: float
@@ -39,7 +39,7 @@ class LocalFit:
     expected: Float
 
     def standard_errors(self, variances: Float) -> tuple[float, float]:
-        """Of k and c, for noise of these two variances."""
+        """Return the standard errors of k and c for these variances of both parts of the noise."""
         k, c = np.sqrt(self.spread @ variances)
         return float(k), float(c)
 
@@ -47,7 +47,7 @@ class LocalFit:
 def local_fit(
     stiffness: Complex, rate: Complex, size: Float, periods: Float, place: Float, weight: Float, degree: int = 1
 ) -> LocalFit:
-    """Least squares over n instants.
+    """Fit stiffness and damping by least squares over n instants.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def local_fit(
     periods
         float[n], time in periods, for the overlap of the windows.
     place, weight
-        float[n], what k and c are polynomials of, and weights of the instants.
+        float[n], variable of the polynomials k and c, and weights of the instants.
     degree
-        Of these polynomials.
+        Degree of these polynomials.
     """
     scale = size * np.sqrt(weight)
     powers = place[:, None] ** np.arange(degree + 1)
@@ -79,7 +79,7 @@ def local_fit(
     return LocalFit(
         stiffness=float(solution[0]),
         damping=float(solution[degree + 1]),
-        # Where nearly nothing is left of it, rounding may leave less than nothing.
+        # Where the spread is nearly zero, rounding may make it negative.
         spread=np.maximum(np.column_stack([np.sum(wanted @ noise * wanted, axis=1) for noise in correlations]), 0.0),
         moments=np.array([residual @ residual, residual @ correlations[0] @ residual]),
         expected=np.array([[np.trace(part) for part in left], [np.sum(correlations[0] * part) for part in left]]),
@@ -100,9 +100,9 @@ def noise_variances(fits: Sequence[LocalFit]) -> Float:
 
 
 def as_settled(fit: LocalFit, residual_s2: float) -> LocalFit:
-    """The fit with the stiffness that a settled point at phase resonance reads from the whole motion of the drive point.
+    """Return the fit with the stiffness that a settled point at phase resonance gives for the total drive-point motion.
 
-    There ``phi_d^2 F / X = D / (1 + D r / phi_d^2)`` with ``D = i w c``, r the receptance of the other modes, which the fit
-    is free of. ``residual_s2`` is ``r / phi_d^2``.
+    There ``phi_d^2 F / X = D / (1 + D r / phi_d^2)`` with ``D = i w c`` and the receptance r of the other modes, which the
+    fit excludes. ``residual_s2`` is ``r / phi_d^2``.
     """
     return replace(fit, stiffness=fit.stiffness * (1.0 + residual_s2 * fit.damping**2))

@@ -1,8 +1,8 @@
-"""The settled vibration at phase resonance that has the properties found in a slow flow.
+"""Convert the properties found in a slow flow to a settled vibration at phase resonance.
 
-Stiffness k and damping c at an amplitude X say how the mode would vibrate there if it were held at phase resonance: at
-``w = sqrt(k)``, under the force ``i c w X / phi_d^2``. Written so, an estimate from a moving vibration is a point like any
-other for `identification.nonlinear_mode`, which finds ``w`` and ``z = c / (2 w)`` in it again.
+Stiffness k and damping c at an amplitude X determine how the mode would vibrate there at phase resonance: at ``w = sqrt(k)``,
+under the force ``i c w X / phi_d^2``. In this form an estimate from a transient vibration is a point like any other for
+`identification.nonlinear_mode`, which returns the same ``w`` and ``z = c / (2 w)``.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ Float = NDArray[np.float64]
 class Amplitudes:
     """Harmonics complex[n_channels, H + 1] of all channels for a motion of phase zero, and their standard errors.
 
-    The fundamentals of motions are displacements over that of the drive point.
+    The fundamentals of motions are displacements divided by the drive-point displacement.
     """
 
     values: Complex
@@ -35,13 +35,13 @@ class Amplitudes:
 
 
 def fit_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> LocalFit:
-    """Stiffness and damping of a slow flow where ``place`` (float[n]) is zero."""
+    """Fit stiffness and damping of a slow flow where ``place`` (float[n]) is zero."""
     fit = local_fit(flow.dynamic_stiffness, flow.rate_1_s, flow.amplitude_m, flow.phase_periods, place, weight, degree)
     return as_settled(fit, flow.residual_m_n / flow.drive_mode_shape**2)
 
 
 def amplitudes_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> Amplitudes:
-    """Harmonics where ``place`` is zero, by least squares over the instants; turned so that the drive point has phase zero."""
+    """Return harmonics where ``place`` is zero, by least squares over the instants, relative to the drive-point phase."""
     orders = np.arange(flow.harmonics.shape[2])
     series = flow.harmonics * np.exp(-1j * np.outer(np.angle(flow.drive_m), orders))
     for row, channel in enumerate(flow.channels):
@@ -75,7 +75,7 @@ def resonant_vibration(
     periods: float,
     warnings: tuple[str, ...] = (),
 ) -> PeriodicVibration:
-    """The settled vibration at phase resonance of ``amplitude_m`` with this stiffness (1/s^2) and damping (1/s).
+    """Return the settled vibration at phase resonance of ``amplitude_m`` with this stiffness (1/s^2) and damping (1/s).
 
     ``errors`` are the standard errors of stiffness and damping; ``found`` gives harmonics and the other channels.
     """
@@ -95,7 +95,7 @@ def resonant_vibration(
     per_stiffness = amplitude_m / flow.drive_mode_shape**2
     harmonics[force, 1] = 1j * damping_1_s * omega * per_stiffness
     std[force, 1] = per_stiffness * float(np.hypot(errors[0], omega * errors[1])) / np.sqrt(2.0)
-    # Between its own displacement and itself the drive channel has no error; what it has goes with k and c.
+    # The drive channel is the reference of all displacements and has no error here; its error is in k and c.
     harmonics[drive, 1] = (1j * omega) ** MOTION_ORDER[flow.channels[drive].motion] * amplitude_m
     return PeriodicVibration(
         channels=flow.channels,

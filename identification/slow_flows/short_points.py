@@ -1,4 +1,4 @@
-"""A point of a backbone from few periods, the approach included, whether or not it had settled."""
+"""A point of a backbone from few periods, including the approach, settled or not."""
 
 from dataclasses import dataclass
 
@@ -13,28 +13,28 @@ from identification.slow_flows.slow_flow import SlowFlow
 __all__ = ["ShortPoint", "short_point"]
 
 _FEWEST_PERIODS = 2.0
-_STEADY = 0.02  # change of the amplitude below which properties are taken to change in proportion to time
+_STEADY = 0.02  # relative change of the amplitude below which properties are taken as linear in time
 _LARGEST_CHANGE = 0.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ShortPoint:
-    """One point, brought to phase resonance.
+    """One point, corrected to phase resonance.
 
     Parameters
     ----------
     vibration
-        The settled vibration at phase resonance with the properties found; points of a `Backbone` are made of it.
+        The settled vibration at phase resonance with the identified properties, to be used as a point of a `Backbone`.
     modal_frequency_hz, modal_frequency_std_hz, damping_ratio, damping_ratio_std
-        What was found, with standard errors.
+        Identified properties with standard errors.
     phase_lag_deg
-        Lag of the displacement behind the force as it was, on the average; it has been corrected for.
+        Mean measured lag of the displacement behind the force, for which the properties are corrected.
     growth_1_s
-        Relative rate at which the amplitude still changed, on the average; likewise.
+        Mean relative growth rate of the amplitude, for which the properties are corrected too.
     force_n
-        Peak of the fundamental of the force as it was, on the average.
+        Mean measured peak of the fundamental of the force.
     periods
-        Periods between the first and the last instant used.
+        Number of periods between the first and the last instant used.
     """
 
     vibration: PeriodicVibration
@@ -49,25 +49,26 @@ class ShortPoint:
 
 
 def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float | None = None) -> ShortPoint:
-    """Modal properties at the amplitude that the vibration had from ``start_s`` to ``stop_s``.
+    """Identify modal properties at the amplitude that the vibration had from ``start_s`` to ``stop_s``.
 
     Parameters
     ----------
     flow
-        From the whole record, the way to the point included: velocity and displacement need the room.
+        Slow flow of the whole record, including the approach to the point, which the filters of velocity and displacement
+        need.
     start_s, stop_s
-        Where the point begins and ends, seconds from the first sample on; all of the flow if None. Every instant also
-        stands for one and a half periods before and after it.
+        Begin and end of the point, seconds from the first sample; the whole flow if None. Every instant also includes one and
+        a half periods before and after it.
 
     Returns
     -------
     ShortPoint
-        At the mean amplitude of this part.
+        The point at the mean amplitude of this part.
 
     Raises
     ------
     IdentificationError
-        On fewer than two periods, an amplitude that changes by more than half, a stiffness or damping that is none.
+        If there are fewer than two periods, the amplitude changes by more than half, or the stiffness is not positive.
     """
     part = flow.between(flow.time_s[0] if start_s is None else start_s, flow.time_s[-1] if stop_s is None else stop_s)
     periods = float(part.phase_periods[-1] - part.phase_periods[0])

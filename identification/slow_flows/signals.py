@@ -1,8 +1,9 @@
-"""From a record to slowly varying amplitudes that keep a linear equation of motion.
+"""Convert a record to slowly varying amplitudes that preserve a linear equation of motion.
 
-Any linear filter that force, acceleration, velocity and displacement share keeps ``phi_d^2 F = a + c v + k x``. Two are
-applied here: a zero-phase high-pass below the fundamental, without which velocity and displacement could not be had from
-an acceleration, and the window of the demodulation. Both run over the whole record; slices are taken afterwards.
+Any linear filter that is applied alike to force, acceleration, velocity and displacement preserves
+``phi_d^2 F = a + c v + k x``. Two filters are applied here. One is a zero-phase high-pass below the fundamental, without
+which an acceleration could not be integrated to velocity and displacement. The other is the window of the demodulation. Both
+run over the whole record; slices are taken afterwards.
 """
 
 from functools import cache
@@ -16,7 +17,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 WINDOW_PERIODS = 3.0
-"""Length of the Blackman window: its zeros lie on all other multiples of the fundamental's frequency, the mean included."""
+"""Length of the Blackman window: its zeros lie at all other multiples of the fundamental frequency, including zero."""
 
 _STOP, _PASS = 0.25, 0.6  # edges of the high-pass over the fundamental frequency
 _END_FIT_PERIODS = 3.0
@@ -25,10 +26,10 @@ _END_HARMONICS = 3
 
 
 def derivatives(theta: Float, data: Float, rate_hz: float, delay_s: Float, orders: tuple[int, ...]) -> Float:
-    """float[n_signals, n]: every signal differentiated ``orders[i]`` times (integrated where negative), its delay taken out.
+    """float[n_signals, n]: signals differentiated ``orders[i]`` times (integrated if negative), with their delays removed.
 
-    ``data`` float[n_signals, n]; ``delay_s`` float[n_signals]. All pass the same high-pass. The ends are led to zero by the
-    harmonics that stand there, fading over some periods, so that nothing rings into the record.
+    ``data`` float[n_signals, n]; ``delay_s`` float[n_signals]. All signals pass the same high-pass. The record is extended at
+    both ends by its harmonics there, which fade to zero over some periods, so that the filter does not ring into the record.
     """
     from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
@@ -48,7 +49,7 @@ def derivatives(theta: Float, data: Float, rate_hz: float, delay_s: Float, order
 
 
 def _ending(theta: Float, data: Float, length: int) -> Float:
-    """float[n_signals, length]: harmonics of the last few periods going on beyond the record, faded out by half a cosine."""
+    """float[n_signals, length]: harmonics of the last few periods, continued beyond the record and faded by half a cosine."""
     last = np.abs(theta - theta[-1]) <= 2.0 * np.pi * _END_FIT_PERIODS
     orders = np.arange(_END_HARMONICS + 1)
 
@@ -63,7 +64,7 @@ def _ending(theta: Float, data: Float, length: int) -> Float:
 
 
 def amplitudes(theta: Float, data: Float, at: Float, harmonics: int) -> Complex:
-    """complex[n_signals, len(at), H + 1]: harmonics around the phases ``at``, weighted by a Blackman window on the phase."""
+    """complex[n_signals, len(at), H + 1]: harmonics around the phases ``at``, with a Blackman window over the phase."""
     half = np.pi * WINDOW_PERIODS
     weight = np.gradient(theta)
     rotations = np.exp(-1j * np.outer(np.arange(harmonics + 1), theta))
@@ -79,9 +80,9 @@ def amplitudes(theta: Float, data: Float, at: Float, harmonics: int) -> Complex:
 
 
 def between_harmonics(theta: Float, signal: Float, at: Float) -> Float:
-    """float[len(at)]: half the squared amplitude of float[n] ``signal`` where there are no harmonics: at orders 1.5 and 2.5.
+    """float[len(at)]: half the squared amplitude of ``signal`` (float[n]) between harmonics, at orders 1.5 and 2.5.
 
-    Seen through a window of twice the length, whose zeros lie on all harmonics; given as the single window would pass it.
+    It is measured through a window of twice the length, whose zeros lie at all harmonics, and scaled to the single window.
     """
     found = amplitudes(0.5 * theta, signal[None], 0.5 * at, 5)[0]
     return np.asarray(np.mean(np.abs(found[:, [3, 5]]) ** 2, axis=1))
@@ -93,10 +94,11 @@ def _blackman(place: Float) -> Float:
 
 
 def window_correlations(distance_periods: Float) -> tuple[Complex, Complex]:
-    """Correlations of noise at instants so many periods apart (the first less the second).
+    """Return two correlations of noise at instants ``distance_periods`` apart (the first instant minus the second).
 
-    Of white noise seen through the window; and of white noise of an acceleration in ``a + w^2 x`` at resonance, where it
-    cancels but for ``1 - 1 / (1 + n)^2``, n its distance in frequency from the fundamental, over the fundamental.
+    The first is that of white noise filtered by the window. The second is that of white noise of an acceleration in
+    ``a + w^2 x`` at resonance, where the noise cancels except for the factor ``1 - 1 / (1 + n)^2``; n is the distance of its
+    frequency from the fundamental frequency, relative to the fundamental frequency.
     """
     lags, plain, motion = _correlations()
     return np.interp(distance_periods, lags, plain), np.interp(distance_periods, lags, motion)
@@ -104,7 +106,7 @@ def window_correlations(distance_periods: Float) -> tuple[Complex, Complex]:
 
 @cache
 def _correlations() -> tuple[Float, Complex, Complex]:
-    """Lags in periods, and both correlations there, by their spectra."""
+    """Return lags in periods, and both correlations there, computed from their spectra."""
     places = np.linspace(-1.0, 1.0, 241)
     orders = np.linspace(-0.75, 2.0, 551)  # the high-pass stops below, the window above
     turns = np.exp(-1j * np.pi * WINDOW_PERIODS * np.outer(orders, places))
@@ -116,5 +118,5 @@ def _correlations() -> tuple[Float, Complex, Complex]:
 
 
 def _high_pass(order: Float) -> Float:
-    """Gain at frequencies given over the fundamental's."""
+    """Gain at frequencies relative to the fundamental frequency."""
     return np.asarray(np.sin(0.5 * np.pi * np.clip((order - _STOP) / (_PASS - _STOP), 0.0, 1.0)) ** 2)

@@ -1,9 +1,9 @@
-"""Modal properties at every instant of a phase-locked vibration that may grow, decay or wander in frequency.
+"""Modal properties at every instant of a phase-locked vibration that may grow, decay or drift in frequency.
 
-One nonlinear mode whose properties change little within a few periods obeys ``phi_d^2 F = a + c v + k x`` at the drive
-point, with ``k = w^2`` and ``c = 2 w z`` at the amplitude of the moment. Demodulated with one and the same window, it becomes
-``g = k + c b`` with ``g = (phi_d^2 F_1 - A_1) / X_1`` and ``b = V_1 / X_1``, whether the vibration is settled or not: what a
-growing vibration stores is in A_1 and V_1.
+One nonlinear mode whose properties change little within a few periods obeys ``phi_d^2 F = a + c v + k x`` at the drive point,
+with ``k = w^2`` and ``c = 2 w z`` at the instantaneous amplitude. With all signals demodulated by the same window, it becomes
+``g = k + c b`` with ``g = (phi_d^2 F_1 - A_1) / X_1`` and ``b = V_1 / X_1``. This holds for settled and transient vibrations,
+because A_1 and V_1 include the energy that a growing vibration stores.
 """
 
 from collections.abc import Sequence
@@ -25,20 +25,20 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _MIN_FIT_PERIODS = 1.0
-_NOISE_FITS = 2.0  # how much longer fits are that the noise is looked for in
-_POOLED_PERIODS = 40.0  # over which the noise is taken for constant
+_NOISE_FITS = 2.0  # factor by which the fits that estimate the noise are longer
+_POOLED_PERIODS = 40.0  # over which the noise is taken as constant
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SlowFlow:
-    """A vibration as it goes, at n instants.
+    """Amplitudes and modal properties of a vibration at n instants.
 
     Parameters
     ----------
     channels
         One per row of ``harmonics``; exactly one of role ``force`` and one of role ``drive``.
     time_s, phase_periods
-        float[n], from the first sample of the record on; phase of the oscillator in periods.
+        float[n], time since the first sample of the record; phase of the oscillator in periods.
     harmonics
         complex[n_channels, n, H + 1], peak, in the unit of each channel, against the phase of the oscillator.
     drive_m
@@ -48,20 +48,20 @@ class SlowFlow:
     stiffness, damping_1_s
         float[n], k (1/s^2) and c (1/s) from least squares over ``fit_periods`` around each instant.
     stiffness_std, damping_std_1_s
-        float[n], their standard errors from what longer fits leave over, overlapping windows accounted for; what properties
-        bend within twice that length counts as noise.
+        float[n], standard errors of these from the residuals of longer fits, with overlapping windows accounted for. A change
+        of the properties that is not quadratic within twice the length of the fits counts as noise.
     noise
-        float[n, 2], variances of real and imaginary part of ``g X``, (m/s^2)^2: the part that averages out as white noise
-        of the force does, and the part that averages out faster (`identification.slow_flows.fits`).
+        float[n, 2], variances of real and imaginary part of ``g X``, (m/s^2)^2: the part that averages out like white noise
+        of the force, and the part that averages out faster (`identification.slow_flows.fits`).
     force_noise
-        float[n], ``phi_d^4 |F|^2 / 2`` between the harmonics, (m/s^2)^2, as the window of the demodulation would pass it: its
-        mean is the first of these variances, known from the force alone.
+        float[n], ``phi_d^4 |F|^2 / 2`` between the harmonics, (m/s^2)^2, as the window of the demodulation would pass it. Its
+        mean is an estimate of the first variance in ``noise`` from the force alone.
     drive_mode_shape
         phi_d, kg^-1/2.
     fit_periods
         Length of the sliding fits.
     residual_m_n
-        Receptance of the other modes at the drive point, m/N, that was taken out.
+        Receptance of the other modes at the drive point, m/N, whose contribution was subtracted.
     """
 
     channels: tuple[Channel, ...]
@@ -86,7 +86,7 @@ class SlowFlow:
         return find_name(self.channels, name)
 
     def between(self, start_s: float, stop_s: float) -> "SlowFlow":
-        """The instants from ``start_s`` to ``stop_s``."""
+        """Return the instants from ``start_s`` to ``stop_s``."""
         inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
         if not inside.any():
             raise IdentificationError(
@@ -96,7 +96,7 @@ class SlowFlow:
         return self.select(inside)
 
     def select(self, keep: NDArray[np.bool_]) -> "SlowFlow":
-        """The instants where ``keep`` (bool[n]) is true."""
+        """Return the instants where ``keep`` (bool[n]) is true."""
         cut: dict[str, Any] = {name: getattr(self, name)[keep] for name in _PER_INSTANT}
         return replace(self, harmonics=self.harmonics[:, keep], **cut)
 
@@ -107,12 +107,12 @@ class SlowFlow:
 
     @property
     def force_n(self) -> Float:
-        """float[n]: peak of the fundamental of the force as it was, N."""
+        """float[n]: measured peak of the fundamental of the force, N."""
         return np.asarray(np.abs(self.force[:, 1]))
 
     @property
     def resonant_force_n(self) -> Float:
-        """float[n]: force that would hold the amplitude of the moment at phase resonance, ``c w |X| / phi_d^2``, N."""
+        """float[n]: force that would hold the instantaneous amplitude at phase resonance, ``c w |X| / phi_d^2``, N."""
         omega = np.sqrt(np.maximum(self.stiffness, 0.0))
         return np.asarray(self.damping_1_s * omega * self.amplitude_m / self.drive_mode_shape**2)
 
@@ -123,12 +123,12 @@ class SlowFlow:
 
     @property
     def frequency_hz(self) -> Float:
-        """float[n]: momentary frequency of the motion, Hz."""
+        """float[n]: instantaneous frequency of the motion, Hz."""
         return np.asarray(self.rate_1_s.imag / (2.0 * np.pi))
 
     @property
     def growth_1_s(self) -> Float:
-        """float[n]: rate at which the motion grows, relative, 1/s."""
+        """float[n]: relative growth rate of the motion, 1/s."""
         return np.asarray(self.rate_1_s.real)
 
     @property
@@ -143,17 +143,17 @@ class SlowFlow:
 
     @property
     def modal_frequency_std_hz(self) -> Float:
-        """float[n]: its standard error."""
+        """float[n]: standard error of the modal frequency, Hz."""
         return np.asarray(self.stiffness_std / (8.0 * np.pi**2 * self.modal_frequency_hz))
 
     @property
     def damping_ratio(self) -> Float:
-        """float[n]: ``c / (2 w)``."""
+        """float[n]: damping ratio ``c / (2 w)``."""
         return np.asarray(self.damping_1_s / (4.0 * np.pi * self.modal_frequency_hz))
 
     @property
     def damping_ratio_std(self) -> Float:
-        """float[n]: its standard error."""
+        """float[n]: standard error of the damping ratio."""
         return np.asarray(self.damping_std_1_s / (4.0 * np.pi * self.modal_frequency_hz))
 
     def deflection_ratio(self, name: str) -> Complex:
@@ -182,7 +182,7 @@ def slow_flow(
     skew_samples: ArrayLike | None = None,
     residual_m_n: float = 0.0,
 ) -> SlowFlow:
-    """Modal properties at every instant of a record.
+    """Identify modal properties at every instant of a record.
 
     Parameters
     ----------
@@ -195,30 +195,31 @@ def slow_flow(
     sample_rate_hz
         Samples per second.
     drive_mode_shape
-        Mass-normalised linear mode shape at the drive point, kg^-1/2; damping goes with its square.
+        Mass-normalised linear mode shape at the drive point, kg^-1/2; the damping is proportional to its square.
     harmonics
         Highest harmonic H.
     fit_periods
-        Periods that the sliding fits take together: more leave less noise, fewer show faster changes.
+        Length of the sliding fits in periods: longer fits leave less noise, shorter ones resolve faster changes.
     points_per_period
-        Instants per period; the window passes too little above one per period for more than two to tell more.
+        Number of instants per period; more than two add little, because the window passes little above one per period.
     skew_samples
-        float[n_channels], how late each channel is, in samples; none if None.
+        float[n_channels], delay of each channel in samples; zero if None.
     residual_m_n
-        Receptance of all other modes at the drive point near the tested frequency, m/N, as a linear modal analysis has it
-        (real part of `LinearModes.receptance` without the tested mode). At rest near phase resonance it does not matter; a
-        ramp faster than the free decay takes a multiple of the settled force, and without it the damping is off by a percent.
+        Receptance of all other modes at the drive point near the tested frequency, m/N, from a linear modal analysis (real
+        part of `LinearModes.receptance` without the tested mode). It has no effect on a settled vibration near phase
+        resonance. A ramp faster than the free decay needs a multiple of the settled force, and without this receptance the
+        damping is then off by a percent.
 
     Returns
     -------
     SlowFlow
-        Without the first and last one and a half periods, where the window of the demodulation would not be whole.
+        The slow flow without the first and last one and a half periods, where the window would be incomplete.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, unequal lengths, a phase that falls, too few samples per period, a record that is too short,
-        missing roles.
+        If values are NaN or infinite, lengths differ, the phase falls, there are too few samples per period, the record is
+        too short, or roles are missing.
     """
     theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
     data = finite_array("samples", samples, np.float64, 2)
@@ -245,7 +246,7 @@ def slow_flow(
     stiffness, rate = (shape**2 * found[force, :, 1] - a) / x, v / x
     periods = at / (2.0 * np.pi)
     fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods)
-    # The two parts of the noise are told apart by how slowly they vary: that takes longer fits.
+    # The two parts of the noise differ in how slowly they vary; separating them takes longer fits.
     longer = min(_NOISE_FITS * fit_periods, float(np.ptp(periods)))
     noise = _pooled(_sliding(stiffness, rate, np.abs(x), periods, longer, degree=2), periods)
     errors = np.array([fit.standard_errors(variances) for fit, variances in zip(fits, noise, strict=True)])
@@ -279,7 +280,7 @@ def _skew(skew_samples: ArrayLike | None, channels: int) -> Float:
 
 
 def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_period: int) -> Float:
-    """float[n]: phases at which the window is whole, evenly spaced; refuses phases that are of no use."""
+    """float[n]: equidistant phases at which the window is complete; raises `IdentificationError` for an unusable phase."""
     if harmonics < 1:
         raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
     if not fit_periods >= _MIN_FIT_PERIODS:
@@ -309,7 +310,7 @@ def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_perio
 def _sliding(
     stiffness: Complex, rate: Complex, size: Float, periods: Float, fit_periods: float, degree: int = 1
 ) -> list[LocalFit]:
-    """One fit around every instant; at the ends over as many instants, further to one side."""
+    """Fit around every instant; near the ends the fit takes as many instants, shifted to one side."""
     half = 0.5 * fit_periods + 1e-9
     fits = []
     for centre in periods:

@@ -1,1 +1,1 @@
-"""A nonlinear state-space model and the exciter that drives it, simulated together from a voltage."""
+"""Simulation of a nonlinear state-space model together with the exciter that drives it, from a voltage."""

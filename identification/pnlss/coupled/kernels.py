@@ -1,4 +1,4 @@
-"""Compiled simulation of a model whose input is a force that its own output reacts on."""
+"""Compiled simulation of a model whose input force depends on its own output."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ _EXACT = 1e-12
 
 
 class Loop(NamedTuple):
-    """``xi(k+1) = A xi + b y_d``, ``F = F_0 + c xi + d y_d``: a force that reacts on an output."""
+    """Filter of a force that reacts on an output: ``xi(k+1) = A xi + b y_d``, ``F = F_0 + c xi + d y_d``."""
 
     a: np.ndarray
     """float[n_xi, n_xi]."""
@@ -42,12 +42,13 @@ def simulate_coupled(
     x: np.ndarray,
     y: np.ndarray,
 ) -> int:
-    """Simulate from rest; input ``row`` is ``given`` (float[n]) plus the reaction to ``output``; other inputs are zero.
+    """Simulate from rest. Input ``row`` is ``given`` (float[n]) plus the reaction to ``output``; other inputs are zero.
 
-    Writes ``force`` (float[n]), ``x`` (float[n, n_states]) and ``y`` (float[n, n_outputs]); ``xi`` and ``after`` (float[n_xi])
-    are room. At each sample the force solves a scalar equation, for the output answers to it at once: by the secant method,
-    whose first step is exact where the features have no force in them. Returns n, or the first sample at which a state is
-    beyond its ``bound``, an output is not finite or no force was found; what is written from there on means nothing.
+    Writes ``force`` (float[n]), ``x`` (float[n, n_states]) and ``y`` (float[n, n_outputs]); ``xi`` and ``after``
+    (float[n_xi]) are work arrays. The output responds to the force without delay, so that the force of each sample is the
+    solution of a scalar equation. It is found by the secant method, whose first step is exact if the features do not depend
+    on the force. Returns n, or the first sample at which a state exceeds its ``bound``, an output is not finite or no force
+    is found; values from that sample on are not valid.
     """
     n, count, reacting = m.a.shape[0], given.size, xi.size
     largest = 0.0

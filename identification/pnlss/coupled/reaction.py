@@ -1,14 +1,14 @@
-"""An exciter's reaction to the motion of the drive point, as a filter that goes along with a simulation.
+"""Reaction of an exciter to the motion of the drive point, approximated by a filter that runs along with a simulation.
 
-The reaction ``F = P Y`` of an output Y that is the drive point's acceleration holds ``1 / s^2``, exactly so where frequency
-responses are concerned. In time a double integrator would drift with anything that is static, and a model that says little of
-frequencies below those it was trained at becomes unstable with it. No causal filter is exact in a band and silent below
-(the phase of one follows from its gain, Bode 1945). Here one is chosen that is stable with the model and near to P; what is
-left to P is added in passes over the whole run (`identification.pnlss.coupled.run`), each of which multiplies the error by
+The reaction is ``F = P Y``. If the output Y is the acceleration of the drive point, P contains ``1 / s^2``. This is exact for
+frequency responses. In time, a double integrator would drift with any static component, and it would destabilise a model that
+is inaccurate below the frequencies of its training. No causal filter is exact within a band and zero below it, because the
+gain of a filter determines its phase (Bode 1945). The filter P^ chosen here is stable with the model and close to P. The
+remainder P - P^ is added in passes over the whole run (`identification.pnlss.coupled.run`). Each pass multiplies the error by
 
     (P - P^) G / (1 - P G),    G the model's linear part,
 
-so that this is what is made small.
+and the filter minimises this factor.
 """
 
 from collections.abc import Callable
@@ -31,28 +31,28 @@ Float = NDArray[np.float64]
 Response = Callable[[Float], Complex]
 
 _LEAKS = (0.07, 0.15, 0.3, 0.6, 1.0, 2.0)
-"""Poles of the filter for the integrators, over the lowest frequency."""
+"""Poles of the filter that replace the integrators, relative to the lowest frequency."""
 _DELAYS = 4
 _QUIET = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
-"""Weights of silence below the band that are tried."""
+"""Weights that are tried for the filter's gain below the band."""
 _STATIC = 1e3
-"""Weight of silence at zero frequency: there is no static force."""
+"""Weight of the filter's gain at zero frequency: there is no static force."""
 _SLOW = 0.3
-"""Share of the lowest frequency up to which the filter is to be silent."""
+"""Share of the lowest frequency up to which the filter's gain should be small."""
 _FAST = 2.5
-"""Poles of the exciter that turn or decay faster than so many radians a sample are left to the delays."""
+"""Poles of the exciter faster than this, in radians per sample, are left to the delays."""
 _TOP = 0.495
-"""Highest frequency over the sample rate."""
+"""Highest frequency of the fit over the sample rate."""
 _LINES = 600
 _SHIFT = 0.15
-"""Relative shift of resonances with amplitude."""
+"""Assumed relative shift of resonances with amplitude."""
 _EASY, _LEAST = 0.05, 0.8
-"""Factors of a pass: up to the one the most silent filter is taken, beyond the other there is none."""
+"""Factors of a pass. A filter with a factor below ``_EASY`` is always accepted; one with a factor above ``_LEAST`` never is."""
 
 
 @dataclass(frozen=True)
 class Reaction:
-    """Exact reaction of an exciter to an output that is the drive point's motion, differentiated ``order`` times."""
+    """Exact reaction of an exciter to an output: the drive-point displacement, differentiated ``order`` times."""
 
     exciter: Exciter
     order: int
@@ -66,7 +66,7 @@ class Reaction:
 
     @property
     def poles(self) -> Complex:
-        """rad/s: those of P without its integrators."""
+        """Poles of P without its integrators, rad/s."""
         p, e = np.polynomial.polynomial, self.exciter
         coil, stinger = [1.0, e.coil_time_constant_s], [1.0, e.stinger_damping_time_s]
         mechanical = [e.suspension_stiffness_n_m, e.suspension_damping_n_s_m, e.moving_mass_kg]
@@ -75,7 +75,7 @@ class Reaction:
         return np.asarray(p.polyroots(np.trim_zeros(whole, "b")), dtype=np.complex128)
 
     def states(self) -> tuple[Float, Float]:
-        """A and b of the filter: leaking integrators, the exciter's poles, delays."""
+        """Return A and b of the filter: leaky integrators, the exciter's poles, delays."""
         leaks = np.exp(-2.0 * np.pi * self.lowest_hz * np.array(_LEAKS) / self.sample_rate_hz)
         blocks, inputs = [np.diag(leaks)], [1.0 - leaks]
         poles = self.poles / self.sample_rate_hz
@@ -91,7 +91,7 @@ class Reaction:
         return np.asarray(block_diag(*blocks)), np.concatenate(inputs)
 
     def filters(self, linear: Response) -> list[Loop]:
-        """Filters by least squares of the passes' factor, the less silent below the band first."""
+        """Return filters that minimise the factor of a pass by least squares, in rising weight of small gain below the band."""
         a, b = self.states()
         band_hz = self.lines(_LINES)
         slow_hz = np.geomspace(0.03, 1.0, _LINES // 6) * _SLOW * self.lowest_hz
@@ -110,30 +110,31 @@ class Reaction:
         return found
 
     def sensitivity(self, lines_hz: Float, linear: Response) -> Float:
-        """float[n]: ``|G / (1 - P G)|``, and what it may become where resonances shift with the amplitude."""
+        """float[n]: ``|G / (1 - P G)|``, as the maximum over the range within which resonances shift with amplitude."""
         g = linear(lines_hz)
         reach = int(np.ceil(np.log1p(_SHIFT) / np.log(lines_hz[1] / lines_hz[0])))
         return np.asarray(maximum_filter1d(np.abs(g / (1.0 - self.exact(lines_hz) * g)), 2 * reach + 1, mode="nearest"))
 
     def lines(self, count: int) -> Float:
-        """Hz: from the lowest frequency on, evenly by logarithm."""
+        """Frequencies in Hz from the lowest frequency on, evenly spaced by logarithm."""
         return np.geomspace(self.lowest_hz, _TOP * self.sample_rate_hz, count)
 
     def response(self, loop: Loop, frequency_hz: Float) -> Complex:
-        """complex[n]: P^ of a filter."""
+        """complex[n]: frequency response P^ of a filter."""
         return np.asarray(self._each(loop.a, loop.b, frequency_hz) @ np.append(loop.c, loop.d))
 
     def _each(self, a: Float, b: Float, frequency_hz: Float) -> Complex:
-        """complex[n, n_xi + 1]: what each state does, and the output itself."""
+        """complex[n, n_xi + 1]: responses of the filter's states to the output, and 1 for its direct term."""
         z = np.exp(2j * np.pi * frequency_hz / self.sample_rate_hz)
         states = StateSpace(a, b[:, None], np.eye(len(b)), np.zeros((len(b), 1))).response(z)[:, :, 0]
         return np.column_stack([states, np.ones(z.size)])
 
 
 def chosen_filter(reaction: Reaction, linear: StateSpace, row: int, output: int) -> Loop:
-    """The filter that is stable with the model's linear part and leaves little to passes over the run; silent below, if it can.
+    """Choose a filter that is stable with the model's linear part and leaves little to the passes over the run.
 
-    Raises `IdentificationError` if none does.
+    Among sufficient filters, the one with the smallest gain below the band is chosen. Raises `IdentificationError` if no
+    filter is suitable.
     """
 
     def response(frequency_hz: Float) -> Complex:
@@ -156,7 +157,7 @@ def chosen_filter(reaction: Reaction, linear: StateSpace, row: int, output: int)
 
 
 def _stable(loop: Loop, linear: StateSpace, row: int, output: int) -> bool:
-    """Whether the linear part is no less stable with the reaction than without it."""
+    """Return whether the linear part with the reaction is no less stable than without it."""
     d = linear.d[output, row]
     through = 1.0 / (1.0 - loop.d * d)
     force = through * np.concatenate([loop.d * linear.c[output], loop.c])

@@ -1,10 +1,10 @@
-"""A force-driven model and an identified exciter, simulated together from the voltage that was recorded.
+"""Simulate a force-driven model together with an identified exciter, from the recorded voltage.
 
-``F = g_e V - Z X_a`` (`identification.prediction.exciter`): what the voltage does is known beforehand and made at all lines
-of the run at once, with the delay, hold and coupling of its path, so that nothing is lost to the sample rate. What the motion
-does goes along with the simulation by a filter near to it. What that leaves is added from pass to pass over the run, exactly
-from the lowest frequency on, until the force no longer changes (waveform relaxation: Lelarasmee et al., IEEE Trans. CAD 1,
-1982).
+``F = g_e V - Z X_a`` (`identification.prediction.exciter`): the contribution of the voltage is known beforehand. It is
+computed at all lines of the run at once, with the delay, hold and coupling of its path, and is therefore exact at any sample
+rate. The contribution of the motion is approximated during the simulation by a filter. The remainder is added in repeated
+passes over the run, exactly above the lowest frequency, until the force no longer changes (waveform relaxation: Lelarasmee et
+al., IEEE Trans. CAD 1, 1982).
 """
 
 from dataclasses import dataclass
@@ -32,9 +32,9 @@ Float = NDArray[np.float64]
 _LOWEST, _GUESSED = 0.8, 0.5
 """Default lowest frequency: share of the lowest trained frequency, or of the linear resonance if that is unknown."""
 _FADED = 0.5
-"""Share of the lowest frequency below which the filter alone makes the reaction."""
+"""Share of the lowest frequency below which only the filter contributes to the reaction."""
 _AFTER_PERIODS = 40
-"""Periods of the lowest frequency that are simulated at zero volts after the end, so that the end is no jump."""
+"""Periods of the lowest frequency simulated at zero volts after the end, so that the run does not end with a jump."""
 _TOLERANCE = 1e-6
 _PASSES = 40
 
@@ -48,11 +48,11 @@ class CoupledRun(Simulation):
     force_n
         float[n], force at the model's input; NaN from ``unbounded_at`` on.
     passes
-        Passes over the run.
+        Number of passes over the run.
     change
-        RMS of what the last pass changed the force by, over that of the force; NaN for an unbounded run.
+        RMS change of the force in the last pass over the RMS force; NaN for an unbounded run.
     notes
-        What a user should know about this run, one line each.
+        Remarks on this run, one line each.
     """
 
     force_n: Float
@@ -64,24 +64,25 @@ class CoupledRun(Simulation):
 def pnlss_coupled_run(
     model: PnlssModel, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
 ) -> CoupledRun:
-    """Response of a model and the exciter at its force input, both from rest, to a recorded voltage.
+    """Simulate a model with the exciter at its force input, both from rest, under a recorded voltage.
 
     Parameters
     ----------
     model
-        With one force as its only input, and the drive point's motion among its outputs.
+        Model with one force as its only input, and the drive-point motion among its outputs.
     exciter
-        That of this very rig. No static force is made, as in harmonic balance (`pnlss_response`).
+        Exciter identified on the same rig. It applies no static force, as in harmonic balance (`pnlss_response`).
     voltage_v
-        float[n], at the model's sample rate, as it was recorded: the exciter's ``path`` is in its parameters.
+        float[n], recorded voltage at the model's sample rate. Do not correct it for the voltage path, which the exciter's
+        ``path`` models.
     lowest_hz
-        Frequency from which the exciter's reaction is exact; below it fades. By default somewhat below the lowest that the
-        model was trained at, half its linear resonance if that is unknown.
+        Frequency above which the exciter's reaction is exact; below it the reaction fades. Default: 0.8 times the lowest
+        frequency of the model's training, or half its linear resonance if that is unknown.
 
     Raises
     ------
     IdentificationError
-        On NaN or inf, a model without such channels, and where no stable filter for the reaction is found.
+        If values are NaN or infinite, the model lacks these channels, or no stable filter for the reaction is found.
     """
     v = finite_array("voltage_v", voltage_v, np.float64, 1)
     forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"]
@@ -110,7 +111,7 @@ def _lowest(model: PnlssModel) -> float:
 
 
 class _Run:
-    """Passes over a run, with zero volts ahead and after."""
+    """Passes over a run, with zero volts before and after the recorded voltage."""
 
     def __init__(self, model: PnlssModel, reaction: Reaction, row: int, output: int, voltage_v: Float) -> None:
         self._model, self._row, self._output, self._n = model, row, output, voltage_v.size
@@ -130,7 +131,7 @@ class _Run:
         self._left[used] = within[used] * (reaction.exact(hz[used]) - reaction.response(self._loop, hz[used]))
 
     def _filtered(self, response: Complex, values: Float) -> Float:
-        """float[count] of values that are zero after their end."""
+        """float[count]: response of a filter to values that are zero after their end."""
         return np.asarray(irfft(response * rfft(values, self._size), self._size)[: self._count])
 
     def found(self) -> CoupledRun:

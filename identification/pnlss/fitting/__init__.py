@@ -1,1 +1,1 @@
-"""Fit of all parameters of a nonlinear state-space model to experiments, in the time domain."""
+"""Fit all parameters of a nonlinear state-space model to experiments, in the time domain."""

@@ -1,4 +1,4 @@
-"""Checks before a fit: data, models and memory it cannot work with are refused."""
+"""Checks before a fit: raise an error if data, model or available memory do not permit it."""
 
 import os
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 _SQUARES = 6
-"""Square matrices of the size of all parameters held at once: normal equations, those of one experiment, eigenvectors, room."""
+"""Parameter-sized square matrices held at once: normal equations, those of one experiment, eigenvectors, work space."""
 
 
 def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
@@ -102,7 +102,7 @@ def check_data(
 
 
 def _check_validation(experiments: Sequence[Experiment], validation: Sequence[Experiment]) -> None:
-    """Refuse validation data that is also training data, or has an output that is zero throughout."""
+    """Raise an error if validation data is also training data, or has an output that is zero throughout."""
     for index, one in enumerate(validation):
         twin = next((k for k, other in enumerate(experiments) if same_data(one, other)), None)
         if twin is not None:
@@ -116,7 +116,7 @@ def _check_validation(experiments: Sequence[Experiment], validation: Sequence[Ex
 
 
 def check_not_zero(experiment: Experiment, what: str) -> None:
-    """Raise `IdentificationError` if an output is zero where it counts, for relative errors are undefined there."""
+    """Raise `IdentificationError` if an output is zero where it counts, because its relative error is undefined."""
     for channel, values in zip(experiment.output_channels, experiment.counted_outputs, strict=True):
         if not np.any(values):
             raise IdentificationError(

@@ -43,13 +43,13 @@ def fit_pnlss(
     Parameters
     ----------
     start
-        Initial model, mostly a linear model `with_features`. Its simulation must stay bounded.
+        Initial model, usually a linear model `with_features`. Its simulation must stay bounded.
     experiments
         Training data.
     validation
         Data on which the iterate is chosen; never part of the fit.
     settings
-        `FitSettings`; None for the usual ones.
+        `FitSettings`; None for the defaults.
     progress
         Called after each iteration.
     resume
@@ -59,12 +59,12 @@ def fit_pnlss(
     Returns
     -------
     PnlssFit
-        After Ctrl-C the fit reached so far, marked ``interrupted``.
+        The fit; after Ctrl-C, the fit reached so far, marked ``interrupted``.
 
     Raises
     ------
     IdentificationError
-        On data and models that do not match, data that cannot determine the parameters, a start that is not bounded.
+        If data and model do not match, the data cannot determine the parameters, or the simulated start is unbounded.
     """
     settings = FitSettings() if settings is None else settings
     estimated = sum(e.initial_state == "estimated" for e in experiments)
@@ -122,7 +122,7 @@ def _state_scale(start: PnlssModel, experiments: Sequence[Experiment]) -> Float:
 
 
 def _begin(problem: Problem) -> Iterates:
-    """Iterates at the start, with initial states from the first samples."""
+    """Return iterates at the start, with initial states estimated from the first samples."""
     parameters = problem.parameters
     rest = np.zeros((parameters.estimated, parameters.start.states))
     system = parameters.system(parameters.vector(parameters.start, rest))
@@ -132,14 +132,14 @@ def _begin(problem: Problem) -> Iterates:
 
 
 def _resumed(problem: Problem, scales: Scales, resume: PnlssFit) -> Iterates:
-    """Iterates at which an earlier fit stopped."""
+    """Return the iterates at which an earlier fit stopped."""
     pairs = ((resume.last, resume.last_initial_states), (resume.model, resume.initial_states))
     last, best = (problem.parameters.vector(scales.model(m), begins / scales.states) for m, begins in pairs)
     return Iterates.resumed(last, best, resume.history)
 
 
 def _trained(model: PnlssModel, experiments: Sequence[Experiment], begins: Float) -> PnlssModel:
-    """The model with the range, band and names of its training data."""
+    """Return the model with the range, band and names of its training data."""
     states, place = np.zeros(model.states), 0
     free = replace(model, state_range=np.full(model.states, np.nan))
     for experiment in experiments:

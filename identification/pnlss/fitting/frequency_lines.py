@@ -15,11 +15,11 @@ __all__ = ["transformed", "with_lines"]
 Float = NDArray[np.float64]
 
 _COLUMNS = 64
-"""Columns transformed at a time, so that a transform needs little memory besides the Jacobian."""
+"""Number of columns transformed at a time, so that a transform needs little memory besides the Jacobian."""
 
 
 def with_lines(records: Sequence[Record], settings: FitSettings, sample_rate_hz: float) -> list[Record]:
-    """The records with weights of lines if the settings ask for them.
+    """Return the records with line weights if the settings require them.
 
     Raises `IdentificationError` for a record that is not periodic or has no line that counts.
     """
@@ -42,7 +42,7 @@ def with_lines(records: Sequence[Record], settings: FitSettings, sample_rate_hz:
 
 
 def _line_weights(settings: FitSettings, record: Record, sample_rate_hz: float) -> Float:
-    """float[n_outputs, n_lines] with which squares of lines add up to the squares of all counted samples (Parseval)."""
+    """float[n_outputs, n_lines]: weights with which squared lines add up to the squares of all counted samples (Parseval)."""
     outputs, period = record.y.shape[1], record.period
     frequencies_hz = np.fft.rfftfreq(period, 1.0 / sample_rate_hz)
     double = np.full(frequencies_hz.size, 2.0)
@@ -70,7 +70,7 @@ def _line_weights(settings: FitSettings, record: Record, sample_rate_hz: float) 
 def transformed(
     record: Record, lines: Float, blocks: Iterable[tuple[Float, Float, Float]]
 ) -> Iterator[tuple[Float, Float, Float]]:
-    """For each output the Jacobian float[2 n_used, n_columns] of its lines, rows float[2 n_used, n_own] and errors.
+    """Yield for each output the Jacobian float[2 n_used, n_columns] of its lines, rows float[2 n_used, n_own] and errors.
 
     Errors are float[2 n_used, n_outputs]. Periods are averaged first; real parts stand above imaginary ones, all weighted.
     """

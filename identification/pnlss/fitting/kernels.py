@@ -103,7 +103,7 @@ def _add_errors(
 
 @inner_kernel
 def _output_weights(system: System, o: int, v: np.ndarray, weight: float, steep: np.ndarray, row: np.ndarray) -> None:
-    """Write the derivatives of output ``o`` by the weights in its features."""
+    """Write the derivatives of output ``o`` with respect to the weights in its features."""
     begin = 0
     monomials = system.output_table.factors.shape[0]
     for f in range(system.output_table.weights.shape[0]):
@@ -166,14 +166,18 @@ def sensitivities(
     rows: np.ndarray,
     errors: np.ndarray,
 ) -> int:
-    """Go through a block of inputs and measured outputs (float[n, n_inputs], float[n, n_outputs]), carrying ``r``.
+    """Process a block of inputs and measured outputs (float[n, n_inputs], float[n, n_outputs]), with the state in ``r``.
 
-    The columns of sensitivities are ``linear`` ones of [A B E] (row by row; 0 for none), then the weights in the
-    state features (row by row), if linear is not 0, then those of initial states. Where the block is
-    ``counted``, ``errors`` (float[n, n_outputs]) gets the weighted errors, simulated less measured, ``r`` their products with
-    all derivatives, and of the samples ``kept`` (int[n_kept], rising) ``jacobian`` (float[n_outputs, n_kept, n_columns +
-    n_output_weights]) gets the derivatives of the weighted outputs, those by the weights in the output features last,
-    and ``rows`` (float[n_kept, n_output_columns]) q: the derivative of output l by its own [C D F] is ``weight[l] q``.
+    The columns of the sensitivities are first the ``linear`` entries of [A B E] (row by row; 0 for none), then, unless linear
+    is 0, the weights in the state features (row by row), then the initial states. If the block is ``counted``, these arrays
+    are written:
+
+    - ``errors`` (float[n, n_outputs]): the weighted errors, simulated minus measured.
+    - ``r``: the sums of the products of errors and derivatives.
+    - ``jacobian`` (float[n_outputs, n_kept, n_columns + n_output_weights]): the derivatives of the weighted outputs at the
+      samples ``kept`` (int[n_kept], rising), with the weights in the output features last.
+    - ``rows`` (float[n_kept, n_output_columns]): q at the same samples. The derivative of output l with respect to its row of
+      [C D F] is ``weight[l] q``.
 
     Returns n, or the sample at which a state is beyond ``bound`` or not a number.
     """

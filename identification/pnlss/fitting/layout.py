@@ -1,4 +1,4 @@
-"""Data of the kernels of a fit: a system, its derivatives, and the room of a recursion over time."""
+"""Data of the kernels of a fit: a system, its derivatives, and the work space of a recursion over time."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ __all__ = ["Room", "Slopes", "System", "room"]
 
 
 class System(NamedTuple):
-    """A model as its parameters stand: ``x(k+1) = [A B E] z``, ``y = [C D F] q``, ``z = (x, u, phi)``, ``q = (x, u, chi)``."""
+    """A model with its parameters: ``x(k+1) = [A B E] z``, ``y = [C D F] q`` with ``z = (x, u, phi)``, ``q = (x, u, chi)``."""
 
     state: np.ndarray
     """float[n_states, n_variables + n_state_features], [A B E]."""
@@ -26,36 +26,36 @@ class Slopes(NamedTuple):
     table: Table
     """Monomials that occur in derivatives, of degree one and above."""
     coefficients: np.ndarray
-    """float[n_monomials, (n_states + n_outputs) * n_states]: their shares in ``E d phi / d x`` and ``F d chi / d x``."""
+    """float[n_monomials, (n_states + n_outputs) * n_states], coefficients in ``E d phi / d x`` and ``F d chi / d x``."""
 
 
 class Room(NamedTuple):
-    """State of the recursion from sample to sample, and its working arrays."""
+    """State of the recursion from sample to sample, and its work arrays."""
 
     x: np.ndarray
     """float[n_states], the state before the next sample."""
     s: np.ndarray
-    """float[2, n_states, n_columns], its sensitivities, first of the two between calls."""
+    """float[2, n_states, n_columns], sensitivities of the state; between calls the first of the two is current."""
     z: np.ndarray
     q: np.ndarray
     slopes: np.ndarray
-    """float[n_slopes], the monomials in derivatives."""
+    """float[n_slopes], values of the monomials in derivatives."""
     effective: np.ndarray
     """float[(n_states + n_outputs) * n_states], ``A + E d phi / d x`` above ``C + F d chi / d x``."""
     back: np.ndarray
-    """float[n_states], errors through the outputs."""
+    """float[n_states], errors propagated back through the outputs."""
     gradient: np.ndarray
-    """float[n_columns + n_output_weights], derivatives times errors, summed."""
+    """float[n_columns + n_output_weights], sum of derivatives times errors."""
     own_gradient: np.ndarray
-    """float[n_outputs, n_output_columns], the same of [C D F]."""
+    """float[n_outputs, n_output_columns], sum of derivatives times errors for [C D F]."""
     row: np.ndarray
-    """float[n_output_weights], derivatives of an output by the weights in its features."""
+    """float[n_output_weights], derivatives of an output with respect to the weights in its features."""
     state_steep: np.ndarray
     output_steep: np.ndarray
 
 
 def room(system: System, slopes: Slopes, columns: int) -> Room:
-    """Room for a recursion with so many columns of sensitivities."""
+    """Return the work space of a recursion with ``columns`` columns of sensitivities."""
     n, outputs = system.state.shape[0], system.output.shape[0]
     return Room(
         np.zeros(n),

@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt iterations: damped steps, choice of the damping, stopping, the iterates kept.
+"""Levenberg-Marquardt iterations: damped steps, choice of the damping, stopping, and the stored iterates.
 
 Normal equations are scaled to columns of unit norm and decomposed once; each damping then only changes a diagonal.
 """
@@ -25,7 +25,9 @@ _SMALLEST, _LARGEST = 1e-16, 1e8
 """Range of dampings that are tried."""
 _NEAR = 1e-4
 """Once an iteration gains less than this share, all samples enter the Hessian, so that a minimum is reached in few steps.
-Before, a subset of the samples makes as fast progress."""
+
+Before that, a subset of the samples progresses as fast.
+"""
 _WORTH = 0.01
 """A smaller damping is tried if its predicted gain exceeds the gain achieved by more than this share."""
 _STALLED = 5
@@ -35,9 +37,9 @@ _STALLED = 5
 class Steps:
     """Solutions of ``(H + damping w_max D^2) step = -g`` in the span of the eigenvectors that the data determine.
 
-    D^2 is the diagonal of H, so that neither units nor degrees matter; w_max is the largest eigenvalue of ``D^-1 H D^-1``.
-    n_states^2 directions change no output at all: eigenvalues below ``truncation w_max`` are left out, which a factorisation
-    could not do.
+    D^2 is the diagonal of H, so that the step does not depend on units or on the degrees of monomials; w_max is the largest
+    eigenvalue of ``D^-1 H D^-1``. n_states^2 directions change no output. Eigenvalues below ``truncation w_max`` are
+    therefore left out, which a factorisation could not do.
 
     Raises
     ------
@@ -61,14 +63,14 @@ class Steps:
         return int(np.count_nonzero(self._kept))
 
     def at(self, damping: float) -> Float:
-        """Step with this damping, relative to the largest eigenvalue."""
+        """Return the step with this damping, which is relative to the largest eigenvalue."""
         if not self.rank:
             return np.zeros_like(self._scale)
         solved = self._gradient / (self._values + damping * self._values[-1])
         return np.asarray(-self._scale * (self._vectors @ solved))
 
     def promised(self, damping: float) -> float:
-        """Predicted decrease of the squared errors with this damping, for outputs linear in the parameters."""
+        """Return the predicted decrease of the squared errors with this damping, for outputs linear in the parameters."""
         values, damped = self._values, self._values + damping * self._values[-1:]
         return float(np.sum(self._gradient**2 * (2.0 * damped - values) / damped**2))
 
@@ -88,14 +90,14 @@ class Iterates:
 
     @classmethod
     def begin(cls, problem: Problem, vector: Float) -> "Iterates":
-        """The iterates at the start of a fit."""
+        """Return the iterates at the start of a fit."""
         damping = problem.settings.damping
         errors = problem.training_error(vector), problem.validation_error(vector)
         return cls(vector, vector, damping, [errors[0]], [errors[1]], [damping], [0.0])
 
     @classmethod
     def resumed(cls, last: Float, best: Float, history: FitHistory) -> "Iterates":
-        """The state in which an earlier fit stopped."""
+        """Return the iterates at which an earlier fit stopped."""
         lists = (history.training_error, history.validation_error, history.damping, history.seconds)
         training, validation, dampings, seconds = (list(map(float, values)) for values in lists)
         began = time.perf_counter() - seconds[-1]
@@ -112,7 +114,7 @@ class Iterates:
         )
 
     def every(self, problem: Problem) -> int:
-        """The next Hessian takes one of this many samples; all of them once the training error has nearly stalled."""
+        """Return n such that the next Hessian uses one of n samples; 1 once the training error has nearly stalled."""
         errors, near = np.array(self.training), max(_NEAR, problem.settings.tolerance)
         far = np.all(np.diff(errors) < -near * errors[:-1])
         return problem.every if far else 1
@@ -169,10 +171,10 @@ def _reason(iterates: Iterates, settings: FitSettings) -> str | None:
 
 
 def _descend(problem: Problem, steps: Steps, iterates: Iterates) -> tuple[Float, float, float] | None:
-    """Parameters, training error and damping of a step that reduces the cost; None if no step does.
+    """Return parameters, training error and damping of a step that reduces the cost; None if no step does.
 
-    A simulation costs far less than sensitivities, so dampings are simply tried: downwards as long as that is better and
-    promises to be, and upwards where nothing was.
+    A simulation costs far less than sensitivities, so that several dampings are tried: smaller ones as long as the cost and
+    its prediction improve, and larger ones if the first did not reduce the cost.
     """
 
     def tried(damping: float) -> tuple[float, Float, float]:

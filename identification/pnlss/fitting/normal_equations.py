@@ -1,7 +1,8 @@
 """Normal equations of all parameters, summed block by block, so that memory does not grow with the number of samples.
 
-With J the derivatives of the weighted errors by the shared parameters and Q the rows q = (x, u, chi), the own parameters of
-output l have the Jacobian ``w_l Q``: so only ``J_l' Q`` and ``Q' Q`` are needed, never the columns themselves.
+J denotes the derivatives of the weighted errors with respect to the shared parameters, Q the rows q = (x, u, chi). The own
+parameters of output l have the Jacobian ``w_l Q``, so that only ``J_l' Q`` and ``Q' Q`` are needed, never the columns
+themselves.
 """
 
 from collections.abc import Iterator
@@ -23,22 +24,22 @@ __all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "kept_samples", "no
 Float = NDArray[np.float64]
 
 BLOCK = 256
-"""Samples of a block: few enough for its Jacobian to stay in the cache between the recursion and the products."""
+"""Samples per block: few enough for its Jacobian to stay in the cache between the recursion and the products."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """``H = J' J`` (float[n, n]) and ``g = J' r`` (float[n]) of weighted errors r."""
+    """Normal equations with ``H = J' J`` (float[n, n]) and ``g = J' r`` (float[n]) of weighted errors r."""
 
     hessian: Float
     gradient: Float
 
 
 def kept_samples(samples: int, every: int) -> NDArray[np.int64]:
-    """Indices of one sample of every ``every``, at positions that follow the golden ratio.
+    """Return indices of one sample in every ``every``, at positions that follow the golden ratio.
 
-    A fixed stride would see a vibration whose period is a few strides always at the same few phases, and miss part of its
+    A fixed stride would sample a vibration whose period is a few strides always at the same few phases, and miss part of its
     harmonics.
     """
     begins = np.arange(0, samples, every)
@@ -47,11 +48,11 @@ def kept_samples(samples: int, every: int) -> NDArray[np.int64]:
 
 
 class Blocks:
-    """Goes through an experiment block by block.
+    """Iterator over the blocks of an experiment.
 
-    Iterating gives the Jacobian float[n_outputs, n, n_columns], rows float[n, n_own] and weighted errors
-    float[n_errors, n_outputs] of counted samples: n is one of every ``every``, errors are those of all. Arrays are reused.
-    Afterwards the products of derivatives and errors are complete. Iteration ends early, with NaN, if the run is unbounded.
+    It yields the Jacobian float[n_outputs, n, n_columns] and rows float[n, n_own] at one counted sample in every ``every``,
+    and the weighted errors float[n_errors, n_outputs] of all counted samples. Arrays are reused. After the iteration the
+    products of derivatives and errors are complete. Iteration ends early, with NaN, if the run is unbounded.
     """
 
     def __init__(
@@ -67,16 +68,16 @@ class Blocks:
 
     @property
     def gradient(self) -> Float:
-        """float[n_columns], of the parameters that outputs share."""
+        """float[n_columns]: gradient with respect to the parameters that outputs share."""
         return self._room.gradient
 
     @property
     def own_gradient(self) -> Float:
-        """float[n_outputs, n_own]."""
+        """float[n_outputs, n_own]: gradient with respect to the own parameters of each output."""
         return self._room.own_gradient
 
     def __iter__(self) -> Iterator[tuple[Float, Float, Float]]:
-        """The blocks, once."""
+        """Yield the blocks; possible only once."""
         record, every, outputs = self._record, self._every, len(self._weights)
         edges = [*range(0, record.counted_from, BLOCK * every), *_edges(record, BLOCK * every), len(record.u)]
         columns, own = self.gradient.size, self.own_gradient.shape[1]
@@ -107,7 +108,7 @@ def _edges(record: Record, size: int) -> Iterator[int]:
 
 
 class _Sums:
-    """Products summed over the blocks of one experiment; symmetric ones in their upper half."""
+    """Products summed over the blocks of one experiment; only the upper half of symmetric ones."""
 
     def __init__(self, columns: int, own: int, outputs: int) -> None:
         self.shared = np.zeros((columns, columns), order="F")
@@ -117,7 +118,7 @@ class _Sums:
         self.own_gradient = np.zeros((outputs, own))
 
     def add(self, blocks: Blocks, every: int) -> None:
-        """All blocks in time, where rows are the same for all outputs."""
+        """Add all blocks in time, where rows are the same for all outputs."""
         for jacobian, rows, _ in blocks:
             dsyrk(every, jacobian.reshape(-1, jacobian.shape[2]).T, beta=1.0, c=self.shared, overwrite_c=1)
             for mine, into in zip(jacobian, self.mixed, strict=True):
@@ -126,7 +127,7 @@ class _Sums:
         self.gradient, self.own_gradient = blocks.gradient, blocks.own_gradient
 
     def add_lines(self, record: Record, lines: Float, blocks: Blocks, weights: Float) -> None:
-        """All frequency lines."""
+        """Add all frequency lines."""
         for output, (jacobian, rows, errors) in enumerate(transformed(record, lines, blocks)):
             self.shared += jacobian.T @ jacobian
             self.mixed[output] = jacobian.T @ rows
@@ -138,10 +139,11 @@ class _Sums:
 def normal_equations(
     parameters: Parameters, vector: Float, records: list[Record], weights: Float, every: int = 1
 ) -> NormalEquations:
-    """Sum over all experiments at ``vector``, errors weighted by output (float[n_outputs]) and by the weights of each record.
+    """Sum the normal equations over all experiments at ``vector``.
 
-    The gradient takes all samples; the Hessian takes one of every ``every``, except for errors by frequency line. The result
-    is not finite if a run is unbounded.
+    Errors are weighted by output (``weights``, float[n_outputs]) and by the weights of each record. The gradient uses all
+    samples; the Hessian uses one in every ``every``, except for errors by frequency line. The result is not finite if a run
+    is unbounded.
     """
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     hessian, gradient = np.zeros((parameters.count, parameters.count)), np.zeros(parameters.count)
@@ -179,12 +181,12 @@ def _scatter(
 
 
 def _whole(upper: Float) -> Float:
-    """A symmetric matrix from its upper half."""
+    """Return a symmetric matrix from its upper half."""
     return np.asarray(np.triu(upper) + np.triu(upper, 1).T)
 
 
 def jacobian(parameters: Parameters, vector: Float, record: Record, weights: Float) -> Float:
-    """float[n_outputs, counted, n_parameters] of one experiment in time, all columns: for small problems and checks."""
+    """float[n_outputs, counted, n_parameters]: full Jacobian of one experiment in time, for small problems and checks."""
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     begin = np.zeros(system.state.shape[0]) if record.place is None else begins[record.place]
     places = parameters.columns(record.place)

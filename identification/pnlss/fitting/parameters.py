@@ -1,4 +1,4 @@
-"""Parameters of a model as one vector and back, and the derivatives of its monomials for the kernels of the fit."""
+"""Convert a model to one parameter vector and back; derivatives of its monomials for the kernels of the fit."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,13 +20,13 @@ Float = NDArray[np.float64]
 class Parameters:
     """Layout of the vector: first the parameters that all outputs share, then those of each output.
 
-    Shared are [A B E] row by row, the weights in the state features row by row, those in the output features, and the
-    estimated initial states of experiments; own are [C D F] row by row.
+    The shared parameters are [A B E] row by row, the weights in the state features row by row, those in the output features,
+    and the estimated initial states of experiments. The own parameters of the outputs are [C D F] row by row.
 
     Parameters
     ----------
     start
-        A model of the same structure; everything that is no parameter is taken from it.
+        A model of the same structure, which supplies everything that is not a parameter.
     estimated
         Number of experiments with an estimated initial state.
     """
@@ -41,7 +41,7 @@ class Parameters:
 
     @cached_property
     def ends(self) -> list[int]:
-        """Where [A B E], the weights of state and output features, the initial states and [C D F] end."""
+        """End indices of [A B E], the weights of state and output features, the initial states, and [C D F] in the vector."""
         start, n, variables = self.start, self.start.states, self.start.state_features.variables
         sizes = [
             n * (variables + start.state_features.count),
@@ -77,7 +77,7 @@ class Parameters:
         return marks
 
     def columns(self, place: int | None) -> NDArray[np.int64]:
-        """Index of the shared parameter that each column of an experiment's Jacobian belongs to.
+        """Return the index of the shared parameter for each column of an experiment's Jacobian.
 
         ``place`` is the position of the experiment among those with an estimated initial state, None if it has none.
         """
@@ -87,12 +87,12 @@ class Parameters:
         return np.concatenate([linear, inner_state, begin, inner_output])
 
     def own(self, output: int) -> slice:
-        """Parameters of one output."""
+        """Return the slice of the parameters of one output."""
         width = (self.count - self.shared) // len(self.start.outputs)
         return slice(self.shared + output * width, self.shared + (output + 1) * width)
 
     def vector(self, model: PnlssModel, initial_states: Float) -> Float:
-        """float[count] from a model of this structure and initial states float[estimated, n_states]."""
+        """float[count]: parameters of a model of this structure and initial states float[estimated, n_states]."""
         parts = (
             np.hstack([model.a, model.b, model.e]),
             model.state_features.weights,
@@ -103,7 +103,7 @@ class Parameters:
         return np.concatenate([np.ravel(part) for part in parts])
 
     def system(self, vector: Float) -> System:
-        """The model with these parameters as the kernels take it."""
+        """Return the model with these parameters in the form that the kernels use."""
         linear, inner_state, inner_output, _, own = np.split(vector, self.ends[:-1])
         state, output = self.tables
         return System(
@@ -114,11 +114,11 @@ class Parameters:
         )
 
     def initial_states(self, vector: Float) -> Float:
-        """float[estimated, n_states]."""
+        """float[estimated, n_states]: estimated initial states."""
         return vector[self.ends[2] : self.ends[3]].reshape(-1, self.start.states)
 
     def model(self, vector: Float) -> PnlssModel:
-        """The model with these parameters."""
+        """Return the model with these parameters."""
         system, start = self.system(vector), self.start
         return replace(
             start,
@@ -129,7 +129,7 @@ class Parameters:
 
 
 def matrices_of(system: System) -> Matrices:
-    """A, B, E, C, D and F as separate matrices."""
+    """Return A, B, E, C, D and F as separate matrices."""
     n, variables = system.state.shape[0], system.state_table.limits.size
     parts = [
         m[:, begin:end]
@@ -140,9 +140,9 @@ def matrices_of(system: System) -> Matrices:
 
 
 def slopes_of(system: System) -> Slopes:
-    """``E d phi / d x`` and ``F d chi / d x`` of the monomials of a system, as combinations of as few products as possible.
+    """Return ``E d phi / d x`` and ``F d chi / d x`` of the monomials as combinations of as few products as possible.
 
-    The derivatives of a cubic model need a handful of products, however many monomials it has.
+    The derivatives of a cubic model need few products, however many monomials it has.
     """
     n, outputs = system.state.shape[0], system.output.shape[0]
     found: dict[tuple[int, ...], Float] = {}

@@ -1,4 +1,4 @@
-"""A fit in scaled variables: cost and normal equations at any parameters."""
+"""A fit in scaled variables: its cost and normal equations at given parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,28 +22,28 @@ Float = NDArray[np.float64]
 
 _EVERY = (1, 2, 4, 8)
 _VALUES = 100
-"""Values of outputs per parameter that a Hessian needs to make as much progress as with all samples."""
+"""Number of output values per parameter with which a Hessian makes as much progress as with all samples."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """RMS of the states of the start, and of inputs and outputs in the training data."""
+    """Units of the fit: RMS of the states of the start, and of inputs and outputs in the training data."""
 
     states: Float
     inputs: Float
     outputs: Float
 
     def model(self, model: PnlssModel) -> PnlssModel:
-        """A model in these units."""
+        """Return a model in these units."""
         return model.scaled(states=self.states, inputs=self.inputs, outputs=self.outputs)
 
     def physical(self, model: PnlssModel) -> PnlssModel:
-        """Inverse of `model`."""
+        """Invert `model`."""
         return model.scaled(states=1.0 / self.states, inputs=1.0 / self.inputs, outputs=1.0 / self.outputs)
 
 
 def scales_of(experiments: Sequence[Experiment], states: Float) -> Scales:
-    """Scales of the counted parts of experiments, with those of the states given."""
+    """Return the scales of inputs and outputs over the counted parts of experiments, with the given scales of the states."""
     inputs = np.concatenate([e.counted_inputs for e in experiments], axis=1)
     outputs = np.concatenate([e.counted_outputs for e in experiments], axis=1)
     return Scales(states, _rms(inputs), _rms(outputs))
@@ -87,7 +87,7 @@ class Problem:
 
     @property
     def every(self) -> int:
-        """Far from the minimum the Hessian of a step takes one of this many samples."""
+        """Far from the minimum, the Hessian uses one in this many samples."""
         if self.settings.every is not None:
             return self.settings.every
         values = sum(len(r.u) - r.counted_from for r in self.training) * self.weights.size
@@ -128,13 +128,13 @@ class Problem:
         return float(np.sqrt(total / self._validation_total))
 
     def cost(self, vector: Float, error: float) -> float:
-        """Squared relative error and ridge."""
+        """Return the squared relative error plus the ridge."""
         if not np.isfinite(error):
             return float(np.inf)
         return error**2 + float(self._ridge @ vector**2)
 
     def equations(self, vector: Float, every: int = 1) -> NormalEquations:
-        """Normal equations of half of `cost`; a small weight holds initial states that the outputs do not show near zero."""
+        """Return the normal equations of half of `cost`; a small weight keeps unobservable initial states near zero."""
         found = normal_equations(self.parameters, vector, self.training, self.weights, every)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
         return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)

@@ -17,12 +17,14 @@ __all__ = ["BOUND", "PRIOR", "SAMPLES", "Record", "fitted_initial_state", "recor
 Float = NDArray[np.float64]
 
 BOUND = 1e6
-"""A state is out of bounds beyond this multiple of its RMS in the start."""
+"""A state is unbounded beyond this multiple of its RMS in the start."""
 SAMPLES = 600
-"""Samples from which an initial state is estimated: a few decay times of lightly damped structures at usual rates."""
+"""Number of samples from which an initial state is estimated: a few decay times of lightly damped structures at usual rates."""
 PRIOR = 1e-6
-"""Weight of the squared initial state (states of unit RMS) beside the squared errors (outputs of unit RMS). It only matters
-for states that the outputs do not show."""
+"""Weight of the squared initial state (states of unit RMS) relative to the squared errors (outputs of unit RMS).
+
+It matters only for unobservable states.
+"""
 _ITERATIONS = 20
 
 
@@ -38,9 +40,9 @@ class Record:
     place: int | None
     """Position among the experiments with an estimated initial state; None for a run from rest."""
     name: str
-    """For messages."""
+    """Name for messages."""
     lines: Float | None = None
-    """float[n_outputs, n_lines], weights of the lines of a period; None where errors are those over time."""
+    """float[n_outputs, n_lines], weights of the lines of a period; None if errors are taken over time."""
 
     def squares(self, errors: Float) -> Float:
         """float[n_outputs], sums of squares of the counted errors float[n, n_outputs], weighted by ``lines`` if given."""
@@ -55,7 +57,7 @@ class Record:
 def records_of(
     experiments: Sequence[Experiment], inputs: Float, outputs: Float, kind: str = "experiments"
 ) -> list[Record]:
-    """Experiments over the given scales."""
+    """Convert experiments to records in the given scales."""
     found: list[Record] = []
     place = 0
     for index, experiment in enumerate(experiments):
@@ -76,7 +78,7 @@ def records_of(
 
 
 def simulated(system: System, u: Float, initial_state: Float) -> tuple[Float, Float] | None:
-    """States and outputs, float[n, ...]; None if they leave all bounds."""
+    """Return states and outputs, float[n, ...]; None if a run is unbounded."""
     m = matrices_of(system)
     x, y = np.empty((len(u), len(m.a))), np.empty((len(u), len(m.c)))
     bound = np.full(len(m.a), BOUND)
@@ -86,7 +88,7 @@ def simulated(system: System, u: Float, initial_state: Float) -> tuple[Float, Fl
 
 
 def fitted_initial_state(system: System, record: Record, weights: Float, samples: int = SAMPLES) -> Float:
-    """float[n_states] that fits the first ``samples`` counted outputs best: least squares by Levenberg-Marquardt from rest.
+    """Fit the initial state, float[n_states], to the first ``samples`` counted outputs by Levenberg-Marquardt from rest.
 
     The result is rest if the run from rest is unbounded.
     """

@@ -27,9 +27,9 @@ class FitHistory:
     training_error, validation_error
         float[n], relative RMS errors over all outputs; validation NaN without data, inf for an unbounded run.
     damping
-        float[n], of the step to each iterate; the first is that of the settings.
+        float[n], damping of the step to each iterate; the first is that of the settings.
     seconds
-        float[n], since the fit began.
+        float[n], time since the fit began.
     """
 
     training_error: Float
@@ -48,7 +48,7 @@ class FitHistory:
 
     @property
     def best(self) -> int:
-        """Iteration with the smallest validation error, or training error where there are no validation data."""
+        """Iteration with the smallest validation error, or the smallest training error if there is no validation data."""
         validated = not bool(np.all(np.isnan(self.validation_error)))
         errors = self.validation_error if validated else self.training_error
         return int(np.argmin(np.where(np.isnan(errors), np.inf, errors)))
@@ -61,25 +61,26 @@ class PnlssFit:
     Parameters
     ----------
     model
-        The best iterate: on validation data where given, else on training data.
+        The best iterate: on validation data if given, else on training data.
     last
-        The last iterate, from which a resumed fit goes on.
+        The last iterate, from which a resumed fit continues.
     linear
-        The linear model that it began with; None if it began with a nonlinear one.
+        The linear model with which the fit began; None if it began with a nonlinear one.
     history
         Errors over the iterations.
     chosen
-        Iteration that ``model`` is.
+        Number of the iteration that gave ``model``.
     initial_states, last_initial_states
-        float[n_estimated, n_states] of ``model`` and ``last``, of the experiments with an estimated one, in their order.
+        float[n_estimated, n_states], initial states of ``model`` and ``last`` in the experiments with an estimated initial
+        state, in their order.
     state_scale
-        float[n_states], RMS of the states in the start: the unit in which the fit saw them.
+        float[n_states], RMS of the states in the start: their unit in the fit.
     settings
-        As given.
+        Settings of the fit, as given.
     stopped
-        Why it ended, in one line.
+        Why the fit ended, in one line.
     interrupted
-        Whether it was stopped from outside: all that was reached is there, and ``resume`` goes on.
+        Whether the fit was interrupted. The result so far is complete, and ``resume`` continues from it.
     """
 
     model: PnlssModel
@@ -109,7 +110,7 @@ class PnlssFit:
         return float(self.history.validation_error[self.chosen])
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays by name, and the attributes (ready for JSON) that go with them."""
+        """Return arrays by name, and the JSON-able attributes that go with them."""
         arrays: dict[str, NDArray[Any]] = {f"history/{name}": value for name, value in vars(self.history).items()}
         arrays |= {name: getattr(self, name) for name in ("initial_states", "last_initial_states", "state_scale")}
         attributes: dict[str, Any] = {"chosen": self.chosen, "stopped": self.stopped, "interrupted": self.interrupted}
@@ -126,7 +127,7 @@ class PnlssFit:
 
     @classmethod
     def from_arrays(cls, arrays: Arrays, attributes: Mapping[str, Any]) -> "PnlssFit":
-        """Inverse of `to_arrays`; raises `IdentificationError` if something is missing or unknown."""
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing or unknown."""
         try:
             models: dict[str, Any] = {}
             for name in ("model", "last", "linear"):

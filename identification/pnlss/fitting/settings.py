@@ -1,4 +1,4 @@
-"""How a fit goes, and what it tells while it does."""
+"""Settings of a fit, and its progress reports."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,38 +18,38 @@ class FitSettings:
     Parameters
     ----------
     iterations
-        At most so many; those of a fit that is resumed are counted.
+        Largest number of iterations, including those of a fit that is resumed.
     patience
-        Stop after so many iterations without a smaller validation error; 0 for never.
+        Stop after this many iterations without a smaller validation error; 0 for never.
     tolerance
-        Stop once the training error has fallen by less than this share in five iterations on end.
+        Stop once the training error has fallen by less than this share in each of five successive iterations.
     outputs
-        ``rms``: squared errors of each output relative to its mean square over the training data, so that outputs in any
-        unit count alike. ``none``: in the units of the channels, as the toolbox of the paper does.
+        ``rms``: squared errors of each output are relative to its mean square over the training data, so that outputs in any
+        unit have equal weight. ``none``: errors are in the units of the channels, as in the toolbox of the paper.
     ridge
-        This many times the sum of squares of E and F is added to the squared relative error, in variables whose RMS in the
-        start is one. Off by default. It holds what the data do not tell of; larger states would make the same coefficients
-        smaller, so a large one moves the state coordinates too.
+        Factor of the sum of squares of E and F that is added to the squared relative error, in variables whose RMS in the
+        start is one. Off by default. It keeps coefficients small that the data do not determine. A large ridge also changes
+        the state coordinates, because larger states make the same coefficients smaller.
     band_hz
         Only frequencies from the first to the second count. Needs periodic experiments.
     line_weights
-        Rows of a frequency in Hz and the weight of errors there, one for all outputs or one for each; linear in between and 0
-        beyond. Needs periodic experiments.
+        Rows of a frequency in Hz and the weights of errors there, one for all outputs or one for each. Weights are linear in
+        between and 0 beyond. Needs periodic experiments.
     every
-        The Hessian of a step is from one of each ``every`` samples, neighbours of which tell nearly the same where records are
-        finely sampled. Its gradient is always from all, and once the training error falls slowly, or no step fits better, the
-        Hessian is too: a fit ends where one with 1 throughout does. None: 2, 4 or 8 where some hundred values of outputs
-        remain for each parameter, else 1.
+        The Hessian of a step uses one in every ``every`` samples, because neighbouring samples are nearly redundant in finely
+        sampled records. The gradient always uses all samples. Once the training error falls slowly, or no step reduces the
+        cost, the Hessian uses all samples too, so that the fit ends at the same minimum as with 1. None: 2, 4 or 8 if about a
+        hundred output values remain per parameter, else 1.
     damping
-        Of the first step, relative to the largest eigenvalue of the scaled normal equations.
+        Damping of the first step, relative to the largest eigenvalue of the scaled normal equations.
     truncation
-        Directions whose eigenvalue is below this share of the largest are left alone: among them the changes of state
-        coordinates, which change no output.
+        Parameters do not move in directions whose eigenvalue is below this share of the largest. Among these directions are
+        the changes of state coordinates, which change no output.
 
     Raises
     ------
     IdentificationError
-        On values out of range.
+        If a value is out of its range.
     """
 
     iterations: int = 100
@@ -100,18 +100,16 @@ class FitSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class FitProgress:
-    """Where a fit is.
+    """Progress of a fit.
 
-    Parameters
-    ----------
-    iteration, iterations
-        Of how many at most.
+    Parameters ---------- iteration, iterations
+        Number of this iteration, and the largest number of iterations.
     training_error, validation_error
         Relative RMS errors; NaN without validation data, inf for an unbounded run.
     damping
-        Of the step that led here.
+        Damping of the step to this iterate.
     seconds
-        Since the fit began.
+        Time since the fit began.
     stage
         ``start 3 of 8`` while starts are compared; empty in the fit itself.
     """

@@ -1,1 +1,1 @@
-"""Steady vibrations of nonlinear state-space models, by harmonic balance of the discrete map."""
+"""Steady vibrations of nonlinear state-space models, by harmonic balance of the discrete-time model."""

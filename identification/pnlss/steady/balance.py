@@ -1,10 +1,9 @@
 """Harmonic balance of a discrete map: ``R(W) X = T^+ f(T X, T U)`` with ``f(x, u) = A x + B u + E phi(x, u)``.
 
-A periodic vibration sampled at any rate, a whole number of samples per period or not, is ``x(k) = X(theta_k)`` with
-``theta_k = k W T_s``; one sample later the phase has turned by ``W T_s``, and R turns harmonic h by h times that.
-Alternating frequency and time (Cameron and Griffin, J. Appl. Mech. 56, 1989): T takes Fourier coefficients to samples of the
-phase, T^+ back.
-The Jacobian is ``R (x) I - T^+ diag(df/dx) T``.
+A periodic vibration, sampled at any rate (also with a fractional number of samples per period), is ``x(k) = X(theta_k)`` with
+``theta_k = k W T_s``. From one sample to the next the phase advances by ``W T_s``, and R rotates harmonic h by h times that.
+Alternating frequency and time (Cameron and Griffin, J. Appl. Mech. 56, 1989): T transforms Fourier coefficients to samples
+over the phase, T^+ transforms them back. The Jacobian is ``R (x) I - T^+ diag(df/dx) T``.
 """
 
 from typing import NamedTuple
@@ -25,26 +24,26 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _ENOUGH_FOR_BENDS = 16
-"""Samples per harmonic for features that are no polynomials; aliasing is then of the order of the neglected harmonics."""
+"""Samples per harmonic for features that are not polynomials; aliasing is then of the order of the neglected harmonics."""
 
 
 class Period(NamedTuple):
-    """A model along a period: inputs' and outputs' coefficients, and derivatives in coefficients."""
+    """A model along a period: coefficients of inputs, outputs and next states, and their derivatives."""
 
     inputs: Float
-    """float[size, n_inputs]."""
+    """float[size, n_inputs], coefficients of the inputs."""
     outputs: Float
-    """float[size, n_outputs]."""
+    """float[size, n_outputs], coefficients of the outputs."""
     next_states: Float
-    """float[size, n_states], of ``f``."""
+    """float[size, n_states], coefficients of ``f``."""
     states_by: Float
-    """float[size, n_states, size, n_variables], derivative of ``f``'s coefficients by those of (x, u)."""
+    """float[size, n_states, size, n_variables], derivative of the coefficients of ``f`` with respect to those of (x, u)."""
     outputs_by: Float
-    """float[size, n_outputs, size, n_variables]."""
+    """float[size, n_outputs, size, n_variables], derivative of the outputs' coefficients with respect to those of (x, u)."""
 
 
 def samples_for(model: PnlssModel, harmonics: int) -> int:
-    """Samples of a period without aliasing into the harmonics kept: more than ``(degree + 1) H`` for polynomials."""
+    """Number of samples per period without aliasing into the retained harmonics: above ``(degree + 1) H`` for polynomials."""
     both = (model.state_features, model.output_features)
     degree = max(int(features.exponents.sum(axis=1).max(initial=1)) for features in both)
     least = (degree + 1) * harmonics + 1
@@ -58,7 +57,7 @@ def _bends(features: Features) -> bool:
 
 
 class Balance:
-    """Equations of a driven model; unknowns are the states' coefficients float[size, n_states] in a row, then the drive's.
+    """Equations of a driven model; unknowns are the coefficients of the states, float[size, n_states], then the drive's.
 
     ``held`` (float[n_inputs]) are constant parts of the inputs, independent of the level.
     """
@@ -85,15 +84,15 @@ class Balance:
         return self.basis.size * self.model.states
 
     def states(self, z: Float) -> Float:
-        """float[size, n_states], coefficients of the states."""
+        """float[size, n_states]: coefficients of the states."""
         return np.asarray(z[: self.state_unknowns].reshape(self.basis.size, -1))
 
     def own(self, z: Float) -> Float:
-        """The drive's unknowns."""
+        """Return the unknowns of the drive."""
         return np.asarray(z[self.state_unknowns :])
 
     def period(self, z: Float, level: float = 1.0) -> Period:
-        """The model along the period that the unknowns describe."""
+        """Evaluate the model along the period that the unknowns describe."""
         size = self.basis.size
         inputs = self._held + level * self._given + self._by_own @ self.own(z)
         v = self.basis.to_time @ np.concatenate([self.states(z), inputs], axis=1)
@@ -108,11 +107,11 @@ class Balance:
         return Period(inputs, back @ y, back @ x, derivative(x_slope), derivative(y_slope))
 
     def angle(self, frequency_hz: float) -> float:
-        """Turn of the phase in one sample, rad."""
+        """Phase advance per sample, rad."""
         return 2.0 * np.pi * frequency_hz / self.model.sample_rate_hz
 
     def evaluated(self, z: Float, frequency_hz: float, level: float = 1.0) -> tuple[Float, Float, Float, Float]:
-        """Residual, and its derivatives by the unknowns, by frequency (per Hz) and by level."""
+        """Return the residual and its derivatives with respect to the unknowns, frequency (per Hz) and level."""
         n, size, count = self.model.states, self.basis.size, self.state_unknowns
         at = self.period(z, level)
         turn, turned = self.basis.turned(self.angle(frequency_hz))
@@ -138,11 +137,11 @@ class Balance:
         return residual, jacobian, by_frequency, by_level
 
     def over_frequency(self) -> System:
-        """The equations with the frequency (Hz) as parameter."""
+        """Return the equations with the frequency (Hz) as parameter."""
         return lambda z, frequency_hz: self.evaluated(z, frequency_hz)[:3]
 
     def over_level(self, frequency_hz: float) -> System:
-        """The equations at one frequency with the level as parameter."""
+        """Return the equations at one frequency with the level as parameter."""
 
         def system(z: Float, level: float) -> tuple[Float, Float, Float]:
             residual, by_z, _, by_level = self.evaluated(z, frequency_hz, level)
@@ -151,7 +150,7 @@ class Balance:
         return system
 
     def linear(self, frequency_hz: float, level: float = 1.0) -> Float:
-        """Unknowns of the linear part at a level."""
+        """Return the unknowns of the linear part at a level."""
         model, z = self.model, np.zeros(self.state_unknowns)
         point = np.array([np.exp(1j * self.angle(frequency_hz))])
         row = self._driven_row()

@@ -1,7 +1,8 @@
-"""Periodic excitations of a model: a sine, a voltage that holds a force among the outputs, an exciter that makes the force.
+"""Periodic excitations of a model: a sine, a voltage that holds a force among the outputs, or an exciter.
 
-Each gives the inputs' Fourier coefficients as linear functions of its own unknowns and of the level (1 is the level asked
-for), and the equations of these unknowns. The coefficients are real, ordered as in `identification.pnlss.steady.basis`.
+Each drive provides the Fourier coefficients of the inputs as linear functions of its own unknowns and of the level (1 is the
+requested level), and the equations of these unknowns. The coefficients are real, ordered as in
+`identification.pnlss.steady.basis`.
 """
 
 from dataclasses import dataclass
@@ -19,11 +20,11 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _NUDGE = 1e-5
-"""Relative step of the numerical derivatives of the exciter by frequency, which are accurate to ten digits."""
+"""Relative step of the exciter's numerical derivatives with respect to frequency, which are accurate to ten digits."""
 
 
 class Equations(NamedTuple):
-    """Equations of a drive's own unknowns e: residual, and derivatives by e, outputs, frequency (Hz) and level."""
+    """Equations of a drive's own unknowns e: residual, and derivatives with respect to e, outputs, frequency (Hz) and level."""
 
     residual: Float
     by_own: Float
@@ -38,24 +39,27 @@ class Drive(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of unknowns of its own."""
+        """Number of the drive's own unknowns."""
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
-        """Inputs' coefficients per unit of level, float[n_coefficients, m], and by e, float[n_coefficients, m, size]."""
+        """Return the inputs' coefficients per unit of level and per unit of each unknown.
+
+        Their shapes are float[n_coefficients, m] and float[n_coefficients, m, size].
+        """
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """The equations at unknowns ``own`` and outputs' coefficients float[n_coefficients, n_outputs]."""
+        """Evaluate the equations at unknowns ``own`` and output coefficients float[n_coefficients, n_outputs]."""
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """Unknowns at level 1 for a linear model with ``response`` complex[n_outputs] to a unit of the driven input."""
+        """Return the unknowns at level 1 for a linear model; ``response`` complex[n_outputs] is per unit of driven input."""
 
     def voltage(self, own: Float) -> complex:
-        """Amplitude of the voltage; NaN where there is none."""
+        """Amplitude of the voltage; NaN if there is none."""
 
 
 @dataclass(frozen=True)
 class Sine:
-    """A sine of fixed amplitude at one input: force, or constant voltage."""
+    """A sine of fixed amplitude at one input: a force or a constant voltage."""
 
     amplitude: float
     row: int
@@ -68,27 +72,27 @@ class Sine:
         return 0
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
-        """The sine."""
+        """Return the coefficients of the sine."""
         given = np.zeros((coefficients, self.n_inputs))
         given[1, self.row] = self.amplitude
         return given, np.zeros((coefficients, self.n_inputs, 0))
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """A sine has no equations: all parts are empty."""
+        """Return empty equations: a sine has no unknowns."""
         return Equations(np.zeros(0), np.zeros((0, 0)), np.zeros((0, *outputs.shape)), np.zeros(0), np.zeros(0))
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """Empty: a sine has no unknowns."""
+        """Return an empty array: a sine has no unknowns."""
         return np.zeros(0)
 
     def voltage(self, own: Float) -> complex:
-        """The amplitude, if it is a voltage."""
+        """The amplitude, if the sine is a voltage; else NaN."""
         return complex(self.amplitude) if self.is_voltage else complex(np.nan)
 
 
 @dataclass(frozen=True)
 class HeldOutput:
-    """A sine of voltage whose amplitude, the one unknown, holds the force at one output: its fundamental or its RMS."""
+    """A voltage sine whose amplitude, the only unknown, holds the fundamental or the RMS of the force at one output."""
 
     force_n: float
     held: Literal["fundamental", "rms"]
@@ -102,20 +106,20 @@ class HeldOutput:
         return 1
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
-        """The sine by its amplitude."""
+        """Return the coefficients of the sine per unit of its amplitude."""
         slope = np.zeros((coefficients, self.n_inputs, 1))
         slope[1, self.row, 0] = 1.0
         return np.zeros((coefficients, self.n_inputs)), slope
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """``|F_1|^2 = (level F)^2``, or the mean square."""
+        """Evaluate ``|F_1|^2 = (level F)^2``, or the same for the mean square."""
         residual, slope = level_reached(outputs[:, self.output], self.held, self.force_n, level)
         by_outputs = np.zeros((1, *outputs.shape))
         by_outputs[0, :, self.output] = slope
         return Equations(np.array([residual]), np.zeros((1, 1)), by_outputs, np.zeros(1), np.array([-2.0 * level]))
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """Force over force per volt."""
+        """Return the held force divided by the force per volt."""
         return np.array([peak_of_level(self.force_n, self.held) / np.abs(response[self.output])])
 
     def voltage(self, own: Float) -> complex:
@@ -124,12 +128,12 @@ class HeldOutput:
 
 
 def peak_of_level(force_n: float, held: str) -> float:
-    """Peak of a sine that has the level."""
+    """Peak of a sine that has the held level."""
     return force_n * (np.sqrt(2.0) if held == "rms" else 1.0)
 
 
 def level_reached(force: Float, held: str, force_n: float, level: float) -> tuple[float, Float]:
-    """``|F_1|^2`` or the mean square of a force over the value asked for, minus level^2; its derivative by the coefficients."""
+    """Return ``|F_1|^2`` or the mean square of a force over the held value, minus level^2, and its gradient."""
     weight = np.zeros(force.size)
     if held == "rms":
         weight[1:] = 0.5 / force_n**2
@@ -140,10 +144,10 @@ def level_reached(force: Float, held: str, force_n: float, level: float) -> tupl
 
 @dataclass(frozen=True)
 class Coupled:
-    """An exciter whose sine of voltage makes the force at one input, with the reaction of the drive point's motion.
+    """An exciter that drives the force input from a voltage sine, with the reaction of the drive-point motion.
 
     Unknowns are the coefficients of the force without its static part, then those of the voltage. The phase reference is the
-    fundamental of the force, or the voltage if that is held.
+    fundamental of the force, or the voltage if the voltage is held.
     """
 
     exciter: Exciter
@@ -151,31 +155,31 @@ class Coupled:
     held: Literal["fundamental", "rms", "voltage"]
     output: int
     order: int
-    """Order of the time derivative of the drive point's displacement in that output."""
+    """Number of times the drive-point displacement is differentiated in that output."""
     row: int
     n_inputs: int
     coefficients: int
 
     @property
     def size(self) -> int:
-        """Harmonics of the force and the voltage."""
+        """Number of coefficients of the force without its static part, plus two of the voltage."""
         return self.coefficients + 1
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
-        """The force's coefficients."""
+        """Return the coefficients of the inputs per unit of each unknown."""
         slope = np.zeros((coefficients, self.n_inputs, self.size))
         slope[1:, self.row, : coefficients - 1] = np.eye(coefficients - 1)
         return np.zeros((coefficients, self.n_inputs)), slope
 
     def _factors(self, frequency_hz: Float) -> tuple[Complex, Complex]:
-        """complex[k], force per volt, and complex[k, H], force per drive output at each harmonic, at float[k]."""
+        """complex[k], force per volt, and complex[k, H], force per unit of drive output at each harmonic, at float[k] Hz."""
         h = np.arange(1, self.coefficients // 2 + 1)
         at_hz = frequency_hz[:, None] * h
         per_motion = self.exciter.force(0.0, 1.0, at_hz) * (2j * np.pi * at_hz) ** (2 - self.order)
         return self.exciter.force(1.0, 0.0, frequency_hz), np.asarray(per_motion)
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """``F_h = g V delta_h1 + r_h Y_h`` for each harmonic, then the held level and the phase reference."""
+        """Evaluate ``F_h = g V delta_h1 + r_h Y_h`` for each harmonic, then the held level and the phase reference."""
         count = self.coefficients - 1
         by_own, by_outputs = np.zeros((self.size, self.size)), np.zeros((self.size, *outputs.shape))
         by_frequency, by_level = np.zeros(self.size), np.zeros(self.size)
@@ -205,7 +209,7 @@ class Coupled:
         return Equations(residual, by_own, by_outputs, by_frequency, by_level)
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """A force without harmonics, and the voltage that it needs."""
+        """Return a force without harmonics and the voltage that it needs."""
         per_volt, per_motion = self._factors(np.array([frequency_hz]))
         of_force = complex((1.0 - per_motion[0, 0] * response[self.output]) / per_volt[0])
         if self.held == "voltage":
@@ -218,5 +222,5 @@ class Coupled:
         return own
 
     def voltage(self, own: Float) -> complex:
-        """The voltage, from the last two unknowns."""
+        """The voltage amplitude, from the last two unknowns."""
         return complex(own[-2], -own[-1])

@@ -31,8 +31,9 @@ def along_period(
 ) -> None:
     """Evaluate the model at ``v`` (float[n, n_variables]): next states ``x`` (float[n, n_states]), outputs ``y``, derivatives.
 
-    ``x_slope`` (float[n, n_states, n_variables]) and ``y_slope`` (float[n, n_outputs, n_variables]) are those with respect to
-    v. ``features``, ``slope`` (float[n_features, n_variables]) and ``steep`` are room for the longer of both tables.
+    ``x_slope`` (float[n, n_states, n_variables]) and ``y_slope`` (float[n, n_outputs, n_variables]) are derivatives with
+    respect to v. ``features``, ``slope`` (float[n_features, n_variables]) and ``steep`` are work arrays, sized for the longer
+    table.
     """
     states, variables = m.a.shape[0], v.shape[1]
     phi, chi = m.e.shape[1], m.f.shape[1]

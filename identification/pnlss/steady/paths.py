@@ -21,11 +21,11 @@ _FIRST_LEVEL = 0.02
 _LEVELS = Steps(first=0.1, largest=0.5)
 _MOST_LEVELS = 300
 _BAND_UNITS = 4.0
-"""Length of a band: with the longest step of 0.05 a band takes 80 points, and a resonance in it many more."""
+"""Length of a band in units of the path: with the longest step of 0.05 a band takes 80 points, with a resonance many more."""
 
 
 class Followed(NamedTuple):
-    """A path and a note on its end; the note is empty if it reached the far end of the band."""
+    """A path and a note on its end; the note is empty if the path reached the far end of the band."""
 
     path: Path
     note: str
@@ -43,7 +43,7 @@ def sizes(balance: Balance, frequency_hz: float) -> Float:
 
 
 def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf) -> Float | None:
-    """Unknowns of the vibration that is reached from rest as the level rises; None if the path does not reach the level."""
+    """Return the unknowns of the vibration reached from rest as the level rises; None if the path does not reach the level."""
     linear, scale = balance.linear(frequency_hz, _FIRST_LEVEL), sizes(balance, frequency_hz)
     try:
         path = continued(
@@ -64,7 +64,7 @@ def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf
 
 
 def statically_stable(balance: Balance, z: Float, frequency_hz: float) -> bool:
-    """Whether a slow change can hold a solution: the determinant of its Jacobian has the sign that it has at rest."""
+    """Return whether a vibration is stable under slow changes: the determinant of its Jacobian has the same sign as at rest."""
     rest = balance.linear(frequency_hz, _FIRST_LEVEL**2)
     signs = [
         np.linalg.slogdet(balance.evaluated(at, frequency_hz, level)[1])[0]
@@ -76,7 +76,7 @@ def statically_stable(balance: Balance, z: Float, frequency_hz: float) -> bool:
 def followed(
     balance: Balance, begin_hz: float, end_hz: float, *, points: int, step: float, largest_use: float
 ) -> Followed | None:
-    """The path from the vibration reached from rest at one end of a band to the other end; None if it has no start."""
+    """Follow the response from rest at one end of a band to the other end; return None if no start is found."""
     start = from_rest(balance, begin_hz, largest_use)
     if start is None:
         return None
@@ -98,12 +98,12 @@ def followed(
 
 
 def polished(balance: Balance, z: Float, frequency_hz: float) -> Float | None:
-    """The solution near ``z`` at a frequency; None if there is none."""
+    """Return the solution near ``z`` at a frequency; None if there is none."""
     return solved(balance.over_frequency(), z, frequency_hz, scale=sizes(balance, frequency_hz))
 
 
 def _beyond(balance: Balance, z: Float, largest_use: float) -> str:
-    """Message on states far outside of the training data; empty if there are none."""
+    """Return a message if states are far outside the range of the training data; else an empty text."""
     use = use_of(np.max(np.abs(balance.basis.to_time @ balance.states(z)), axis=0), balance.model.state_range)
     if not np.any(use > largest_use):
         return ""

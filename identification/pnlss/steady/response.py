@@ -37,7 +37,7 @@ def pnlss_frequency_response(
     points: int = 1000,
     largest_range_use: float = 3.0,
 ) -> SteadyPrediction:
-    """Steady response of a model to a constant force, through its folds; `pnlss_response` with the fundamentals alone."""
+    """Compute the steady response of a model to a constant force, through its folds: the fundamentals of `pnlss_response`."""
     return pnlss_response(
         model,
         force_n,
@@ -67,38 +67,38 @@ def pnlss_response(
     points: int = 1000,
     largest_range_use: float = 3.0,
 ) -> PnlssResponse:
-    """Steady response of a model to a constant force, by harmonic balance and arc-length continuation.
+    """Compute the steady response of a model to a constant force, by harmonic balance and arc-length continuation.
 
     Parameters
     ----------
     model
-        Driven by one force, or by one voltage with the force among its outputs; one output at least is a motion.
+        Model driven by one force, or by one voltage with the force among its outputs; at least one output is a motion.
     force_n
-        Force held, N: the peak of its fundamental, or its RMS where ``force`` is ``rms``; the voltage's amplitude, V, where it
-        is ``voltage``.
+        Held force, N: the peak of its fundamental, or its RMS if ``force`` is ``rms``. The amplitude of the voltage, V, if
+        ``force`` is ``voltage``.
     force
-        What "constant" means. ``pure-sine``: a force without harmonics, for a model driven by a force; its only choice
-        without ``exciter``. ``fundamental`` or ``rms`` of a force with the harmonics that the exciter gives it, no static
-        one. ``voltage``: a sine of constant voltage at the exciter.
+        Quantity that is constant. ``pure-sine``: a force without harmonics, for a model driven by a force; the only choice
+        for such a model without ``exciter``. ``fundamental`` or ``rms``: that of a force with the harmonics that the exciter
+        causes, without a static part. ``voltage``: a sine of constant voltage at the exciter.
     exciter
-        For models driven by a force: the exciter that makes it, and is moved by the model's drive point.
+        For models driven by a force: the exciter that applies the force and moves with the model's drive point.
     held_inputs
-        Constant value of every input beside the driven one, by name: ``{"constant": 1.0}`` after
+        Constant value of every input other than the driven one, by name: ``{"constant": 1.0}`` after
         `Experiment.with_constant_input`.
     lowest_hz, highest_hz
-        Band; by default 15 % about the resonance of the model's linear part that moves the drive point most.
+        Band; by default within 15 % of the resonance of the model's linear part with the largest drive-point motion.
     harmonics, samples
-        Harmonics beside the static one, fewer (with a note) where the sample rate has not room for them; samples of a
-        period, by default enough that polynomials fold nothing into the harmonics kept.
+        Number of harmonics without the static one, reduced (with a note) if they exceed half the sample rate. Number of
+        samples per period; by default enough that polynomials do not alias into the retained harmonics.
     points
-        Most points on a branch.
+        Largest number of points on a branch.
     largest_range_use
-        Use of the states' trained range beyond which a path is not followed; a note says so.
+        Largest state relative to the trained range; a path that exceeds it ends there, with a note.
 
     Raises
     ------
     IdentificationError
-        On a model, exciter and force that do not go together, a band that is none, too few samples; and if no periodic
+        If model, exciter and force do not match, the band limits do not rise, there are too few samples, or no periodic
         vibration is found at either end of the band.
     """
     low, high = band_of(model, lowest_hz, highest_hz)
@@ -149,10 +149,10 @@ def pnlss_steady_state(
     near: SteadyStates | None = None,
     largest_range_use: float = 3.0,
 ) -> SteadyStates:
-    """The periodic vibration at one force and frequency: reached from rest as the force rises, or ``near`` another one.
+    """Compute the periodic vibration at one force and frequency: reached from rest as the force rises, or ``near`` another.
 
-    Parameters are those of `pnlss_response`; of ``near`` the first point is the start of Newton's method, which may leave the
-    range. Raises `IdentificationError` if it finds none.
+    Parameters are those of `pnlss_response`. Newton's method starts from the first point of ``near`` and may leave the
+    trained range. Raises `IdentificationError` if no vibration is found.
     """
     at_hz = positive("frequency_hz", frequency_hz, "Hz")
     held, _ = harmonics_that_fit(model, harmonics, at_hz)
@@ -173,7 +173,7 @@ def _along(balance: Balance, found: Followed) -> SteadyStates:
 
 
 def _at_the_edge(points: SteadyStates, low: float, high: float) -> list[str]:
-    """Whether the band misses the resonance."""
+    """Return a note if the largest amplitude is at an end of the band."""
     at_hz = points.frequency_hz[int(np.argmax(np.abs(points.displacement_m[:, 1, 0])))]
     return ["the largest amplitude is at an end of the band: widen it"] if at_hz in (low, high) else []
 
@@ -191,7 +191,7 @@ def notes_of(
     exciter: Exciter | None,
     held_inputs: Mapping[str, float] | None = None,
 ) -> tuple[str, ...]:
-    """Notes for the user: held quantity, harmonics at the peak, use of the trained range, losses of stability except folds."""
+    """Return notes on the held quantity, harmonics at the peak, use of the trained range, and losses of stability but folds."""
     constant = [f"input '{name}' is held at {value:g}" for name, value in (held_inputs or {}).items()]
     return (*_held(model, force, exciter), *constant, *_harmonics(points), *_range(points), *_losses(points))
 
@@ -209,7 +209,7 @@ def _held(model: PnlssModel, force: str, exciter: Exciter | None) -> list[str]:
 
 
 def _harmonics(points: SteadyStates) -> list[str]:
-    """Harmonics of force and motion at the largest amplitude."""
+    """Return notes on the harmonics of force and motion at the largest amplitude."""
     peak = int(np.argmax(np.abs(points.displacement_m[:, 1, 0])))
     row = motion_rows(points.output_channels)[0]
     order = MOTION_ORDER[points.output_channels[row].motion]

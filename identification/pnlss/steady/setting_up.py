@@ -1,4 +1,4 @@
-"""Equations of the harmonic balance that a user asks for: drive, held inputs, band, harmonics; linear resonance."""
+"""Set up the equations of a harmonic balance: drive, held inputs, band, harmonics; find the linear resonance."""
 
 from collections.abc import Mapping
 from typing import Literal, get_args
@@ -31,15 +31,15 @@ Float = NDArray[np.float64]
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 
 _LIGHT = 0.3
-"""Damping ratio up to which a pole makes a resonance."""
+"""Largest damping ratio at which a pole counts as a resonance."""
 _BAND = (0.85, 1.15)
 
 
 def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> tuple[int, NDArray[np.float64]]:
-    """Row of the driven input, and the constant values of all other inputs, float[n_inputs].
+    """Return the row of the driven input, and the constant values of all other inputs, float[n_inputs].
 
-    Driven is the one force, or the one input that is not held. Raises `IdentificationError` where there is none such, or an
-    input beside it has no value.
+    The driven input is the only force, or the only input that is not held. Raises `IdentificationError` if there is no such
+    input, or if another input has no value.
     """
     given = dict(held_inputs or {})
     names = [channel.name for channel in model.inputs]
@@ -72,7 +72,7 @@ def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> t
 def drive_of(
     model: PnlssModel, level: float, held: Held, exciter: Exciter | None, coefficients: int, row: int
 ) -> Drive:
-    """The drive at input ``row``; raises `IdentificationError` if model, exciter and held quantity do not match."""
+    """Return the drive at input ``row``; raise `IdentificationError` if model, exciter and held quantity do not match."""
     if held not in get_args(Held):
         raise IdentificationError(f"force: is '{held}', allowed are {', '.join(get_args(Held))}")
     amplitude = positive("force_n", level, "V" if held == "voltage" else "N")
@@ -108,10 +108,10 @@ def _voltage_driven(model: PnlssModel, amplitude: float, held: Held, exciter: Ex
 
 
 def linear_resonance_hz(model: PnlssModel) -> float:
-    """Natural frequency of the linear part's lightly damped mode with the largest displacement of the drive point.
+    """Natural frequency of the lightly damped mode of the linear part with the largest drive-point displacement.
 
-    Of those in the band that its training data was excited in, where that is known and holds one: others are guesses. Raises
-    `IdentificationError` if it has none.
+    If the excited band of the training data is known and contains such modes, only these are considered, because modes
+    outside the band are uncertain. Raises `IdentificationError` if there is no lightly damped mode.
     """
     poles = np.linalg.eigvals(model.a)
     s = np.log(poles[(poles.imag > 0.0) & (np.abs(poles) > 0.0)]) * model.sample_rate_hz
@@ -140,7 +140,7 @@ def balance_of(
     harmonics: int,
     samples: int | None,
 ) -> Balance:
-    """The equations; raises `IdentificationError` on too few samples and as `held_values` and `drive_of` do."""
+    """Return the equations; raise `IdentificationError` for too few samples and as `held_values` and `drive_of` do."""
     least = 2 * harmonics + 1
     count = samples_for(model, harmonics) if samples is None else samples
     if count < least:
@@ -151,7 +151,7 @@ def balance_of(
 
 
 def band_of(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None) -> tuple[float, float]:
-    """The band in Hz, by default around the linear resonance; raises `IdentificationError` if the limits do not rise."""
+    """Return the band in Hz, by default around the linear resonance; raise `IdentificationError` if the limits do not rise."""
     if lowest_hz is None or highest_hz is None:
         resonance = linear_resonance_hz(model)
         lowest_hz = _BAND[0] * resonance if lowest_hz is None else lowest_hz
@@ -165,7 +165,7 @@ def band_of(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None
 
 
 def harmonics_that_fit(model: PnlssModel, harmonics: int, highest_hz: float) -> tuple[int, list[str]]:
-    """Harmonics below half the sample rate, with a note if these are fewer than asked for."""
+    """Return the number of harmonics below half the sample rate, with a note if it is lower than requested."""
     if harmonics < 1:
         raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
     room = int(np.ceil(0.5 * model.sample_rate_hz / highest_hz)) - 1
@@ -181,7 +181,7 @@ def harmonics_that_fit(model: PnlssModel, harmonics: int, highest_hz: float) -> 
 
 
 def unknowns_near(balance: Balance, near: SteadyStates) -> Float:
-    """Unknowns from the first point of other steady states; harmonics that these lack are zero."""
+    """Return unknowns from the first point of other steady states; harmonics that these lack are zero."""
     size = balance.basis.size
 
     def fitted(harmonics: NDArray[np.complex128]) -> Float:

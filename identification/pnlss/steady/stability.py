@@ -1,13 +1,14 @@
 """Stability of a periodic vibration of a discrete map, by Hill's matrix.
 
-A disturbance ``p(theta_k) mu^k`` of a vibration obeys ``mu R p = T^+ f' T p``: its multipliers over one sample are eigenvalues
-of ``R^-1 T^+ f' T``, each of them many times over, turned by whole multiples of ``W T_s``. Those whose eigenvectors lie
-about the static harmonic suffer least from truncation; as many as there are states are kept, those of the lowest centroid,
-no two of them copies (a real negative multiplier over one period has two copies that lie equally low;
-Lazarus and Thomas, C. R. Mecanique 338, 2010; Bayer and Leine, Nonlinear Dyn. 111, 2023, on sorting).
+A disturbance ``p(theta_k) mu^k`` of a vibration obeys ``mu R p = T^+ f' T p``. Its multipliers over one sample are
+eigenvalues of ``R^-1 T^+ f' T``. Each multiplier occurs many times, in copies rotated by whole multiples of ``W T_s``. The
+eigenvectors centred on the static harmonic suffer least from truncation. As many eigenvalues as there are states are
+therefore kept, those with the lowest centroid, without copies. (A real negative multiplier over one period has two copies
+with equally low centroids; Lazarus and Thomas, C. R. Mecanique 338, 2010; Bayer and Leine, Nonlinear Dyn. 111, 2023, on
+sorting.)
 
-The product of Jacobians over a period, a smaller matrix, is no substitute: a period holds no whole number of samples, and the
-map says nothing between them. Where it does hold one, both are the same to rounding.
+The product of Jacobians over a period, a smaller matrix, cannot replace this: a period is in general not a whole number of
+samples, and the map is not defined between samples. If it is a whole number, both methods agree to rounding.
 """
 
 from typing import Literal
@@ -38,11 +39,11 @@ def multipliers(states_by: Float, turn: Float, basis: Basis, angle_rad: float) -
     states_by
         float[size, n_states, size, n_states], ``T^+ f' T``.
     turn
-        float[size, size], R.
+        float[size, size], rotation matrix R of one sample.
     basis
-        The series.
+        The Fourier series.
     angle_rad
-        Turn of the phase in one sample.
+        Phase advance per sample, rad.
     """
     size, n = states_by.shape[:2]
     matrix = np.tensordot(turn.T, states_by, axes=1).reshape(size * n, size * n)  # R is orthogonal
@@ -59,7 +60,7 @@ def multipliers(states_by: Float, turn: Float, basis: Basis, angle_rad: float) -
 
 
 def _distinct(values: Complex, count: int, samples: float) -> Complex:
-    """The first ``count`` values of which none is a copy of one before; where there are too few, the first copies too."""
+    """Return the first ``count`` values that are no copies of earlier ones; if there are too few, the first copies too."""
     with np.errstate(under="ignore"):
         over_period = values**samples
     kept: list[int] = []
@@ -71,17 +72,17 @@ def _distinct(values: Complex, count: int, samples: float) -> Complex:
 
 
 def loss_of_stability(values: Complex, angle_rad: float, *, real: bool = True) -> Loss:
-    """What the largest multiplier stands for if it is unstable.
+    """Classify the loss of stability by the largest multiplier; return an empty text if it is stable.
 
-    Through a real positive multiplier over one period the vibration jumps (fold), through a real negative one the period
-    doubles, through a complex pair the amplitude is modulated (Neimark-Sacker).
+    With a real positive multiplier over one period the vibration jumps (fold), with a real negative one the period doubles,
+    with a complex pair the amplitude is modulated (Neimark-Sacker).
 
     Parameters
     ----------
     values
         complex[k], multipliers over one sample.
     angle_rad
-        Turn of the phase in one sample.
+        Phase advance per sample, rad.
     real
         Whether real positive multipliers count.
     """

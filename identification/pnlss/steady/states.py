@@ -1,4 +1,4 @@
-"""Periodic vibrations of a nonlinear state-space model with all harmonics, and a frequency response made of them."""
+"""Periodic vibrations of a nonlinear state-space model with all harmonics, and frequency responses composed of them."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -31,7 +31,7 @@ _ARRAYS = (
     "input_use",
 )
 _FINE = 16
-"""Samples per harmonic by which the largest magnitude of a state is found, to 0.5 % of the highest harmonic."""
+"""Samples per harmonic for the largest magnitude of a state, which is found to 0.5 % of the highest harmonic."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,18 +41,19 @@ class SteadyStates:
     Parameters
     ----------
     frequency_hz
-        float[n].
+        float[n], frequency of the vibration.
     states, inputs, outputs
         complex[n, H + 1, n_states | n_inputs | n_outputs], harmonics ``y = Re sum Y_h exp(i h theta)``.
     voltage_v
-        complex[n], amplitude of the voltage; NaN where there is none.
+        complex[n], amplitude of the voltage; NaN if there is none.
     multipliers
-        complex[n, n_states], of a disturbance over one sample, under the inputs as they are.
+        complex[n, n_states], multipliers of a disturbance over one sample, with unchanged inputs.
     stable
-        bool[n]. Under a given input: every multiplier is below 1. With a held force: a slow change of frequency can hold the
-        point, and no multiplier exceeds 1 except real ones, which belong to an input that is not held.
+        bool[n], whether the vibration is stable. Under a given input: every multiplier is below 1 in magnitude. With a held
+        force: the point is stable under slow changes of frequency, and only real positive multipliers exceed 1; these apply
+        to an input that is not held.
     loss
-        Loss of stability: ``fold``, ``period doubling``, ``Neimark-Sacker``; empty for stable ones.
+        Loss of stability: ``fold``, ``period doubling``, ``Neimark-Sacker``; empty for stable points.
     state_use, input_use
         float[n, n_states], float[n, n_inputs], largest magnitude over the largest in the training data; NaN where unknown.
     input_channels, output_channels
@@ -84,7 +85,7 @@ class SteadyStates:
 
     @property
     def force_n(self) -> Complex:
-        """complex[n, H + 1]: the force, an input or an output; raises `IdentificationError` if there is none."""
+        """complex[n, H + 1]: harmonics of the force, an input or an output; raises `IdentificationError` if there is none."""
         for channels, harmonics in ((self.input_channels, self.inputs), (self.output_channels, self.outputs)):
             rows = [row for row, channel in enumerate(channels) if channel.role == "force"]
             if rows:
@@ -111,13 +112,13 @@ class SteadyStates:
         return np.asarray(found)
 
     def joined(self, other: "SteadyStates") -> "SteadyStates":
-        """The points of both, those of this one first."""
+        """Return the points of both, those of this one first."""
         arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _ARRAYS}
         return replace(self, **arrays, loss=(*self.loss, *other.loss))
 
 
 def motion_rows(channels: tuple[Channel, ...]) -> list[int]:
-    """Rows of the motions, drive points first; raises `IdentificationError` if there is none."""
+    """Return the rows of the motions, drive points first; raise `IdentificationError` if there is none."""
     drive = [row for row, channel in enumerate(channels) if channel.role == "drive"]
     others = [row for row, channel in enumerate(channels) if channel.role == "response"]
     if not drive + others:
@@ -126,7 +127,7 @@ def motion_rows(channels: tuple[Channel, ...]) -> list[int]:
 
 
 def largest_use(use: Float) -> Float:
-    """float[n] of float[n, k]: the largest known one; NaN where none is known."""
+    """float[n] of float[n, k]: the largest known value of each row; NaN if none is known."""
     known = np.where(np.isfinite(use), use, -np.inf).max(axis=1, initial=-np.inf)
     return np.where(np.isfinite(known), known, np.nan)
 
@@ -134,9 +135,9 @@ def largest_use(use: Float) -> Float:
 def steady_states(
     balance: Balance, unknowns: Float, frequency_hz: Float, statically_stable: NDArray[np.bool_]
 ) -> SteadyStates:
-    """The vibrations that solutions (float[n, n_unknowns]) of a balance describe.
+    """Convert solutions (float[n, n_unknowns]) of a balance to vibrations.
 
-    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that a slow change can hold.
+    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that are stable under slow changes.
     """
     model, basis = balance.model, balance.basis
     count, harmonics = frequency_hz.size, basis.harmonics + 1
@@ -182,7 +183,7 @@ class PnlssResponse:
     Parameters
     ----------
     force_n, force
-        Level and kind of the force that is held, as in `SteadyPrediction`.
+        Level and kind of the held force, as in `SteadyPrediction`.
     points, folds
         The vibrations along the curve, and those at its turning points in frequency.
     branch
@@ -204,7 +205,7 @@ class PnlssResponse:
 
     @property
     def prediction(self) -> SteadyPrediction:
-        """The fundamental harmonics; the modal amplitude is unknown, for no mode shape is needed."""
+        """The fundamental harmonics as a prediction; the modal amplitude is unknown because there is no mode shape."""
         count, folds = self.points.count, self.folds.count
         return SteadyPrediction(
             force_n=self.force_n,
