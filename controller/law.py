@@ -34,7 +34,7 @@ CONTROL = np.dtype(
 
 
 class Law(Protocol):
-    """A configured law: gives the rules of the lock, and builds the parameters for a sample rate."""
+    """A configured control law: the criteria of phase lock, and the parameters of the law for a sample rate."""
 
     @property
     def lock(self) -> LockRule:

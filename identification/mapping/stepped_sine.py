@@ -54,8 +54,9 @@ class PhaseConvention(MappingTable):
 class LevelSet(MappingTable):
     """Levels that were measured the same way.
 
-    Paths are names joined by dots, with ``[3]`` for the fourth entry of a list. If ``levels`` is given, the other paths start
-    at each entry of that list. Otherwise they start at the top, and columns of two-dimensional arrays are levels.
+    Each field is the path of an array in the file: names joined by dots, with ``[3]`` for the fourth entry of a list. If
+    ``levels`` names a list with one entry a level, the other paths start at each entry of that list. Otherwise they start at
+    the root of the file, and each column of a two-dimensional array is one level.
     """
 
     levels: Path | None = None

@@ -128,7 +128,7 @@ def steady_predictions(
 
 
 def _fundamental(mode: NonlinearMode, level: float, force: HeldForce) -> Callable[[Float], Float]:
-    """Return the peak of the fundamental of the force as a function of q."""
+    """Return the function that gives the amplitude (peak) of the fundamental force at a modal amplitude q."""
     if force != "rms":
         return partial(np.full_like, fill_value=level)
     share = np.abs(mode.force_harmonics[:, 1]) / np.linalg.norm(mode.force_harmonics[:, 1:], axis=1)

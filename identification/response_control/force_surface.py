@@ -59,7 +59,7 @@ class ForceSurface:
         return Section(lag, np.log(amplitude), omega, stiffness + np.log(amplitude), covariance)
 
     def at_lag(self, phase_lag_deg: float = 90.0) -> FrequencyResponse:
-        """Return one point per level at one lag, by default at phase resonance: a backbone, for `single_point_mode`."""
+        """Return one point per level at a phase lag; at phase resonance, the default, a backbone (`single_point_mode`)."""
         section = self.section(phase_lag_deg)
         if not section.omega.size:
             raise IdentificationError(f"phase_lag_deg: is {phase_lag_deg:g}, no level was measured there")

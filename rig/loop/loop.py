@@ -92,7 +92,7 @@ class RunningLoop(Protocol):
 
     @property
     def report(self) -> dict[str, Any]:
-        """Statistics for the record, as plain data."""
+        """Timing statistics of the loop as plain data, for the recording."""
 
 
 class Loop(DrivenLoop):
@@ -161,7 +161,7 @@ class Loop(DrivenLoop):
 
     @property
     def report(self) -> dict[str, Any]:
-        """Statistics for the record, as plain data."""
+        """Timing statistics of the loop as plain data, for the recording."""
         return {**self.statistics.report(int(self.tick.arrays.loop["cycles"][0])), **self.daq.statistics}
 
     def _load_kernels(self) -> None:

@@ -73,7 +73,7 @@ class Sink(io.RawIOBase):
         return len(view)
 
     def readinto(self, buffer: "WriteableBuffer") -> int:
-        """Fill ``buffer`` from the file and what is held; what was never written reads as zeros."""
+        """Fill ``buffer`` from the file and from bytes not yet written to it. Bytes that never existed read as zeros."""
         view = memoryview(buffer).cast("B")
         self._file.seek(self._position)
         data = self._file.read(len(view)).ljust(len(view), b"\0")

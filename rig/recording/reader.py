@@ -117,7 +117,7 @@ class Recording:
 
     @property
     def latest(self) -> dict[int, dict[str, Any]]:
-        """The last result of each point that the plan in force asks for, by number, in the order of the plan."""
+        """The last result of each point of the current plan, keyed by the number of the point, in the order of the plan."""
         results = {int(point["number"]): point for point in self.points}
         numbers = self.plans[-1].numbers
         return {n: results[n] for n in (sorted(results) if numbers is None else numbers) if n in results}

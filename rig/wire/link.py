@@ -45,7 +45,7 @@ class Link(ABC):
 
     @abstractmethod
     def configure(self, stream: Stream) -> None:
-        """Set the shape of samples and outputs; called at both ends before START takes effect."""
+        """Set channels and block size of samples and outputs; called at both ends before START takes effect."""
 
     @abstractmethod
     def send(self, message: Message) -> None:

@@ -226,7 +226,10 @@ class Heartbeat(NamedTuple):
 
 
 class EmergencyStop(NamedTuple):
-    """From the host, or from anyone on a bus: 0 V at once, and latch. Sent three times, answered by a heartbeat."""
+    """Command to put out 0 V at once and to latch the stop, from the host or from any node of a bus.
+
+    The sender sends it three times; the device answers with a heartbeat.
+    """
 
     reason: int = 0
 

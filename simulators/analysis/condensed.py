@@ -44,7 +44,10 @@ class CondensedRig:
             raise ValueError(_NOT_HELD) from None
 
     def transfer(self, omega_rad_s: float, orders: NDArray[np.int64]) -> tuple[Complex, Complex]:
-        """Return T [n_order, n_site + 2, n_site + 1] and its derivative by W; rows as `rows`, columns as `columns`."""
+        """Return T [n_order, n_site + 2, n_site + 1] and its derivative by W.
+
+        `rows` lists the outputs, `columns` the inputs.
+        """
         inverse = self.resolvent(omega_rad_s, orders)
         states, left = inverse @ self.columns, self.rows @ inverse
         return self.rows @ states, -1j * orders[:, None, None] * (left @ states)
@@ -84,7 +87,10 @@ class CondensedStructure:
         return inverse, slope
 
     def transfer(self, omega_rad_s: float, orders: NDArray[np.int64]) -> tuple[Complex, Complex]:
-        """Return T [n_order, n_site + 2, n_site + 1] and its derivative by W: site coordinates, force, drive displacement."""
+        """Return T [n_order, n_site + 2, n_site + 1] and its derivative by W.
+
+        The outputs are site coordinates, force and drive displacement.
+        """
         inverse, slope = self._receptance(omega_rad_s, orders)
         s = 1j * omega_rad_s * orders[:, None, None]
         rows = np.concatenate([self.rows + s * self.rate_rows, self._drive_rows(orders)], axis=1)

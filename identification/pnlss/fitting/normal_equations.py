@@ -101,7 +101,7 @@ class Blocks:
 
 
 def _edges(record: Record, size: int) -> Iterator[int]:
-    """First samples of the blocks of counted samples; no block extends into the next period."""
+    """First sample of each block. Blocks hold only samples that enter the fit; no block extends into the next period."""
     period = record.period or len(record.u)
     for begin in range(record.counted_from, len(record.u), period):
         yield from range(begin, min(begin + period, len(record.u)), size)

@@ -1,4 +1,4 @@
-"""Levels of a plan in volts, newtons or metres, and the start at a voltage before a loop holds them."""
+"""Levels of a plan in volts, newtons or metres, and the voltage that a test starts with before a loop holds them."""
 
 import math
 from dataclasses import replace

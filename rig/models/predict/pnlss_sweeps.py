@@ -109,7 +109,7 @@ def _largest_in_training(model: PnlssModel, row: int) -> float:
 
 
 def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tuple[SweepGiven, tuple[str, ...]]:
-    """Return a recorded sweep at the model's rate, by its stored number, with the oscillator's phase at the counted samples."""
+    """Return the sweep with a stored number at the model's rate, and the oscillator's phase at the compared samples."""
     bench, model, name = bench_of_recording(recording), models.model, f"sweep {number + 1}"
     try:
         signals = Signals.chosen(bench, [c.name for c in models.inputs], [c.name for c in model.outputs])

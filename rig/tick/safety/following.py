@@ -195,13 +195,19 @@ def follow_level(
     """Check once a period whether the held quantity follows the output; return whether it was astray for `ASTRAY_PERIODS`.
 
     ``period`` (of `controller.period.PERIOD`) gives the output, the fundamentals and the held quantity, which should be
-    ``wanted`` (N or m). ``slipping``: a lock is about to be lost, so that the reference is not updated.
+    ``wanted`` (N or m). The reference is the last state in which the held quantity followed. ``slipping``: the lock is about to
+    be lost; the reference is then not updated.
 
-    The held quantity follows if it has grown towards its level, or is near its level while the output rises slowly. While the
-    vibration builds up, a force may be too large. If the vibration has grown more than the output has risen, a force may also
-    sag by up to a quarter while the output rises slowly. At a frequency given by the plan (``may_jump``) the force may then
-    drop further, because a structure can jump past a turning point. The held quantity is astray if the output has risen and the
-    quantity has not followed, has fallen to half its reference without such growth, or is too large.
+    The held quantity follows if it has moved towards its level since the reference, or if it is near its level and the output
+    rises only slowly. It is astray
+
+    - if the output has risen and the quantity has not followed,
+    - if the quantity has fallen to half its reference, or
+    - if it is too large.
+
+    A held force has three exceptions. It may be too large while the vibration builds up. It may drop by up to a quarter while
+    the output rises slowly, if the vibration has grown more than the output. At a frequency given by the plan (``may_jump``) it
+    may then drop further, because a structure can jump past a turning point.
     """
     amplitude_v, held, force, response = period.output_v, period.held, period.force_n, period.drive_m_s2
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)

@@ -97,7 +97,7 @@ class CanCodec:
         return (first // sent.block + 1) * sent.groups - self._reported > sent.wrap // 2
 
     def decode(self, frame: Frame) -> Message | None:
-        """The message that a frame completes, if any; foreign frames are counted and dropped."""
+        """Return the message that a frame completes, if any. Foreign frames are counted and dropped."""
         known = None if frame.extended else self._kinds.get(frame.identifier)
         if known is None:
             self._counters["foreign_frames"] += 1

@@ -109,7 +109,7 @@ class Codec:
         raise TypeError(f"{message!r} is no message")
 
     def decode(self, payload: bytes) -> Message:
-        """The message of a payload; counts are views of its bytes. Raises `Malformed`, and nothing else."""
+        """Decode a payload into a message. Arrays of counts are views of the payload, not copies. Raises only `Malformed`."""
         size = len(payload)
         if size < HEADER_SIZE:
             raise Malformed(f"{size} bytes")

@@ -78,9 +78,9 @@ def port_names() -> list[str]:
 
 
 def open_port(path: str, baud: int) -> Any:
-    """A pyserial port, 8N1, opened exclusively, with old input dropped; reading its descriptor never blocks.
+    """Open a pyserial port (8N1, exclusive) and discard old input. Reading its descriptor never blocks.
 
-    Raises `DaqBusy`, `DaqDisconnected` or `DaqRefused` with what is there and what to do.
+    Raises `DaqBusy`, `DaqDisconnected` or `DaqRefused`. The message says which ports there are and what to do.
     """
     if sys.platform == "win32":
         raise DaqRefused(

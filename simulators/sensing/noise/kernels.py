@@ -25,7 +25,7 @@ TAIL = 3.6541528853610088
 
 
 def _edges() -> NDArray[np.float64]:
-    """Return the right edges of the layers [LAYERS + 1], the base first, for the density ``exp(-x^2 / 2)``."""
+    """Return the right edges of the ziggurat's layers [LAYERS + 1], the base first, for the density ``exp(-x^2 / 2)``."""
     area = TAIL * math.exp(-0.5 * TAIL**2) + math.sqrt(0.5 * math.pi) * math.erfc(TAIL / math.sqrt(2.0))
     edges = np.zeros(LAYERS + 1)
     edges[0] = area * math.exp(0.5 * TAIL**2)  # a rectangle with the area of the base and its tail
