@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import freqs
 
+from rig.campaigns.evaluation.point import RowRange
+from rig.campaigns.evaluation.stored_point import stored
 from rig.campaigns.running.level_search import share_of_limits
 from rig.check.findings import graded
 from rig.check.judging import best_assignment, by_magnitude
@@ -13,6 +15,7 @@ from rig.check.responses import fit_mode
 from rig.check.run import SEARCH, seen_in
 from rig.check.silence import hum, silent_findings
 from rig.tick.layout import recorded_row
+from tests.rig.campaigns.made_points import made_point
 from tests.rig.rigs import bench_with
 
 RATE_HZ = 5000.0
@@ -118,7 +121,8 @@ def recorded_with(bench, inputs):
     rows = np.zeros(len(inputs), recorded_row(len(bench.channels)))
     rows["inputs"], rows["output_v"] = inputs, 0.1
     part = SimpleNamespace(read=lambda first, end: rows[first:end], end={"reason": "completed"})
-    return SimpleNamespace(parts=[part], latest={0: {"first_sample": 0, "end_sample": len(rows)}})
+    point = made_point(rows=RowRange(first_sample=0, end_sample=len(rows)))
+    return SimpleNamespace(parts=[part], latest={0: stored(point)})
 
 
 def test_lost_samples_do_not_hide_how_near_a_limit_the_others_were():
