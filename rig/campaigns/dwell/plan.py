@@ -59,6 +59,10 @@ class DwellPlan(SettledPlan):
     """Changes from the first mean at which the output is ramped down and the test ends."""
     accepted_level_error: float = Field(0.01, gt=0, le=1)
     """Largest relative error of a held force or displacement over a mean with which the mean is accepted."""
+    on_failure: Literal["stop"] = "stop"
+    """A mean that is disturbed ramps the output down and ends the test: nothing settles the vibration again before the next."""
+    on_lost_lock: Literal["stop"] = "stop"
+    """A lost lock trips."""
     repeats: Literal[1] = 1
     """Always 1: a specimen ages only once."""
 

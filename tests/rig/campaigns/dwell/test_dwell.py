@@ -204,6 +204,8 @@ def test_a_mean_that_was_not_accepted_is_no_reference_and_stops_nothing_but_its_
         ({"abort": {"frequency": 2.0}}, "abort.frequency"),
         ({"cycles": 10**9}, "cycles: .* points, allowed are up to 10000"),
         ({"repeats": 2}, "repeats"),
+        ({"on_failure": "skip"}, "on_failure"),
+        ({"on_lost_lock": "skip"}, "on_lost_lock"),
     ],
 )
 def test_plans_that_make_no_sense_are_refused(changes, message):
