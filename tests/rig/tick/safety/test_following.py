@@ -119,10 +119,15 @@ HELD = ["magnet-beam/stepped-phase", "magnet-beam/stepped-phase-fast", "magnet-b
 def test_a_load_cell_that_dies_under_force_control_trips_before_the_output_has_doubled(plan, fault):
     daq, tick, bench = _run(plan, 20.0 if plan.startswith("magnet") else 4.0, readings=fault)
     before_v, peak_v = daq.peaks_v()
-    assert EndReason(int(tick.guard["reason"][0])) is EndReason.LEVEL_NOT_FOLLOWED
+    reason = EndReason(int(tick.guard["reason"][0]))
+    # noise instead of a force has no phase either: the friction beam's lock may be lost before the level is missed
+    assert reason in (EndReason.LEVEL_NOT_FOLLOWED, EndReason.LOST_LOCK)
     assert peak_v <= LARGEST_RISE * CREEP**3 * before_v
     assert _periods_to_the_trip(daq, tick, bench) < 60.0
-    assert "did not follow on channel force" in describe_end(tick.guard, bench)
+    if reason is EndReason.LEVEL_NOT_FOLLOWED:
+        assert "did not follow on channel force" in describe_end(tick.guard, bench)
+    else:
+        assert plan.startswith("friction")
 
 
 @pytest.mark.parametrize("fault", [_noise_of(DRIVE_CHANNEL), _times(DRIVE_CHANNEL, 0.1)], ids=["dead", "a tenth"])
