@@ -10,7 +10,8 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
-from rig.drivers.virtual.driver import HOLD_SAMPLES
+from rig.drivers.virtual.driver import COUNTED, HOLD_SAMPLES
+from rig.drivers.virtual.faults import OUTPUT_HELD
 from rig.drivers.virtual.kernels import Converters, exchange_block, loopback_of
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
@@ -103,7 +104,8 @@ class VirtualPlant:
             key: value for key, value in bench.driver.options.items() if key not in ("queue_blocks", "delay_samples")
         }
         driver = bench.driver.model_copy(update={"options": dict(options)})
-        self._rig, self._seed = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed).rig, seed
+        self._daq = VirtualDAQ(bench.model_copy(update={"driver": driver}), seed)
+        self._rig, self._seed = self._daq.rig, seed
         converter = self._rig.converter
         self._channels = bench.channels
         self.names = tuple(channel.name for channel in bench.channels)
@@ -124,6 +126,7 @@ class VirtualPlant:
             int(Flag.DIVERGED): int(DeviceFlag.OVERLOAD),
             int(Flag.DAC_CLIPPED): int(DeviceFlag.OUTPUT_CLIPPED),
             int(Flag.AMPLIFIER_CLIPPED): int(DeviceFlag.OUTPUT_CLIPPED),
+            OUTPUT_HELD: int(DeviceFlag.OUTPUT_HELD),
         }
         self.reset()
 
@@ -132,7 +135,8 @@ class VirtualPlant:
         self._realised = self._rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)
         loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
-        self._converters = Converters(NO_QUEUE, np.zeros(len(Flag), np.int64), loopback)
+        counts = np.zeros(len(COUNTED), np.int64)
+        self._converters = Converters(NO_QUEUE, counts, loopback, self._daq.held_outputs())
         self._first = 0
         self._buffers_for(0)
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from rig.drivers.virtual.faults import PassingFaults
 from simulators.exciter import Exciter, Stinger
 from simulators.scatter import Deviation, Scatter
 from simulators.sensing.parts import Converter, Sensor
@@ -42,6 +43,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "Scatter": Scatter,
     "Deviation": Deviation,
     "Wear": Wear,
+    "Faults": PassingFaults,
 }
 WORDS = {"string": "text", "boolean": "true, false", "number": "number", "integer": "whole number", "object": "table"}
 

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError
 from rig.bench import Bench
 from rig.bench.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
+from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, PassingFaults
 from rig.drivers.virtual.kernels import Converters, exchange_block, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
@@ -22,31 +23,33 @@ __all__ = ["VirtualDAQ"]
 
 FACT_TOLERANCE = 1e-3
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
-FLAG_NAMES = tuple(str(flag.name).lower() for flag in Flag)
+COUNTED = (*(str(flag.name).lower() for flag in Flag), *FAULT_FLAGS, "lost_samples")
 GROWTH = 1e-3  # a step; of a plant that does not grow there is rounding alone, far below
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 
 
 class Queue(Configured):
-    """Latency of the virtual device."""
+    """Latency and passing faults of the virtual device."""
 
     queue_blocks: int = Field(0, ge=0, le=64)
     """q: blocks of outputs in the device's queue, as in a buffered DAQ."""
     delay_samples: int = Field(0, ge=0, le=1000)
     """Further samples between the handing over of an output and the converter."""
+    faults: PassingFaults = PassingFaults()
+    """Passing faults: outputs that come too late, samples that are lost."""
 
 
 class VirtualDAQ(DAQ):
     """A virtual rig behind the DAQ contract.
 
-    Options: those of `simulators.VirtualRig` (``specimen`` and its parts), ``queue_blocks`` and ``delay_samples``. The
-    seed draws the noise; on one machine a run with the same seed and outputs returns the same inputs bit for bit,
+    Options: those of `simulators.VirtualRig` (``specimen`` and its parts), ``queue_blocks``, ``delay_samples`` and ``faults``.
+    The seed draws noise and faults; on one machine a run with the same seed and outputs returns the same inputs bit for bit,
     whatever the block.
 
     Channels with ``loopback = true`` behind those of the rig's sensors read the output itself, late by hold and filters as the
     sensors are, without noise or steps.
 
-    It returns at once: pacing is the loop's. Not modelled: lost samples, jitter, a device that fails.
+    It returns at once: pacing is the loop's. Not modelled: jitter, a device that fails.
     """
 
     wall_clock: ClassVar[bool] = False
@@ -69,9 +72,18 @@ class VirtualDAQ(DAQ):
         self._check_arrays(seed)
         self._seed = seed
         self._specimen = bench.specimen
-        self._counts = np.zeros(len(Flag), np.int64)
-        self._exchanged = Converters(np.zeros(0), self._counts, loopback_of(self.channels, 0.0))
+        self._counts = np.zeros(len(COUNTED), np.int64)
+        self._bench_block = bench.block
+        self._exchanged = Converters(np.zeros(0), self._counts, loopback_of(self.channels, 0.0), self._faults())
         self._first = 0
+
+    def _faults(self) -> FaultArrays:
+        return self._queue_options.faults.build(self._seed, self.sample_rate_hz, self._bench_block)
+
+    def held_outputs(self) -> FaultArrays:
+        """The held outputs among the passing faults, for a device around the rig that loses samples in a way of its own."""
+        held = self._queue_options.faults.model_copy(update={"lost_per_s": 0.0})
+        return held.build(self._seed, self.sample_rate_hz, self._bench_block)
 
     def _check_arrays(self, seed: int) -> None:
         """Refuse, before a run begins, parts whose arrays cannot be computed or are not finite."""
@@ -166,8 +178,8 @@ class VirtualDAQ(DAQ):
 
     @property
     def counters(self) -> dict[str, int]:
-        """Samples at which each flag of the rig was up."""
-        return dict(zip(FLAG_NAMES, self._counts.tolist(), strict=True))
+        """Samples at which each flag of rig and device was up, and samples that were lost."""
+        return dict(zip(COUNTED, self._counts.tolist(), strict=True))
 
     @property
     def output_v(self) -> float:
@@ -182,8 +194,9 @@ class VirtualDAQ(DAQ):
         self._realised = self.rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)
         loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
-        self._exchanged = Converters(np.zeros(self.queue_samples), self._counts, loopback)
-        self._fused = Converters(np.zeros(self.block + self.queue_samples), self._counts, loopback)
+        faults = self._faults()
+        self._exchanged = Converters(np.zeros(self.queue_samples), self._counts, loopback, faults)
+        self._fused = Converters(np.zeros(self.block + self.queue_samples), self._counts, loopback, faults)
         self._counts[:] = 0
         self._first = 0
 
@@ -233,3 +246,4 @@ class VirtualDAQ(DAQ):
         """Set the converter and the queue to 0 V."""
         self._exchanged.queue[:] = 0.0
         self._exchanged.loopback.past[:] = 0.0
+        self._exchanged.faults.last_v[:] = 0.0

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.daq import Channel
+from rig.daq import LOST, Channel
+from rig.drivers.virtual.faults import OUTPUT_HELD, FaultArrays, is_hit
 from rig.tick.kernels import tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from rig.tick.safety.kernels import is_over
@@ -43,9 +44,11 @@ class Converters(NamedTuple):
     queue: np.ndarray
     """float64[d], d may be 0: ring of outputs that are not on the converter yet, V."""
     counts: np.ndarray
-    """int64[bits]: samples at which each flag of the rig was up."""
+    """int64[bits + 1]: samples at which each flag was up, then samples lost."""
     loopback: Loopback
     """Channels that read the output."""
+    faults: FaultArrays
+    """Passing faults of the device."""
 
 
 @kernel
@@ -84,18 +87,40 @@ def exchange_block(
             voltage = queue[slot]
             queue[slot] = voltages[index]
         row = inputs[index]
+        voltage, raised = convert(converters.faults, first + index, voltage)
         read_output(loopback, first + index, voltage, row)
-        flags[index] = sample(rig, state, voltage, row[:sensed])
-        count_flags(flags[index], converters.counts)
+        flags[index] = told(sample(rig, state, voltage, row[:sensed]) | raised, converters.counts)
+        if flags[index] & LOST:
+            row[:] = math.nan
 
 
 @kernel
-def count_flags(flags: int, counts: np.ndarray) -> None:
-    """Count every flag that is up."""
-    if flags != 0:
-        for bit in range(counts.size):
-            if flags & (1 << bit):
-                counts[bit] += 1
+def convert(faults: FaultArrays, index: int, voltage: float) -> tuple[float, int]:
+    """Return the voltage on the converter at sample ``index``, which may be the held one, and the flags of passing faults."""
+    if not faults.any:
+        return voltage, 0
+    raised = 0
+    if is_hit(faults, 0, index):
+        voltage = faults.last_v[0]
+        raised |= OUTPUT_HELD
+    faults.last_v[0] = voltage
+    if is_hit(faults, 1, index):
+        raised |= LOST
+    return voltage, raised
+
+
+@kernel
+def told(flags: int, counts: np.ndarray) -> int:
+    """Count every flag that is up and return the flags as the host sees them: with a lost sample, its flags are lost too."""
+    if flags == 0:
+        return 0
+    if flags & LOST:
+        counts[counts.size - 1] += 1
+        return LOST
+    for bit in range(counts.size - 1):
+        if flags & (1 << bit):
+            counts[bit] += 1
+    return flags
 
 
 @kernel
@@ -117,11 +142,11 @@ def fused(
     looped, sensed = loopback.v_per_v.size > 0, volts[: volts.size - loopback.v_per_v.size]
     for index in range(rows.size):
         slot = t.loop[0].sample % delay
+        voltage, raised = convert(converters.faults, t.loop[0].sample, queue[slot])
         if looped:
-            read_output(loopback, t.loop[0].sample, queue[slot], volts)
-        flags = sample(rig, state, queue[slot], sensed)
-        count_flags(flags, converters.counts)
-        queue[slot] = tick(t, volts, False, readings[index], rows[index])
+            read_output(loopback, t.loop[0].sample, voltage, volts)
+        flags = told(sample(rig, state, voltage, sensed) | raised, converters.counts)
+        queue[slot] = tick(t, volts, (flags & LOST) != 0, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
         if is_over(t.guard[0], t.loop[0].lead_whole):
             return index + 1

@@ -1,0 +1,131 @@
+"""Passing faults of the virtual device: outputs that are held, samples that are lost."""
+
+import numpy as np
+import pytest
+
+from rig.daq import LOST
+from rig.drivers import make_daq
+from rig.drivers.virtual.faults import OUTPUT_HELD
+from rig.emulator.emulated import emulated
+from rig.errors import ConfigurationError
+from rig.loop.loop import Loop
+from rig.tick.layout import DEVICE_SHIFT
+from tests.rig.rigs import bench_with, tick_for
+
+FAULTS = {"held_per_s": 2.0, "held_s": 0.004, "lost_per_s": 3.0, "lost_s": 0.002}
+
+
+def exchanged(faults, block, seed=1, n=8400, **changes):
+    """Inputs, flags and counters of a run in blocks; the output is its own sample number."""
+    with make_daq(bench_with({"block": 14, **changes}, faults=faults), seed) as daq:
+        daq.start(block)
+        inputs, flags = [], []
+        for first in range(0, n, block):
+            inputs.append(daq.exchange(1e-5 * np.arange(first, first + block)))
+            flags.append(daq.flags.copy())
+        return np.concatenate(inputs), np.concatenate(flags), daq.counters
+
+
+@pytest.mark.parametrize("block", [1, 14, 50])
+@pytest.mark.parametrize("wear", [{}, {"frequency_per_s": [-0.01], "until_s": 2.0, "every_s": 0.113}])
+def test_fused_and_exchanged_runs_agree_bit_for_bit(block, wear):
+    rows, counted = [], []
+    bench = bench_with({"block": block, "limits": {"lost_s": 1.0}}, faults=FAULTS, queue_blocks=1, wear=wear)
+    for fused in (True, False):
+        with make_daq(bench, 3) as daq:
+            daq.start(block)
+            tick = tick_for(bench, block + daq.latency_samples, 0.3)
+            rows.append(np.concatenate([*Loop(daq, tick, fused=fused).run()]))
+            counted.append(daq.counters)
+    shortest = min(part.size for part in rows)
+    flags = rows[0]["flags"][:shortest] >> DEVICE_SHIFT
+    assert np.count_nonzero(flags & OUTPUT_HELD) > 40
+    assert np.count_nonzero(flags & LOST) > 40
+    for name in rows[0].dtype.names:
+        np.testing.assert_array_equal(rows[0][name][:shortest], rows[1][name][:shortest])
+    assert counted[0]["lost_samples"] == np.count_nonzero(flags & LOST)
+
+
+def test_faults_do_not_depend_on_how_the_samples_are_cut_into_blocks():
+    inputs, flags, _ = exchanged(FAULTS, 1)
+    for block in (7, 14, 600):
+        other, raised, _ = exchanged(FAULTS, block)
+        np.testing.assert_array_equal(raised, flags)
+        np.testing.assert_array_equal(other, inputs)
+
+
+def test_faults_are_those_of_the_seed():
+    flags = [exchanged(FAULTS, 14, seed)[1] for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(flags[0], flags[1])
+    assert not np.array_equal(flags[0], flags[2])
+
+
+def test_without_faults_the_readings_are_those_of_a_device_that_has_none():
+    inputs, flags, counters = exchanged({}, 14)
+    assert not flags.any()
+    assert counters["output_held"] == counters["lost_samples"] == 0
+    with make_daq(bench_with(), 1) as daq:
+        daq.start(8400)
+        np.testing.assert_array_equal(daq.exchange(1e-5 * np.arange(8400)), inputs)
+
+
+def test_faults_last_whole_blocks_and_come_as_often_as_they_should():
+    held_only = {"held_per_s": 5.0, "held_s": 0.0056}  # two blocks of 14 samples at 5 kHz
+    _, flags, counters = exchanged(held_only, 14, n=280_000)
+    held = (flags & OUTPUT_HELD) != 0
+    edges = np.flatnonzero(np.diff(held.astype(int)))
+    assert np.all((edges + 1) % 28 == 0)
+    share = 1.0 - np.exp(-5.0 * 0.0056)  # at least one arrival of a Poisson process in a slot
+    assert held.mean() == pytest.approx(share, abs=4.0 * np.sqrt(share / 10_000))
+    assert counters["output_held"] == held.sum()
+
+
+def test_a_held_output_is_the_last_one_and_the_late_ones_are_dropped():
+    loopback = {"name": "out", "role": "monitor", "unit": "V", "sensitivity_v_per_unit": 1.0, "loopback": True}
+    channels = [*bench_with().model_dump()["channels"], loopback]
+    inputs, flags, _ = exchanged({"held_per_s": 20.0, "held_s": 0.0028}, 14, channels=channels)
+    held = (flags & OUTPUT_HELD) != 0
+    expected = 1e-5 * np.arange(flags.size)
+    for index in np.flatnonzero(held):
+        expected[index] = expected[index - 1] if index else 0.0
+    assert 0 < held.sum() < held.size
+    # The loopback reads half a sample of hold and the filters' delay late, linearly between two samples.
+    with make_daq(bench_with()) as daq:
+        delay = 0.5 + daq.filter_delay_samples
+    late = np.interp(np.arange(expected.size) - delay, np.arange(expected.size), expected)
+    np.testing.assert_allclose(inputs[20:, -1], late[20:], atol=1e-12)
+
+
+def test_lost_samples_are_rows_of_no_numbers_and_the_others_are_untouched():
+    whole, _, _ = exchanged({}, 14)
+    inputs, flags, counters = exchanged({"lost_per_s": 3.0, "lost_s": 0.0028}, 14)
+    lost = (flags & LOST) != 0
+    assert np.isnan(inputs[lost]).all()
+    np.testing.assert_array_equal(inputs[~lost], whole[~lost])
+    assert counters["lost_samples"] == lost.sum() > 0
+
+
+def test_an_emulated_device_holds_the_same_outputs_with_the_flag_of_the_wire():
+    bench = bench_with({"block": 14}, faults={"held_per_s": 20.0, "held_s": 0.0056})
+    with emulated(bench, lockstep=True, seed=1) as reached, make_daq(reached) as daq:
+        daq.start(14)
+        raised = []
+        for _ in range(300):
+            daq.exchange(np.zeros(14))
+            raised.append(daq.flags.copy())
+    _, flags, _ = exchanged({"held_per_s": 20.0, "held_s": 0.0056}, 14, n=300 * 14)
+    np.testing.assert_array_equal(np.concatenate(raised) == 4, flags == OUTPUT_HELD)
+    assert flags.any()
+
+
+@pytest.mark.parametrize(
+    ("faults", "line"),
+    [
+        ({"held_per_s": -1.0}, r"faults\.held_per_s = -1"),
+        ({"lost_s": 0.0}, r"faults\.lost_s = 0"),
+        ({"sticky": 1.0}, r"faults\.sticky"),
+    ],
+)
+def test_faults_that_are_none_are_refused_by_name(faults, line):
+    with pytest.raises(ConfigurationError, match=line):
+        make_daq(bench_with(faults=faults))
