@@ -1,0 +1,65 @@
+"""Force laws of the hypothesised nonlinearities, as elements of a virtual rig, and what they do to one mode.
+
+Under a displacement ``x = a cos(theta)`` a force ``-f(x)`` acts on the fundamental like a stiffness, its describing function
+``N(a) = 1/(pi a) integral of f(a cos theta) cos theta`` (Gelb and Vander Velde, Multiple-Input Describing Functions, 1968).
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+
+__all__ = ["describing_function", "drag", "drag_for", "hardening_for", "softening_for"]
+
+SAMPLES = 720  # of a period
+BOUND = 0.5  # of the highest displacement: where a softening spring begins to stop softening
+
+
+@numba.cfunc("float64(float64, CPointer(float64))", cache=True)
+def saturating(x, parameters):
+    """Force of a cubic spring whose secant stiffness is bounded: k3 x^3 / (1 + (x / x0)^2)."""
+    ratio = x / parameters[1]
+    return -parameters[0] * x * x * x / (1.0 + ratio * ratio)
+
+
+@numba.cfunc("float64(float64, CPointer(float64))", cache=True)
+def drag(v, parameters):
+    """Damping force that grows with the velocity: (c2 |v| + c3 v^2) v."""
+    return -(parameters[0] * abs(v) + parameters[1] * v * v) * v
+
+
+@numba.cfunc("float64(float64, CPointer(float64))", cache=True)
+def odd_polynomial(x, parameters):
+    """Force of a spring: k3 x^3 + k5 x^5 + k7 x^7."""
+    square = x * x
+    return -(parameters[0] + (parameters[1] + parameters[2] * square) * square) * square * x
+
+
+def describing_function(force: Callable[[np.ndarray], np.ndarray], amplitude: float) -> float:
+    """Return N(a) of ``force(x)``, the restoring force, by a sum over a period."""
+    theta = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    cosine = np.cos(theta)
+    return float(2.0 / (SAMPLES * amplitude) * np.sum(force(amplitude * cosine) * cosine))
+
+
+def hardening_for(at: str, stiffness_n_m: float, amplitude_m: float) -> dict[str, Any]:
+    """Return a cubic spring that adds a stiffness (N/m) at an amplitude (m): ``3/4 k3 a^2``."""
+    return {"kind": "cubic", "at": at, "stiffness_n_m3": stiffness_n_m / (0.75 * amplitude_m**2)}
+
+
+def softening_for(at: str, stiffness_n_m: float, amplitude_m: float) -> dict[str, Any]:
+    """Return a spring with bounded secant stiffness that adds a stiffness (N/m, negative to soften) at an amplitude (m)."""
+    bound = BOUND * amplitude_m
+    of_unit = describing_function(lambda x: x**3 / (1.0 + (x / bound) ** 2), amplitude_m)
+    return _user(at, "saturating", "deflection", [stiffness_n_m / of_unit, bound])
+
+
+def drag_for(at: str, damping_n_s_m: float, velocity_m_s: float) -> dict[str, Any]:
+    """Return a drag that adds a damping (N s/m) at a velocity amplitude (m/s): ``8/(3 pi) c2 v`` for ``c2 |v| v``."""
+    return _user(at, "drag", "velocity", [damping_n_s_m * 3.0 * math.pi / (8.0 * velocity_m_s), 0.0])
+
+
+def _user(at: str, name: str, of: str, parameters: list[float]) -> dict[str, Any]:
+    return {"kind": "user", "at": at, "of": of, "function": f"{__name__}:{name}", "parameters": parameters}

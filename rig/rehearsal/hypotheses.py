@@ -1,0 +1,78 @@
+"""Hypotheses on what nobody has measured of a rig, as a table (TOML)."""
+
+from pathlib import Path
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from rig.bench.configuration import Configured, read_toml, validated
+
+__all__ = ["Hypotheses", "load_hypotheses"]
+
+
+class Hypotheses(Configured):
+    """What is drawn from for a twin beyond what was measured.
+
+    Probabilities are those with which one twin has the property; sizes are drawn between the bounds, evenly in their logarithm
+    unless something else is said. The highest level is the largest displacement that the plan asks for on the linear rig.
+    """
+
+    hardening: float = Field(0.35, ge=0.0, le=1.0)
+    """Probability of a spring that hardens."""
+    softening: float = Field(0.35, ge=0.0, le=1.0)
+    """Probability of a spring that softens, with a stiffness that stays above a bound."""
+    shift: tuple[float, float] = (0.002, 0.08)
+    """Relative shift of the modal frequency at the highest level, by either spring."""
+    damping_growth: tuple[float, float] = (1.0, 3.0)
+    """Damping ratio at the highest level over that at a low one, by drag; every twin has some."""
+    joint: float = Field(0.2, ge=0.0, le=1.0)
+    """Probability of a joint that slips, beside the springs."""
+    joint_shift: tuple[float, float] = (0.002, 0.05)
+    """Relative fall of the modal frequency when the joint slips altogether."""
+    joint_slip: tuple[float, float] = (0.3, 3.0)
+    """Displacement at which it slips altogether, over that of the highest level."""
+    stop: float = Field(0.1, ge=0.0, le=1.0)
+    """Probability of a stop that is met."""
+    stop_gap: tuple[float, float] = (0.3, 1.0)
+    """Its clearance, over the displacement of the highest level."""
+    stop_stiffness: tuple[float, float] = (0.03, 1.0)
+    """Its stiffness, over the modal stiffness of the specimen there."""
+    second_mode: float = Field(0.1, ge=0.0, le=1.0)
+    """Probability of a mode nearby that no measurement has shown."""
+    second_mode_at: tuple[float, float] = (0.7, 1.5)
+    """Its frequency over that of the tested mode; within 5 % of it there is none."""
+    second_mode_shape: tuple[float, float] = (0.003, 0.03)
+    """Its drive-point shape over that of the tested mode: what a fit hides."""
+    mode_shape: float = Field(1.5, ge=1.0, le=10.0)
+    """Factor, either way, by which the bench's mode shape may be wrong where it was not measured (two standard deviations)."""
+    gain: float = Field(0.03, ge=0.0, le=1.0)
+    """Probability that the amplifier's gain is not that of the measurement."""
+    gain_factor: tuple[float, float] = (0.5, 2.0)
+    """That gain over the measured one."""
+    frequency_drift: float = Field(0.002, ge=0.0, le=0.1)
+    """Standard deviation of the relative change of the modal frequency since the measurement: temperature, a remounted stinger."""
+    damping_drift: float = Field(0.05, ge=0.0, le=1.0)
+    """Standard deviation of the logarithm of the change of damping since then."""
+    held_per_s: float = Field(0.0, ge=0.0, le=1000.0)
+    """Rate of blocks whose output comes late and is held, 1/s, as `rig doctor` counts them."""
+    lost_per_s: float = Field(0.0, ge=0.0, le=1000.0)
+    """Rate of blocks of inputs that are lost, 1/s."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.hardening + self.softening > 1.0:
+            total = self.hardening + self.softening
+            raise ValueError(f"hardening + softening = {total:g}: allowed is up to 1, a twin has one spring at most")
+        for name, value in self:
+            if isinstance(value, tuple) and not 0.0 < value[0] <= value[1]:
+                raise ValueError(f"{name} = {list(value)}: allowed is two numbers above 0, the lower one first")
+        for name in ("shift", "joint_shift"):
+            highest = getattr(self, name)[1]
+            if highest >= 0.5:
+                raise ValueError(f"{name} = {list(getattr(self, name))}: allowed is below 0.5")
+        return self
+
+
+def load_hypotheses(path: str | Path) -> Hypotheses:
+    """Read a table of hypotheses; keys that it does not give keep their defaults. Raises `ConfigurationError`."""
+    return validated(Hypotheses, read_toml(Path(path)), str(path))

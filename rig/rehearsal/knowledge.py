@@ -1,0 +1,280 @@
+"""What is known of a rig before a rehearsal, gathered from recordings, models and the plan."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from controller.tuning import PlantModel
+from identification import (
+    Exciter,
+    FrequencyResponseMatrix,
+    LinearModes,
+    ModalAnalysis,
+    NonlinearMode,
+    best_linear_approximation,
+)
+from rig.bench import Bench
+from rig.campaigns.planning.plan import Plan
+from rig.errors import ConfigurationError
+from rig.measurements import spectra
+from rig.recording.reader import Recording
+from rig.rehearsal.linear_rig import LinearKnowledge, Prior, Responses, known_rig
+
+__all__ = ["Knowledge", "gathered"]
+
+Real = NDArray[np.float64]
+
+BAND = (0.5, 2.2)  # of the linear frequency: band in which the linear rig is fitted
+LEAST_HALF_POWER = 0.5  # share of a sample of hold in the latency
+START = {
+    "coil_time_constant_s": 1e-4,
+    "exciter_damping_n_s_m": 20.0,
+    "suspension_stiffness_n_m": 6000.0,
+    "stinger_stiffness_n_m": 5e6,
+}
+"""Values of a shaker for modal tests (PHYSICS of the shipped benches), for what is not measured; a factor of two either way."""
+LINES = 400  # lines at which a rig is fitted
+SMOOTHED = 15  # lines over which variances are averaged: those of a few realisations scatter by themselves
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """What is known of a rig."""
+
+    linear: LinearKnowledge
+    """The linear rig."""
+    noise_rms: Mapping[str, float]
+    """Noise of the channels that were listened to, RMS in the channel's unit."""
+    lead_samples: float | None
+    """Samples from an output to the input that shows it, block included; None if it was not measured."""
+    shape_measured: bool
+    """Whether the drive point's mode shape comes from a measurement, and not from the bench."""
+    mode: NonlinearMode | None
+    """Measured frequency and damping over the amplitude."""
+    sources: tuple[str, ...]
+    """Where the knowledge comes from, one line each."""
+
+
+@dataclass
+class _Found:
+    """What has been gathered so far."""
+
+    responses: Responses | None = None
+    priors: dict[str, Prior] = field(default_factory=dict)
+    start: dict[str, float] = field(default_factory=dict)
+    noise: dict[str, float] = field(default_factory=dict)
+    lead: float | None = None
+    exciter: bool = False
+    shape: bool = False
+    mode: NonlinearMode | None = None
+    sources: list[str] = field(default_factory=list)
+
+
+def gathered(bench: Bench, plan: Plan, sources: Mapping[str, Any]) -> Knowledge:
+    """Gather what the plan's ``[plant]`` and the ``sources`` tell of a rig.
+
+    ``sources`` are objects by the name of their file: a `Recording` of ``rig tune``, ``rig check`` or any multisine, a
+    `ModalAnalysis` or `LinearModes`, an `Exciter`, a `NonlinearMode`. Raises `ConfigurationError` for anything else, and if
+    nothing tells of exciter and structure.
+    """
+    found = _Found()
+    for name, source in sources.items():
+        _take(found, bench, name, source)
+    plant = plan.known_plant
+    if found.responses is None and plant is not None:
+        _plant(found, bench, plant, _ratios(plan, bench))
+    if found.responses is None and not (found.exciter and found.shape):
+        raise ConfigurationError(
+            f"`from`: nothing tells of the exciter and the structure of the bench {bench.name}: give a recording of `rig tune` "
+            "or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a virtual bench may rehearse by "
+            "itself with `exact`"
+        )
+    channels = [channel.name for channel in bench.channels if channel.role == "response"]
+    facts = bench.specimen
+    start = {
+        "frequency_hz": facts.linear_frequency_hz,
+        "drive_shape": abs(facts.drive_mode_shape) if facts.drive_mode_shape is not None else 1.0,
+        "force_per_volt_n_v": 1.0,
+        "moving_mass_kg": 0.2,
+        **START,
+        **found.start,
+    }
+    return Knowledge(
+        linear=known_rig(channels, start, found.priors, found.responses),
+        noise_rms=found.noise,
+        lead_samples=found.lead,
+        shape_measured=found.shape,
+        mode=found.mode,
+        sources=tuple(found.sources),
+    )
+
+
+def _take(found: _Found, bench: Bench, name: str, source: Any) -> None:
+    if isinstance(source, Recording):
+        _recording(found, bench, name, source)
+    elif isinstance(source, ModalAnalysis | LinearModes):
+        _linear_modes(found, bench, name, source.modes if isinstance(source, ModalAnalysis) else source)
+    elif isinstance(source, Exciter):
+        _exciter(found, name, source)
+    elif isinstance(source, NonlinearMode):
+        found.mode = source
+        found.sources.append(f"{name}: frequency and damping over the amplitude, {source.amplitude_m.size} levels")
+    else:
+        raise ConfigurationError(
+            f"`from` = {name}: holds a {type(source).__name__}; allowed are a recording of a multisine, linear modes, an "
+            "exciter, a nonlinear mode"
+        )
+
+
+def _recording(found: _Found, bench: Bench, name: str, recording: Recording) -> None:
+    if recording.kind != "multisine":
+        raise ConfigurationError(f"`from` = {name}: is a recording of kind {recording.kind}; allowed is a multisine")
+    by_level = spectra(recording)
+    level = list(by_level)[-1]
+    measured = by_level[level]
+    names = _names(bench)
+    if missing := [one for one in names if one not in [channel.name for channel in measured.channels]]:
+        raise ConfigurationError(f"`from` = {name}: has no channel {missing[0]!r} of the bench {bench.name}")
+    matrix = best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
+    inside = _inside(bench, matrix.frequency_hz)
+    found.responses = _thinned(
+        Responses(matrix.frequency_hz[inside], matrix.value[inside, :, 0], _std(matrix)[inside], bench.sample_rate_hz)
+    )
+    step = float(np.diff(measured.frequency_hz).mean())
+    for one in names:
+        density = 0.5 * float(np.mean(measured.noise_variance[:, measured.index(one)])) / step
+        found.noise[one] = float(np.sqrt(0.5 * density * bench.sample_rate_hz))
+    lead = recording.parts[-1].information.get("about", {}).get("lead_samples")
+    found.lead = None if lead is None else float(lead)
+    found.shape = True
+    _start_from(found, bench, found.responses)
+    found.sources.append(f"{name}: responses to a multisine of {level:.3g} V RMS, {int(inside.sum())} lines")
+
+
+def _names(bench: Bench) -> list[str]:
+    return [c.name for role in ("force", "drive", "response") for c in bench.channels if c.role == role]
+
+
+def _inside(bench: Bench, frequency_hz: Real) -> NDArray[np.bool_]:
+    linear = bench.specimen.linear_frequency_hz
+    return np.asarray((frequency_hz > BAND[0] * linear) & (frequency_hz < BAND[1] * linear))
+
+
+def _std(matrix: FrequencyResponseMatrix) -> Real:
+    total, noise = matrix.total_std[:, :, 0], matrix.noise_std[:, :, 0]
+    variance = np.nan_to_num(np.where(np.isfinite(total), total, noise)) ** 2
+    return np.asarray(np.sqrt(uniform_filter1d(variance, SMOOTHED, axis=0, mode="nearest")))
+
+
+def _thinned(responses: Responses) -> Responses:
+    """Keep at most `LINES` lines: half of them the nearest to the mode, the others spread over the band."""
+    frequency = responses.frequency_hz
+    if frequency.size <= LINES:
+        return responses
+    mode = int(np.argmax(np.abs(responses.value[:, 1] / responses.value[:, 0])))
+    near = np.argsort(np.abs(frequency - frequency[mode]))[: LINES // 2]
+    far = np.linspace(0, frequency.size - 1, LINES // 2).round().astype(int)
+    kept = np.union1d(near, far)
+    return replace(responses, frequency_hz=frequency[kept], value=responses.value[kept], std=responses.std[kept])
+
+
+def _start_from(found: _Found, bench: Bench, responses: Responses) -> None:
+    """Take start values from a fit of the plant, which needs none."""
+    try:
+        plant = PlantModel.from_frequency_responses(
+            responses.frequency_hz,
+            responses.value[:, 0],
+            responses.value[:, 1],
+            sample_rate_hz=bench.sample_rate_hz,
+            latency_samples=0.0,
+        )
+    except ValueError as error:
+        raise ConfigurationError(
+            f"`from`: the responses of the bench {bench.name} show no mode near {bench.specimen.linear_frequency_hz:g} Hz: "
+            f"{error}"
+        ) from None
+    _plant_start(found, plant)
+
+
+def _plant_start(found: _Found, plant: PlantModel) -> None:
+    """Take start values from a plant: its polynomials are products of the exciter's parameters."""
+    alpha, beta, w = plant.force_v_n, plant.acceleration_v_s2_m, plant.centre_rad_s
+    per_volt = 1.0 / alpha[0] if alpha[0] > 0.0 else 1.0 / plant.volts_per_newton()
+    start = {"frequency_hz": plant.frequency_rad_s / (2.0 * np.pi), "damping_ratio": plant.damping_ratio}
+    start |= {"drive_shape": plant.drive_shape, "force_per_volt_n_v": per_volt}
+    coil_s = alpha[1] * per_volt / w
+    start["coil_time_constant_s"] = coil_s if 1e-6 < coil_s < 1e-2 else START["coil_time_constant_s"]
+    start["moving_mass_kg"] = float(np.clip(beta[2] * per_volt, 0.02 / plant.drive_shape**2, 1e3))
+    start["suspension_stiffness_n_m"] = float(np.clip(beta[0] * w**2 * per_volt, 10.0, 1e7))
+    start["exciter_damping_n_s_m"] = float(np.clip(beta[1] * w * per_volt, 0.1, 1e5))
+    found.start |= start
+
+
+def _plant(found: _Found, bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> None:
+    """Take the plant that the plan has measured, as responses as uncertain as its misfit."""
+    low, high = (max(plant.band_hz[0], BAND[0] * bench.specimen.linear_frequency_hz), plant.band_hz[1])
+    frequency = np.linspace(low, high, LINES)
+    s = 2j * np.pi * frequency
+    force, drive = plant.force_per_v(s), plant.acceleration_per_v(s)
+    others = [drive * ratios.get(name, 1.0) for name in _names(bench)[2:]]
+    value = np.stack([force, drive, *others], axis=1) * np.sinc(frequency / bench.sample_rate_hz)[:, None]
+    rms = np.sqrt(np.mean(np.abs(value) ** 2, axis=0))
+    std = np.broadcast_to(max(plant.fit_error, 1e-3) * rms, value.shape).copy()
+    for column, name in enumerate(_names(bench)[2:], 2):
+        if name not in ratios:
+            std[:, column] = 2.0 * rms[column]
+    found.responses = Responses(frequency, value, std, bench.sample_rate_hz)
+    found.lead = plant.latency_samples
+    found.shape = True
+    _plant_start(found, plant)
+    found.sources.append(f"the plan's [plant]: {low:.4g} to {high:.4g} Hz, within {100.0 * plant.fit_error:.2g} %")
+
+
+def _ratios(plan: Plan, bench: Bench) -> Mapping[str, float]:
+    ratios = getattr(plan, "ratios_to_drive", None)
+    return bench.response_ratios if ratios is None else ratios(bench)
+
+
+def _linear_modes(found: _Found, bench: Bench, name: str, modes: LinearModes) -> None:
+    """Take frequency, damping and shape of the tested mode, with their standard errors."""
+    tested = int(np.argmin(np.abs(modes.frequency_hz - bench.specimen.linear_frequency_hz)))
+    drive = next(i for i, channel in enumerate(modes.channels) if channel.role == "drive")
+    facts = {
+        "frequency_hz": (modes.frequency_hz[tested], modes.frequency_std_hz[tested], 1e-3),
+        "damping_ratio": (modes.damping_ratio[tested], modes.damping_ratio_std[tested], 0.2),
+        "drive_shape": (modes.shapes[drive, tested], modes.shapes_std[drive, tested], 0.1),
+    }
+    for key, (value, std, otherwise) in facts.items():
+        relative = float(std / abs(value)) if np.isfinite(std) and std > 0.0 else otherwise
+        found.priors[key] = Prior(abs(float(value)), max(relative, 1e-5))
+        found.start[key] = abs(float(value))
+    for row, channel in enumerate(modes.channels):
+        if row != drive:
+            ratio = float(modes.shapes[row, tested] / modes.shapes[drive, tested])
+            found.priors[f"ratio {channel.name}"] = Prior(ratio, max(0.02 * abs(ratio), 1e-4))
+    found.shape = True
+    found.sources.append(f"{name}: mode {tested + 1} of {modes.frequency_hz.size} at {modes.frequency_hz[tested]:.5g} Hz")
+
+
+def _exciter(found: _Found, name: str, exciter: Exciter) -> None:
+    """Take the exciter's parameters, with their standard errors."""
+    std = exciter.std
+    damping, damping_std = exciter.damping_n_s_m
+    values = {
+        "force_per_volt_n_v": (abs(exciter.force_per_volt_n_v), std["force_per_volt_n_v"]),
+        "coil_time_constant_s": (exciter.coil_time_constant_s, std["coil_time_constant_s"]),
+        "moving_mass_kg": (exciter.moving_mass_kg, std["moving_mass_kg"]),
+        "exciter_damping_n_s_m": (damping, damping_std),
+        "suspension_stiffness_n_m": (exciter.suspension_stiffness_n_m, std["suspension_stiffness_n_m"]),
+    }
+    for key, (value, error) in values.items():
+        if value > 0.0:
+            relative = error / value if np.isfinite(error) and error > 0.0 else 0.02
+            found.priors[key] = Prior(float(value), float(np.clip(relative, 1e-4, 1.0)))
+            found.start[key] = float(value)
+    found.exciter = True
+    found.sources.append(f"{name}: exciter, {exciter.lowest_hz:.4g} to {exciter.highest_hz:.4g} Hz")

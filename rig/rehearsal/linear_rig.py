@@ -1,0 +1,273 @@
+"""The linear rig near one mode in physical parameters, fitted to measured responses together with what is known beforehand.
+
+The structure has the mode under test, modes beside it where the responses show them, and one mode far below and one far above
+for what the others contribute. Shaker, amplifier and stinger are those of `identification.Exciter`::
+
+    (1 + Z r) F = g_e V - Z A / s^2,    Z = s^2 m + s c + k + s b / (1 + s tau),    g_e = g / (1 + s tau),    r = 1 / k_s.
+
+The voltage is the number given to a converter that holds it, the inputs pass an AC coupling, as in
+`identification.prediction.exciter.VoltagePath`. Suspension damping c and back-EMF b are told apart by the coil alone, so they are one parameter here, half of it each.
+
+Every parameter has a prior, wide for what nobody knows; it bounds the directions that the data do not determine. With the
+Jacobian J of the residuals over their standard deviations, prior included, the covariance is ``s^2 (J^T J)^-1`` (Tarantola,
+Inverse Problem Theory, SIAM 2005, section 3.2), where s^2 is the misfit over its expectation if that is above 1.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import ConfigurationError
+
+__all__ = ["LinearKnowledge", "LinearRig", "Prior", "Responses", "known_rig"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+LOW, HIGH, FLOOR_DAMPING = 0.05, 2.0, 0.005  # frequencies of the far modes over the ends of the band; their damping
+UNEXPLAINED = 4.0  # misfit over its expectation above which a further mode is looked for
+EXPLAINED = 0.5  # of that misfit must be left, or less, for the mode to be kept
+MOST_BESIDE = 3
+MODEL_FLOOR = 2e-3  # of a response: smallest standard deviation that is believed
+EXCITER = (
+    "force_per_volt_n_v",
+    "coil_time_constant_s",
+    "moving_mass_kg",
+    "exciter_damping_n_s_m",
+    "suspension_stiffness_n_m",
+    "stinger_stiffness_n_m",
+)
+MODE = ("frequency_hz", "damping_ratio", "drive_shape")
+COUPLING_HZ = 0.3  # AC coupling of common conditioners
+WIDE = 0.7  # standard deviation of the logarithm of what nobody has measured: a factor of two either way
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of a parameter: its value and the standard deviation of its logarithm."""
+
+    value: float
+    log_std: float
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """Measured responses to the voltage."""
+
+    frequency_hz: Real
+    """Lines [n]."""
+    value: Complex
+    """Force (N/V), acceleration of the drive point and of every response channel (m/s^2/V) [n, 2 + responses]."""
+    std: Real
+    """Standard deviations [n, 2 + responses]."""
+    sample_rate_hz: float
+    """Sample rate of the hold of the output; the voltage is the number given to the converter."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearRig:
+    """One linear rig: parameters by name."""
+
+    values: Mapping[str, float]
+    """Parameters. Modes beside the tested one have their number behind the name, the far ones ``low`` and ``high``."""
+    channels: tuple[str, ...]
+    """Response channels; the shape of mode ``x`` at a channel over that at the drive point is ``ratio <channel> x``."""
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """Ends of the names of the modes; that of the tested mode is empty."""
+        return tuple(name.removeprefix("frequency_hz").strip() for name in self.values if name.startswith("frequency_hz"))
+
+    def of(self, name: str, mode: str = "") -> float:
+        """Return a parameter of a mode."""
+        return self.values[f"{name} {mode}".strip()]
+
+    def receptances(self, s: Complex) -> Complex:
+        """Displacement per force at drive point and response channels, m/N [1 + responses, n]."""
+        out = np.zeros((1 + len(self.channels), s.size), np.complex128)
+        for mode in self.modes:
+            omega = 2.0 * np.pi * self.of("frequency_hz", mode)
+            shape = self.of("drive_shape", mode)
+            pole = s**2 + 2.0 * self.of("damping_ratio", mode) * omega * s + omega**2
+            ratios = np.array([1.0, *(self.of(f"ratio {name}", mode) for name in self.channels)])
+            out += shape**2 * ratios[:, None] / pole
+        return out
+
+    def force_per_v(self, s: Complex, receptance: Complex) -> Complex:
+        """Force per volt at the amplifier, N/V, where the drive point has this receptance (m/N)."""
+        v = self.values
+        lag = 1.0 + s * v["coil_time_constant_s"]
+        half = 0.5 * v["exciter_damping_n_s_m"]
+        stiffness = s**2 * v["moving_mass_kg"] + s * half * (1.0 + 1.0 / lag) + v["suspension_stiffness_n_m"]
+        return v["force_per_volt_n_v"] / lag / (1.0 + stiffness * (receptance + 1.0 / v["stinger_stiffness_n_m"]))
+
+    def responses(self, frequency_hz: Real, sample_rate_hz: float) -> Complex:
+        """Responses as `Responses.value` has them."""
+        s: Complex = 2j * np.pi * np.asarray(frequency_hz, np.complex128)
+        receptances = self.receptances(s)
+        late = np.sinc(frequency_hz / sample_rate_hz) * np.exp(-s * self.values["delay_s"])
+        late *= s / (s + 2.0 * np.pi * self.values["coupling_hz"])
+        force = self.force_per_v(s, receptances[0]) * late
+        return np.asarray(np.vstack([force, s**2 * receptances * force]).T)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearKnowledge:
+    """What is known of the linear rig: the most likely parameters and their covariance."""
+
+    names: tuple[str, ...]
+    """Names of the parameters, in the order of ``mean``."""
+    positive: NDArray[np.bool_]
+    """Which of them are logarithms [p]."""
+    mean: Real
+    """Most likely values [p]."""
+    covariance: Real
+    """Covariance [p, p]."""
+    channels: tuple[str, ...]
+    """Response channels."""
+    misfit: float
+    """Relative misfit of the responses, root mean square; NaN without responses."""
+    inflation: float
+    """Squared misfit over its expectation, by which the data's covariance is multiplied where it is above 1."""
+    determined: float
+    """Share of the parameters' directions whose standard deviation the data have at least halved."""
+
+    def rig(self, x: Real | None = None) -> LinearRig:
+        """Return the rig of a parameter vector [p]; by default the most likely one."""
+        vector = self.mean if x is None else x
+        values = np.where(self.positive, np.exp(np.where(self.positive, vector, 0.0)), vector)
+        return LinearRig(dict(zip(self.names, values.tolist(), strict=True)), self.channels)
+
+    def std(self, name: str) -> float:
+        """Standard deviation of a parameter, relative where it is positive."""
+        index = self.names.index(name)
+        return float(np.sqrt(self.covariance[index, index]))
+
+    def draw(self, generator: np.random.Generator) -> LinearRig:
+        """Draw a rig from the joint distribution."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        spread = vectors * np.sqrt(np.maximum(values, 0.0))
+        return self.rig(self.mean + spread @ generator.standard_normal(self.mean.size))
+
+
+class _Parameters:
+    """Names, start values and priors of a fit."""
+
+    def __init__(self, channels: Sequence[str], priors: Mapping[str, Prior]) -> None:
+        self.channels, self.priors = tuple(channels), dict(priors)
+        self.names: list[str] = []
+        self.positive: list[bool] = []
+        self.centre: list[float] = []
+        self.std: list[float] = []
+
+    def log(self, name: str, value: float, log_std: float = WIDE) -> None:
+        """Add a positive parameter."""
+        known = self.priors.get(name, Prior(value, log_std))
+        self._add(name, True, float(np.log(known.value)), known.log_std)
+
+    def plain(self, name: str, value: float, std: float) -> None:
+        """Add a parameter of any sign."""
+        known = self.priors.get(name)
+        self._add(name, False, value if known is None else known.value, std if known is None else known.log_std)
+
+    def _add(self, name: str, positive: bool, centre: float, std: float) -> None:
+        self.names.append(name)
+        self.positive.append(positive)
+        self.centre.append(centre)
+        self.std.append(std)
+
+    def mode(self, mode: str, frequency_hz: float, shape: float, *, log_std: tuple[float, float, float]) -> None:
+        """Add a mode; ``log_std``: of frequency, damping ratio and drive shape."""
+        end = f" {mode}" if mode else ""
+        self.log(f"frequency_hz{end}", frequency_hz, log_std[0])
+        self.log(f"damping_ratio{end}", FLOOR_DAMPING, log_std[1])
+        self.log(f"drive_shape{end}", shape, log_std[2])
+        for name in self.channels:
+            self.plain(f"ratio {name}{end}", 0.0 if mode else 1.0, 2.0)
+
+
+def known_rig(
+    channels: Sequence[str], start: Mapping[str, float], priors: Mapping[str, Prior], responses: Responses | None
+) -> LinearKnowledge:
+    """Return what responses and priors together say of a rig.
+
+    ``channels`` are the names of the response channels. ``start`` has the start values of `EXCITER` and `MODE`; ``priors`` what
+    is known beforehand, by name. Raises `ConfigurationError` if the responses are not those of such a rig.
+    """
+    beside: list[float] = []
+    while True:
+        found, worst_hz = _fitted(_parameters(channels, start, priors, responses, beside), responses)
+        if responses is None or found.inflation <= UNEXPLAINED or len(beside) == MOST_BESIDE:
+            return found
+        beside.append(worst_hz)
+        better, _ = _fitted(_parameters(channels, start, priors, responses, beside), responses)
+        if better.inflation > EXPLAINED * found.inflation:
+            return found
+
+
+def _parameters(
+    channels: Sequence[str],
+    start: Mapping[str, float],
+    priors: Mapping[str, Prior],
+    responses: Responses | None,
+    beside: Sequence[float],
+) -> _Parameters:
+    out = _Parameters(channels, priors)
+    shape, hertz = start["drive_shape"], start["frequency_hz"]
+    out.mode("", hertz, shape, log_std=(0.1, 1.5, WIDE))
+    out.centre[1] = np.log(start.get("damping_ratio", FLOOR_DAMPING)) if "damping_ratio" not in priors else out.centre[1]
+    for name in EXCITER:
+        out.log(name, start[name])
+    rate = 5000.0 if responses is None else responses.sample_rate_hz
+    out.plain("delay_s", 0.0, 2.0 / rate)
+    out.log("coupling_hz", COUPLING_HZ)
+    lowest, highest = (0.4 * hertz, 2.5 * hertz) if responses is None else responses.frequency_hz[[0, -1]]
+    out.mode("low", LOW * float(lowest), 0.1 * shape, log_std=(1e-3, 1e-3, 2.0))
+    out.mode("high", HIGH * float(highest), shape, log_std=(0.5, 1e-3, 2.0))
+    for number, line_hz in enumerate(beside, 2):
+        out.mode(str(number), line_hz, 0.3 * shape, log_std=(0.1, 1.5, 2.0))
+    return out
+
+
+def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[LinearKnowledge, float]:
+    """Return the fit, and the line (Hz) that fits worst."""
+    from scipy.optimize import least_squares
+
+    centre, std = np.array(parameters.centre), np.array(parameters.std)
+    positive = np.array(parameters.positive)
+    names, channels = tuple(parameters.names), parameters.channels
+    prior = np.diag(std**2)
+
+    def knowledge(x: Real, covariance: Real, *quality: float) -> LinearKnowledge:
+        return LinearKnowledge(names, positive, x, covariance, channels, *quality)
+
+    if responses is None:
+        return knowledge(centre, prior, float("nan"), 1.0, 0.0), 0.0
+    scale = np.sqrt(np.mean(np.abs(responses.value) ** 2, axis=0))
+    sigma = np.sqrt(responses.std**2 + (MODEL_FLOOR * np.abs(responses.value)) ** 2 + (0.2 * MODEL_FLOOR * scale) ** 2)
+
+    def misses(x: Real) -> Complex:
+        model = knowledge(x, prior, 0.0, 1.0, 0.0).rig().responses(responses.frequency_hz, responses.sample_rate_hz)
+        return np.asarray(model - responses.value)
+
+    def residuals(x: Real) -> Real:
+        error = (misses(x) / sigma).ravel()
+        return np.concatenate([error.real, error.imag, (x - centre) / std])
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = least_squares(residuals, centre, x_scale=std, method="trf", max_nfev=100, ftol=1e-7, xtol=1e-7)
+    if not np.all(np.isfinite(found.fun)):
+        raise ConfigurationError("the responses are not those of a shaker, a stinger and a structure near one mode")
+    error = misses(found.x)
+    expected = max(2 * error.size - centre.size, 1)
+    inflation = float(np.sum(np.abs(error / sigma) ** 2)) / expected
+    data = found.jac[: 2 * error.size] / np.sqrt(max(1.0, inflation))
+    covariance = np.linalg.inv(data.T @ data + np.diag(std**-2.0))
+    whitened = covariance / np.outer(std, std)
+    determined = float(np.mean(np.linalg.eigvalsh(whitened) < 0.25))
+    relative = np.abs(error) / scale
+    worst = responses.frequency_hz[int(np.argmax(relative[:, 1]))]
+    misfit = float(np.sqrt(np.mean(relative**2)))
+    return knowledge(found.x, covariance, misfit, inflation, determined), float(worst)

@@ -1,0 +1,242 @@
+"""One trial of a rehearsal: the plan on one virtual rig, by the same runner, loop and evaluation as a test."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from rig.arming.run_options import Silent
+from rig.bench import Bench
+from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.kinds import KINDS
+from rig.campaigns.planning.plan import Plan
+from rig.campaigns.running.execution import Execution
+from rig.errors import RigError
+from rig.loop.session import open_session
+from rig.tick.tick import TickSettings
+
+__all__ = ["Trial", "TrialPoint", "run_trial"]
+
+REFUSED = "REFUSED"
+"""End of a trial whose plan the bench refuses before anything moves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialPoint:
+    """One point of the plan as a trial measured it."""
+
+    number: int
+    """Number in the plan, from 0."""
+    level: float
+    """Level in the plan's unit."""
+    quality: str
+    """Quality of the point (`rig.campaigns.evaluation.point.Quality`)."""
+    reason: str
+    """Why it is not accepted; empty if it is."""
+    frequency_hz: float = np.nan
+    """Frequency of the vibration, Hz."""
+    force_n: float = np.nan
+    """Peak of the force's fundamental, N."""
+    amplitude_m: float = np.nan
+    """Peak of the drive point's fundamental displacement, m."""
+    voltage_v: float = np.nan
+    """Amplitude of the output, V."""
+    modal_frequency_hz: float = np.nan
+    """Frequency at phase resonance, Hz."""
+    damping_ratio: float = np.nan
+    """Modal damping ratio as reported."""
+    frequency_std_hz: float = np.nan
+    """Its standard error as reported, Hz."""
+    damping_ratio_std: float = np.nan
+    """Its standard error as reported."""
+    phase_error_deg: float = np.nan
+    """Wanted minus measured lag, deg."""
+    settle_periods: float = np.nan
+    """Periods until it settled or failed."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the point is used."""
+        return self.quality in ("good", "warned")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """How the plan ended on one rig."""
+
+    end: str
+    """Name of the `rig.tick.safety.layout.EndReason`, or ``REFUSED`` if the bench refuses the plan."""
+    text: str
+    """The same in a sentence."""
+    tripped: bool
+    """Whether the run tripped."""
+    completed: bool
+    """Whether every point was accepted."""
+    channel: str
+    """Channel of a trip; empty for none."""
+    level: float
+    """Level at which it tripped; NaN otherwise."""
+    duration_s: float
+    """Time on the rig, s."""
+    shares: Mapping[str, float]
+    """Largest value over its limit, by limit: ``voltage``, ``force``, and acceleration, displacement and range of every channel."""
+    points: tuple[TrialPoint, ...]
+    """Points that were measured or failed, in the order of measurement."""
+
+    @property
+    def lost_lock(self) -> bool:
+        """Whether the lock was lost, or never gained, at any point."""
+        lost = {"lost-lock", "not-locked", "outside-window"}
+        return self.end in ("LOST_LOCK", "NO_LOCK", "NO_LOCK_IN_WINDOW") or any(p.quality in lost for p in self.points)
+
+
+class _Peaks:
+    """Largest value of every limited quantity over a run."""
+
+    def __init__(self, bench: Bench, limits: np.ndarray) -> None:
+        self.bench = bench
+        self.moving = [i for i, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
+        gain, keep = float(limits["integrator_gain"][0]), 1.0 - float(limits["integrator_leak"][0])
+        self.numerator, self.denominator = [gain**2], [1.0, -2.0 * keep, keep**2]
+        self.state = np.zeros((2, len(self.moving)))
+        self.inputs = np.zeros(len(bench.channels))
+        self.moved_m = np.zeros(len(self.moving))
+        self.output_v = 0.0
+
+    def take(self, rows: np.ndarray) -> None:
+        """Take note of a chunk of rows. The displacement is integrated as the tick does (`rig.tick.safety.kernels`)."""
+        inputs = np.nan_to_num(rows["inputs"].astype(float))
+        self.inputs = np.maximum(self.inputs, np.abs(inputs).max(axis=0))
+        self.output_v = max(self.output_v, float(np.abs(rows["output_v"]).max()))
+        moved, self.state = lfilter(
+            self.numerator, self.denominator, inputs[:, self.moving], axis=0, zi=self.state
+        )
+        self.moved_m = np.maximum(self.moved_m, np.abs(moved).max(axis=0))
+
+    def shares(self) -> dict[str, float]:
+        """Return every peak over its limit."""
+        limits, channels = self.bench.limits, self.bench.channels
+        out = {"voltage": self.output_v / limits.voltage_v}
+        for i, channel in enumerate(channels):
+            if channel.role == "monitor":
+                continue
+            limit = limits.force_n if channel.role == "force" else limits.acceleration_m_s2
+            quantity = "force" if channel.role == "force" else "acceleration"
+            out[f"{quantity} {channel.name}"] = float(self.inputs[i]) / limit
+            out[f"range {channel.name}"] = float(self.inputs[i]) / channel.range_in_unit
+        for i, moved in zip(self.moving, self.moved_m, strict=True):
+            out[f"displacement {channels[i].name}"] = float(moved) / limits.displacement_m
+        return out
+
+
+class _Notebook:
+    """Takes what a run would write to its journal, and keeps the points and the end."""
+
+    def __init__(self) -> None:
+        self.points: list[Mapping[str, Any]] = []
+        self.ended: Mapping[str, Any] = {}
+        self.peaks: _Peaks | None = None
+
+    def part(self, information: Mapping[str, Any]) -> None:
+        """Take note of the beginning of the run."""
+
+    def rows(self, rows: np.ndarray) -> None:
+        """Take note of telemetry rows."""
+        if self.peaks is not None and rows.size:
+            self.peaks.take(rows)
+
+    def event(self, event: Mapping[str, Any]) -> None:
+        """Take note of an event."""
+
+    def point(self, point: Mapping[str, Any]) -> None:
+        """Take note of a point."""
+        self.points.append(point)
+
+    def end(self, end: Mapping[str, Any]) -> None:
+        """Take note of the end of the run."""
+        self.ended = end
+
+
+def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
+    """Run a plan on a virtual bench and return how it ended. Nothing is written to a disk.
+
+    A plan that the bench refuses is a result too, with ``end`` = ``REFUSED``.
+    """
+    try:
+        plan.check(bench)
+    except RigError as error:
+        return _refused(str(error))
+    notes = _Notebook()
+    with open_session(bench, seed) as session:
+        settings = TickSettings(
+            bench,
+            plan.law,
+            plan.amplitude_law,
+            plan.settle_rule,
+            plan.segments(bench.sample_rate_hz),
+            plan.waveforms(bench.sample_rate_hz),
+            plan.known_plant,
+        )
+        loop = session.start(settings)
+        notes.peaks = _Peaks(bench, loop.tick.arrays.limits)
+        execution = Execution(plan, bench, loop, notes, Silent())
+        execution.go({})
+        samples, channel = loop.statistics.samples, int(loop.tick.guard["channel"][0])
+    end = notes.ended
+    at = end.get("tripped_at")
+    tripped = bool(end["tripped"])
+    return Trial(
+        end=str(end["reason"]).upper(),
+        text=str(end["text"]),
+        tripped=tripped,
+        completed=bool(end["completed"]),
+        channel=bench.channels[channel].name if tripped and channel >= 0 else "",
+        level=float(at["level"]) if at else float("nan"),
+        duration_s=samples / bench.sample_rate_hz,
+        shares=notes.peaks.shares(),
+        points=tuple(_points(plan, notes.points)),
+    )
+
+
+def _refused(text: str) -> Trial:
+    nothing: dict[str, float] = {}
+    return Trial(
+        end=REFUSED,
+        text=text,
+        tripped=False,
+        completed=False,
+        channel="",
+        level=float("nan"),
+        duration_s=0.0,
+        shares=nothing,
+        points=(),
+    )
+
+
+def _points(plan: Plan, stored: Sequence[Mapping[str, Any]]) -> list[TrialPoint]:
+    result: type[Any] = KINDS[plan.kind].result
+    return [_point(point_from(table, result)) for table in stored]
+
+
+def _point(point: Point[Any]) -> TrialPoint:
+    found: dict[str, float | None] = {"settle_periods": point.settle_periods}
+    if point.vibration is not None:
+        for name in ("frequency_hz", "force_n", "amplitude_m", "voltage_v"):
+            found[name] = getattr(point.vibration, name)
+    if point.modal is not None:
+        found["modal_frequency_hz"] = point.modal.modal_frequency_hz
+        found["frequency_std_hz"] = point.modal.modal_frequency_std_hz
+        found["damping_ratio"] = point.modal.damping_ratio
+        found["damping_ratio_std"] = point.modal.damping_ratio_std
+    if point.lock is not None:
+        found["phase_error_deg"] = point.lock.phase_error_deg
+    return TrialPoint(
+        number=point.number,
+        level=point.level,
+        quality=str(point.quality),
+        reason=point.reason,
+        **{name: float(value) for name, value in found.items() if value is not None},
+    )
