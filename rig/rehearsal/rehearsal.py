@@ -1,0 +1,231 @@
+"""A rehearsal: the plan on many twins, in parallel, resumable, with a journal of the draws."""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, fields
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import vibrolock
+from rig.bench import Bench
+from rig.campaigns.planning.plan import Plan
+from rig.errors import ConfigurationError, RecordingError
+from rig.rehearsal.hypotheses import Hypotheses
+from rig.rehearsal.knowledge import Knowledge
+from rig.rehearsal.trial import Trial, TrialPoint, run_trial
+from rig.rehearsal.truth import TrueBackbone, true_backbone
+from rig.rehearsal.twins import Twin, draw_twin, exact_twin
+from simulators.ensemble import ensemble
+
+__all__ = ["Draw", "Rehearsal", "RehearsalRequest", "draws_path", "rehearse", "tested_digest"]
+
+MOST_DRAWS = 100_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draw:
+    """One twin and how the plan ended on it."""
+
+    number: int
+    """Number, from 0."""
+    unknowns: Mapping[str, float]
+    """What was drawn, by name."""
+    trial: Trial
+    """How the plan ended."""
+    truth: TrueBackbone
+    """What harmonic balance of the twin finds."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RehearsalRequest:
+    """What is to be rehearsed.
+
+    Raises `ConfigurationError` for values that are not allowed.
+    """
+
+    plan: Plan
+    """The plan."""
+    bench: Bench
+    """The bench."""
+    knowledge: Knowledge | None = None
+    """What is known of the rig; None rehearses a virtual bench on itself."""
+    hypotheses: Hypotheses = field(default_factory=Hypotheses)
+    """What is assumed of everything else."""
+    draws: int = 200
+    """Number of twins."""
+    seed: int = 0
+    """Seed of the draws."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.draws <= MOST_DRAWS:
+            raise ConfigurationError(f"`draws` = {self.draws}: allowed is 1 to {MOST_DRAWS}")
+        if self.seed < 0:
+            raise ConfigurationError(f"`seed` = {self.seed}: allowed is 0 or more")
+        self.plan.check(self.bench)
+
+    def twin(self, number: int) -> Twin:
+        """Return the twin of a number."""
+        if self.knowledge is None:
+            return exact_twin(self.bench, self.seed + number)
+        return draw_twin(self.bench, self.plan, self.knowledge, self.hypotheses, self.seed, number)
+
+    def __call__(self, number: int) -> Draw:
+        """Draw a twin and run the plan on it."""
+        twin = self.twin(number)
+        trial = run_trial(self.plan, twin.bench, twin.number)
+        truth = true_backbone(twin.bench, trial, twin.number)
+        return Draw(number=number, unknowns=twin.unknowns, trial=trial, truth=truth)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Everything that the draws depend on, as plain data; the number of draws is not among it."""
+        known = self.knowledge
+        return {
+            "plan": self.plan.model_dump(mode="json"),
+            "bench": self.bench.model_dump(mode="json"),
+            "hypotheses": None if known is None else self.hypotheses.model_dump(mode="json"),
+            "sources": [] if known is None else list(known.sources),
+            "most_likely": {} if known is None else dict(known.linear.rig().values),
+            "relative_std": {} if known is None else {name: known.linear.std(name) for name in known.linear.names},
+            "determined": None if known is None else known.linear.determined,
+            "seed": self.seed,
+            "software_version": vibrolock.__version__,
+        }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Rehearsal:
+    """The draws of a rehearsal and what they depend on."""
+
+    facts: Mapping[str, Any]
+    """`RehearsalRequest.facts`."""
+    draws: tuple[Draw, ...]
+    """The draws, by number."""
+    finished: str
+    """When it was finished, ISO 8601."""
+
+    @property
+    def digest(self) -> str:
+        """Digest of facts and draws, which a recording names."""
+        draws = [asdict(draw) for draw in self.draws]
+        return _digest({"facts": self.facts, "draws": draws})
+
+    @property
+    def tests(self) -> str:
+        """Digest of plan and bench (`tested_digest`)."""
+        return _digest({"plan": self.facts["plan"], "bench": self.facts["bench"]})
+
+
+def tested_digest(plan: Plan, bench: Bench) -> str:
+    """Digest of plan and bench: a rehearsal holds for these alone."""
+    return _digest({"plan": plan.model_dump(mode="json"), "bench": bench.model_dump(mode="json")})
+
+
+def _digest(facts: Any) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def draws_path(output: Path) -> Path:
+    """Return the journal of the draws beside the file of a rehearsal."""
+    return output.with_name(f"{output.name}.draws")
+
+
+def rehearse(
+    request: RehearsalRequest,
+    journal: Path | None = None,
+    *,
+    progress: Callable[[Draw, int], None] = lambda _draw, _done: None,
+    jobs: int | None = None,
+) -> Rehearsal:
+    """Run the plan on all twins and return what came of it.
+
+    With a ``journal`` every draw is written to it as it is done; a journal of the same rehearsal is taken up again, and it stays
+    until the caller removes it. ``progress`` is told of each draw and of the number done. ``jobs`` is as in joblib: None follows
+    `joblib.parallel_config`, so that a cluster is one line of the caller. Raises `RecordingError` for a journal of another
+    rehearsal, or one that cannot be written.
+    """
+    done = {} if journal is None else _begun(journal, request)
+    for count, draw in enumerate(done.values(), 1):
+        progress(draw, count)
+    missing = [number for number in range(request.draws) if number not in done]
+    for draw in _run(request, missing, jobs):
+        done[draw.number] = draw
+        if journal is not None:
+            _append(journal, asdict(draw))
+        progress(draw, len(done))
+    draws = tuple(done[number] for number in range(request.draws))
+    return Rehearsal(facts=request.facts, draws=draws, finished=datetime.now(UTC).isoformat(timespec="seconds"))
+
+
+def _run(request: RehearsalRequest, numbers: Sequence[int], jobs: int | None) -> Iterator[Draw]:
+    for _, draw in ensemble({str(number): number for number in numbers}, request, n_jobs=jobs):
+        yield draw
+
+
+def _begun(journal: Path, request: RehearsalRequest) -> dict[int, Draw]:
+    """Return the draws that a journal holds; begin it if it does not exist. A last line that was cut off is dropped."""
+    head = {"rehearsal": _digest(request.facts)}
+    if not journal.exists():
+        _append(journal, head)
+        return {}
+    try:
+        lines = journal.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{journal}: cannot be read ({error})") from None
+    tables = list(_whole_lines(lines))
+    if not tables or tables[0] != head:
+        raise RecordingError(
+            f"{journal}: holds the draws of another rehearsal (another plan, bench, knowledge, seed or version); "
+            "`overwrite` to begin anew"
+        )
+    if len(tables) < len(lines):
+        _write(journal, tables)
+    draws = [draw_from(table) for table in tables[1:]]
+    return {draw.number: draw for draw in draws if draw.number < request.draws}
+
+
+def _whole_lines(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+    for line in lines:
+        try:
+            yield json.loads(line)
+        except json.JSONDecodeError:
+            return
+
+
+def _write(journal: Path, tables: Sequence[Mapping[str, Any]]) -> None:
+    with suppress(OSError):
+        journal.unlink()
+    for table in tables:
+        _append(journal, table)
+
+
+def _append(journal: Path, table: Mapping[str, Any]) -> None:
+    try:
+        with journal.open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps(table) + "\n")
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        raise RecordingError(f"{journal}: cannot be written ({error.strerror}); the draws so far are in it") from None
+
+
+def draw_from(table: Mapping[str, Any]) -> Draw:
+    """Return the draw of a table made by `dataclasses.asdict`."""
+    trial = dict(table["trial"])
+    trial["points"] = tuple(TrialPoint(**_known(TrialPoint, point)) for point in trial["points"])
+    truth = {name: tuple(values) for name, values in table["truth"].items()}
+    return Draw(
+        number=int(table["number"]),
+        unknowns=dict(table["unknowns"]),
+        trial=Trial(**_known(Trial, trial)),
+        truth=TrueBackbone(**_known(TrueBackbone, truth)),
+    )
+
+
+def _known(kind: type[Any], table: Mapping[str, Any]) -> dict[str, Any]:
+    names = {one.name for one in fields(kind)}
+    return {name: value for name, value in table.items() if name in names}

@@ -1,0 +1,56 @@
+"""What a trial's points should have measured: phase resonance of its own rig by harmonic balance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.drivers.virtual import VirtualDAQ
+from rig.rehearsal.trial import Trial
+from simulators.analysis import NotConvergedError, phase_resonance_backbone
+
+__all__ = ["TrueBackbone", "true_backbone"]
+
+MOST_POINTS = 4
+HARMONICS = 9
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueBackbone:
+    """Modal properties of the rig at the amplitudes of some accepted points."""
+
+    numbers: tuple[int, ...]
+    """Numbers of the points."""
+    frequency_hz: tuple[float, ...]
+    """Frequencies at phase resonance, Hz."""
+    damping_ratio: tuple[float, ...]
+    """Damping ratios."""
+
+
+def true_backbone(bench: Bench, trial: Trial, seed: int = 0) -> TrueBackbone:
+    """Balance the rig at the amplitudes of up to four accepted points, the lowest and the highest included.
+
+    Empty if no point has modal properties or none converges.
+    """
+    measured = [p for p in trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
+    measured.sort(key=lambda point: point.amplitude_m)
+    picked = sorted({round(i) for i in np.linspace(0, len(measured) - 1, min(MOST_POINTS, len(measured)))})
+    points = [measured[i] for i in picked]
+    if not points:
+        return TrueBackbone(numbers=(), frequency_hz=(), damping_ratio=())
+    rig = VirtualDAQ(bench, seed).rig.realised(seed)
+    amplitudes = np.maximum.accumulate([p.amplitude_m for p in points]) * (1.0 + 1e-12 * np.arange(len(points)))
+    try:
+        found = phase_resonance_backbone(
+            rig, amplitudes_m=amplitudes, near_hz=points[0].modal_frequency_hz, harmonics=HARMONICS
+        )
+    except NotConvergedError as error:
+        if error.found is None:
+            return TrueBackbone(numbers=(), frequency_hz=(), damping_ratio=())
+        found = error.found
+    n = found.frequency_hz.size
+    return TrueBackbone(
+        numbers=tuple(p.number for p in points[:n]),
+        frequency_hz=tuple(found.modal_frequency_hz.tolist()),
+        damping_ratio=tuple(found.damping_ratio.tolist()),
+    )
