@@ -1,0 +1,256 @@
+"""What would help a plan: changes that are tried on the same twins, one at a time and then together."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.bench.configuration import merged
+from rig.campaigns.planning.levels import LEVELS
+from rig.campaigns.planning.plan import Plan
+from rig.campaigns.plans import plan_from
+from rig.errors import RigError
+from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest
+from simulators.ensemble import ensemble
+
+__all__ = ["Effect", "Improvement", "Remedy", "improve", "remedies_for"]
+
+Table = dict[str, Any]
+
+GAINS = (
+    "k1",
+    "k2",
+    "frequency_integral_per_s",
+    "response_integral_per_s",
+    "reference_integral_per_s",
+)
+MOST_EACH = 24  # draws that failed, and draws that ended well, on which a remedy is tried
+MOST_STEPS = 4
+WORTH = 0.02  # of the draws: rise of the score for which a remedy is taken
+TRIP_WEIGHT = 2.0  # a trip counts this many times a point that is missing
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A change of a plan."""
+
+    name: str
+    """What is changed, in a few words."""
+    changes: Table
+    """Keys of the plan with their new values."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a remedy did on the twins on which it was tried."""
+
+    name: str
+    """The remedy."""
+    changes: Table
+    """Keys of the plan with their new values."""
+    ends_well: tuple[float, float]
+    """Probability that the plan ends well, without and with it."""
+    trips: tuple[float, float]
+    """Probability of a trip, without and with it."""
+    draws: int
+    """Number of twins on which it was tried."""
+    taken: bool = False
+    """Whether it is part of the improved plan."""
+
+
+@dataclass(frozen=True, eq=False)
+class Improvement:
+    """An improved plan, and what was tried."""
+
+    plan: Plan
+    """The plan with all remedies that were taken; the given plan if none helped."""
+    changes: Table
+    """All changes together."""
+    effects: tuple[Effect, ...]
+    """Every remedy that was tried, in the order of trying."""
+
+
+def remedies_for(plan: Plan, bench: Bench, draws: Sequence[Draw]) -> list[Remedy]:
+    """Return the changes that may help this kind of plan on this bench."""
+    table = plan.model_dump(mode="json")
+    return list(_ramps(table)) + list(_windows(table, bench)) + list(_levels(plan, draws)) + list(_loops(table)) + list(
+        _patience(table)
+    )
+
+
+def _ramps(table: Table) -> Iterator[Remedy]:
+    if "ramp_periods" in table:
+        for times in (4.0, 16.0):
+            yield Remedy(f"ramps {times:g} times as long", {"ramp_periods": times * table["ramp_periods"]})
+    if table.get("on_lost_lock") == "stop" and "dwell" not in table["kind"]:
+        yield Remedy("a lost lock skips its point", {"on_lost_lock": "skip"})
+
+
+def _windows(table: Table, bench: Bench) -> Iterator[Remedy]:
+    window = (table.get("controller") or {}).get("frequency_window_hz")
+    if window is None:
+        return
+    lowest, highest = bench.limits.frequency_hz
+    middle, half = 0.5 * (window[0] + window[1]), 0.5 * (window[1] - window[0])
+    for times in (1.5, 2.5):
+        wider = [max(middle - times * half, lowest), min(middle + times * half, highest)]
+        if wider[0] > 0.4 * middle and wider != window:
+            yield Remedy(f"a frequency window {times:g} times as wide", {"controller": {"frequency_window_hz": wider}})
+
+
+def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
+    key = getattr(plan, "levels_key", None)
+    if key not in LEVELS:
+        return
+    levels = sorted(getattr(plan, key))
+    start = getattr(plan, "start_v", None)
+    lower: Table = {key: [levels[0] / 3.0, *levels]}
+    if start is not None:
+        lower["start_v"] = start / 3.0
+    yield Remedy("a first level of a third", lower)
+    if len(levels) > 1:
+        higher: Table = {key: levels[1:]}
+        if start is not None:
+            higher["start_v"] = start * levels[1] / levels[0]
+        yield Remedy("without the lowest level", higher)
+        finer = [level for low, high in zip(levels, levels[1:], strict=False) for level in (low, float(np.sqrt(low * high)))]
+        yield Remedy("steps half as large", {key: [*finer, levels[-1]]})
+    tripped = [draw.trial.level for draw in draws if draw.trial.tripped and np.isfinite(draw.trial.level)]
+    below = [level for level in levels if not tripped or level < min(tripped) * (1.0 - 1e-9)]
+    if below and len(below) < len(levels):
+        yield Remedy(f"levels up to {below[-1]:.3g} {plan.level_unit}", {key: below})
+
+
+def _loops(table: Table) -> Iterator[Remedy]:
+    controller = table.get("controller") or {}
+    gains = {name: controller[name] for name in GAINS if controller.get(name)}
+    for times in (0.5, 2.0):
+        if gains:
+            yield Remedy(
+                f"{'half' if times < 1.0 else 'twice'} the gains",
+                {"controller": {name: times * value for name, value in gains.items()}},
+            )
+
+
+def _patience(table: Table) -> Iterator[Remedy]:
+    settle = table.get("settle")
+    if settle and "longest_periods" in settle:
+        yield Remedy("three times as long to settle", {"settle": {"longest_periods": 3.0 * settle["longest_periods"]}})
+    if isinstance(table.get("record_periods"), int):
+        yield Remedy("twice the recorded periods", {"record_periods": 2 * table["record_periods"]})
+    if isinstance(table.get("retries"), int):
+        yield Remedy("three more retries", {"retries": table["retries"] + 3})
+
+
+def improve(
+    request: RehearsalRequest,
+    rehearsal: Rehearsal,
+    *,
+    progress: Callable[[Effect], None] = lambda _: None,
+    jobs: int | None = None,
+) -> Improvement:
+    """Try remedies on twins of a rehearsal, take the best, try the others on top of it, and so on.
+
+    A remedy is tried on up to 24 draws that did not end well and as many that did; probabilities are weighted by how many each
+    stand for. It is taken if ``P(ends well) - 2 P(trip)`` rises by more than 0.02 of the draws. The improved plan deserves a
+    rehearsal of its own with other draws, for it was chosen by these.
+    """
+    failed = [draw for draw in rehearsal.draws if not draw.trial.completed]
+    well = [draw for draw in rehearsal.draws if draw.trial.completed]
+    sample = [*_spread(failed), *_spread(well)]
+    weights = {d.number: len(failed) / max(len(_spread(failed)), 1) for d in failed}
+    weights |= {d.number: len(well) / max(len(_spread(well)), 1) for d in well}
+    plan, changes, effects = request.plan, {}, list[Effect]()
+    now, candidates = sample, remedies_for(plan, request.bench, rehearsal.draws)
+    for _ in range(MOST_STEPS):
+        before = _rates(now, weights)
+        if not any(not draw.trial.completed for draw in now):
+            break
+        tried: list[tuple[float, Remedy, Plan, list[Draw]]] = []
+        for remedy in candidates:
+            changed = _changed(plan, remedy.changes, request.bench)
+            if changed is None:
+                continue
+            found = _again(replace(request, plan=changed), request, sample, jobs)
+            after = _rates(found, weights)
+            effect = Effect(remedy.name, remedy.changes, (before[0], after[0]), (before[1], after[1]), len(sample))
+            effects.append(effect)
+            progress(effect)
+            tried.append((_score(after) - _score(before), remedy, changed, found))
+        if not tried:
+            break
+        rise, remedy, changed, found = max(tried, key=lambda entry: entry[0])
+        if rise <= WORTH:
+            break
+        effects = [replace(e, taken=True) if e.name == remedy.name and e.ends_well[0] == before[0] else e for e in effects]
+        plan, now = changed, found
+        changes = merged(changes, remedy.changes)
+        candidates = [one for one in remedies_for(plan, request.bench, found) if _same_kind(one, remedy) is False]
+    return Improvement(plan, changes, tuple(effects))
+
+
+def _same_kind(one: Remedy, taken: Remedy) -> bool:
+    """Whether a remedy changes what another has changed."""
+    return set(_paths(one.changes)) & set(_paths(taken.changes)) != set()
+
+
+def _paths(changes: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for key, value in changes.items():
+        if isinstance(value, Mapping):
+            yield from _paths(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key
+
+
+def _spread(draws: Sequence[Draw]) -> list[Draw]:
+    """Return at most `MOST_EACH` draws, spread evenly."""
+    if len(draws) <= MOST_EACH:
+        return list(draws)
+    return [draws[i] for i in np.linspace(0, len(draws) - 1, MOST_EACH).round().astype(int)]
+
+
+def _rates(draws: Sequence[Draw], weights: Mapping[int, float]) -> tuple[float, float]:
+    """Weighted probabilities of a good end and of a trip."""
+    total = sum(weights[draw.number] for draw in draws)
+    well = sum(weights[draw.number] for draw in draws if draw.trial.completed) / total
+    trips = sum(weights[draw.number] for draw in draws if draw.trial.tripped) / total
+    return well, trips
+
+
+def _score(rates: tuple[float, float]) -> float:
+    return rates[0] - TRIP_WEIGHT * rates[1]
+
+
+def _changed(plan: Plan, changes: Table, bench: Bench) -> Plan | None:
+    """Return the changed plan; None if it is not allowed."""
+    try:
+        changed = plan_from(merged(plan.model_dump(mode="json", exclude_none=True), changes), "changed plan")
+        changed.check(bench)
+    except RigError:
+        return None
+    return changed
+
+
+def _again(changed: RehearsalRequest, drawn_for: RehearsalRequest, sample: Sequence[Draw], jobs: int | None) -> list[Draw]:
+    """Run a changed plan on the twins that were drawn for the plan before the change."""
+    job = _OnTwinsOf(changed, drawn_for)
+    return [draw for _, draw in ensemble({str(d.number): d.number for d in sample}, job, n_jobs=jobs)]
+
+
+@dataclass(frozen=True, eq=False)
+class _OnTwinsOf:
+    """A rehearsal of one plan on the twins of another, so that only the plan differs."""
+
+    changed: RehearsalRequest
+    drawn_for: RehearsalRequest
+
+    def __call__(self, number: int) -> Draw:
+        from rig.rehearsal.trial import run_trial
+        from rig.rehearsal.truth import TrueBackbone
+
+        twin = self.drawn_for.twin(number)
+        trial = run_trial(self.changed.plan, twin.bench, twin.number)
+        nothing = TrueBackbone(numbers=(), frequency_hz=(), damping_ratio=())
+        return Draw(number=number, unknowns=twin.unknowns, trial=trial, truth=nothing)
