@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rig.arming.arming import Arm
+from rig.arming.rehearsed import Rehearsed
 from rig.arming.run_facts import About
 from rig.errors import ConfigurationError
 
@@ -63,7 +64,15 @@ class RunOptions:
     """Permission to move something physical: True, a callable that asks a person, or None (`rig.arming.arming`)."""
     about: About = field(default_factory=About)
     """Operator, specimen and notes, recorded with the part."""
+    rehearsal: Rehearsed | None = None
+    """A rehearsal of the plan on this bench, recorded with the part. Benches with ``arming.largest_trip_probability`` need one."""
+    override_rehearsal: str = ""
+    """Why the plan may run although such a bench refuses; recorded with who said so."""
 
     def __post_init__(self) -> None:
         if self.seed is not None and not 0 <= self.seed <= LARGEST_SEED:
             raise ConfigurationError(f"seed = {self.seed}: allowed is 0 to 2**63 - 1")
+        if not self.override_rehearsal.isprintable():
+            raise ConfigurationError(
+                f"`override_rehearsal` = {self.override_rehearsal!r}: allowed is printable text in one line"
+            )

@@ -96,6 +96,11 @@ class Arming(Configured):
     """Age up to which a check counts, h."""
     require_check: bool = True
     """Whether an automated bench needs a check that passed, of the same channels and driver."""
+    largest_trip_probability: float | None = Field(None, gt=0, le=1)
+    """Largest probability of a trip with which a plan is armed; it then needs a rehearsal (`rig rehearse`) whose 95 % interval
+    stays below. None asks for no rehearsal."""
+    rehearsal_valid_h: float = Field(168.0, gt=0, le=8760)
+    """Age up to which such a rehearsal counts, h."""
     hardware_emergency_stop: bool = False
     """Whether there is an emergency stop that cuts the amplifier without the computer, and a person has tested it; wanted by
     drivers that are not `rig.daq.Capabilities.safe_without_host`."""

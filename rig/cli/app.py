@@ -18,6 +18,7 @@ from rig.cli.identify import identify
 from rig.cli.list import list_
 from rig.cli.options import say_what_is_imported
 from rig.cli.predict import predict
+from rig.cli.rehearse import rehearse_
 from rig.cli.reproduce import reproduce_
 from rig.cli.run import resume, run
 from rig.cli.show import plot_, show
@@ -52,6 +53,7 @@ app.command("tune")(tune_)
 app.command()(emulate)
 app.command()(conformance)
 app.command("check")(check_)
+app.command("rehearse")(rehearse_)
 app.command("reproduce")(reproduce_)
 app.command()(run)
 app.command()(resume)

@@ -1,6 +1,6 @@
 """What is known of a rig before a rehearsal, gathered from recordings, models and the plan."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -257,7 +257,9 @@ def _linear_modes(found: _Found, bench: Bench, name: str, modes: LinearModes) ->
             ratio = float(modes.shapes[row, tested] / modes.shapes[drive, tested])
             found.priors[f"ratio {channel.name}"] = Prior(ratio, max(0.02 * abs(ratio), 1e-4))
     found.shape = True
-    found.sources.append(f"{name}: mode {tested + 1} of {modes.frequency_hz.size} at {modes.frequency_hz[tested]:.5g} Hz")
+    found.sources.append(
+        f"{name}: mode {tested + 1} of {modes.frequency_hz.size} at {modes.frequency_hz[tested]:.5g} Hz"
+    )
 
 
 def _exciter(found: _Found, name: str, exciter: Exciter) -> None:

@@ -78,7 +78,9 @@ class LinearRig:
     @property
     def modes(self) -> tuple[str, ...]:
         """Ends of the names of the modes; that of the tested mode is empty."""
-        return tuple(name.removeprefix("frequency_hz").strip() for name in self.values if name.startswith("frequency_hz"))
+        return tuple(
+            name.removeprefix("frequency_hz").strip() for name in self.values if name.startswith("frequency_hz")
+        )
 
     def of(self, name: str, mode: str = "") -> float:
         """Return a parameter of a mode."""
@@ -217,7 +219,9 @@ def _parameters(
     out = _Parameters(channels, priors)
     shape, hertz = start["drive_shape"], start["frequency_hz"]
     out.mode("", hertz, shape, log_std=(0.1, 1.5, WIDE))
-    out.centre[1] = np.log(start.get("damping_ratio", FLOOR_DAMPING)) if "damping_ratio" not in priors else out.centre[1]
+    out.centre[1] = (
+        np.log(start.get("damping_ratio", FLOOR_DAMPING)) if "damping_ratio" not in priors else out.centre[1]
+    )
     for name in EXCITER:
         out.log(name, start[name])
     rate = 5000.0 if responses is None else responses.sample_rate_hz

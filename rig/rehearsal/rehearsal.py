@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import vibrolock
+from rig.arming.rehearsed import tested_digest
 from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
@@ -21,7 +22,7 @@ from rig.rehearsal.truth import TrueBackbone, true_backbone
 from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
 
-__all__ = ["Draw", "Rehearsal", "RehearsalRequest", "draws_path", "rehearse", "tested_digest"]
+__all__ = ["Draw", "Rehearsal", "RehearsalRequest", "draws_path", "rehearse"]
 
 MOST_DRAWS = 100_000
 
@@ -92,6 +93,7 @@ class RehearsalRequest:
             "most_likely": {} if known is None else dict(known.linear.rig().values),
             "relative_std": {} if known is None else {name: known.linear.std(name) for name in known.linear.names},
             "determined": None if known is None else known.linear.determined,
+            "tests": tested_digest(self.plan, self.bench),
             "seed": self.seed,
             "software_version": vibrolock.__version__,
         }
@@ -107,6 +109,8 @@ class Rehearsal:
     """The draws, by number."""
     finished: str
     """When it was finished, ISO 8601."""
+    tried: tuple[Mapping[str, Any], ...] = ()
+    """Remedies that were tried on its twins, as plain data (`rig.rehearsal.remedies.Effect`)."""
 
     @property
     def digest(self) -> str:
@@ -116,13 +120,8 @@ class Rehearsal:
 
     @property
     def tests(self) -> str:
-        """Digest of plan and bench (`tested_digest`)."""
-        return _digest({"plan": self.facts["plan"], "bench": self.facts["bench"]})
-
-
-def tested_digest(plan: Plan, bench: Bench) -> str:
-    """Digest of plan and bench: a rehearsal holds for these alone."""
-    return _digest({"plan": plan.model_dump(mode="json"), "bench": bench.model_dump(mode="json")})
+        """Digest of plan and bench (`rig.arming.rehearsed.tested_digest`)."""
+        return str(self.facts["tests"])
 
 
 def _digest(facts: Any) -> str:

@@ -75,8 +75,12 @@ class Improvement:
 def remedies_for(plan: Plan, bench: Bench, draws: Sequence[Draw]) -> list[Remedy]:
     """Return the changes that may help this kind of plan on this bench."""
     table = plan.model_dump(mode="json")
-    return list(_ramps(table)) + list(_windows(table, bench)) + list(_levels(plan, draws)) + list(_loops(table)) + list(
-        _patience(table)
+    return (
+        list(_ramps(table))
+        + list(_windows(table, bench))
+        + list(_levels(plan, draws))
+        + list(_loops(table))
+        + list(_patience(table))
     )
 
 
@@ -115,7 +119,9 @@ def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
         if start is not None:
             higher["start_v"] = start * levels[1] / levels[0]
         yield Remedy("without the lowest level", higher)
-        finer = [level for low, high in zip(levels, levels[1:], strict=False) for level in (low, float(np.sqrt(low * high)))]
+        finer = [
+            level for low, high in zip(levels, levels[1:], strict=False) for level in (low, float(np.sqrt(low * high)))
+        ]
         yield Remedy("steps half as large", {key: [*finer, levels[-1]]})
     tripped = [draw.trial.level for draw in draws if draw.trial.tripped and np.isfinite(draw.trial.level)]
     below = [level for level in levels if not tripped or level < min(tripped) * (1.0 - 1e-9)]
@@ -184,7 +190,9 @@ def improve(
         rise, remedy, changed, found = max(tried, key=lambda entry: entry[0])
         if rise <= WORTH:
             break
-        effects = [replace(e, taken=True) if e.name == remedy.name and e.ends_well[0] == before[0] else e for e in effects]
+        effects = [
+            replace(e, taken=True) if e.name == remedy.name and e.ends_well[0] == before[0] else e for e in effects
+        ]
         plan, now = changed, found
         changes = merged(changes, remedy.changes)
         candidates = [one for one in remedies_for(plan, request.bench, found) if _same_kind(one, remedy) is False]
@@ -233,7 +241,9 @@ def _changed(plan: Plan, changes: Table, bench: Bench) -> Plan | None:
     return changed
 
 
-def _again(changed: RehearsalRequest, drawn_for: RehearsalRequest, sample: Sequence[Draw], jobs: int | None) -> list[Draw]:
+def _again(
+    changed: RehearsalRequest, drawn_for: RehearsalRequest, sample: Sequence[Draw], jobs: int | None
+) -> list[Draw]:
     """Run a changed plan on the twins that were drawn for the plan before the change."""
     job = _OnTwinsOf(changed, drawn_for)
     return [draw for _, draw in ensemble({str(d.number): d.number for d in sample}, job, n_jobs=jobs)]

@@ -22,7 +22,9 @@ __all__ = ["Twin", "Twins", "draw_twin", "exact_twin"]
 MOST_TRIES = 50
 SUBSTEPS_HZ = 20_000.0  # least internal rate of a twin
 INSIDE = "inside"  # deflection of the structure itself, without that on its suspension: where springs and joints act
-REACH_WITHOUT_LEVELS = 0.3  # of the displacement limit: highest level of a plan whose levels say nothing of displacement
+REACH_WITHOUT_LEVELS = (
+    0.3  # of the displacement limit: highest level of a plan whose levels say nothing of displacement
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,9 @@ Twins = Callable[[int], Twin]
 def exact_twin(bench: Bench, number: int) -> Twin:
     """Return the virtual bench itself, with another seed. Raises `ConfigurationError` for any other bench."""
     if bench.driver.name != "virtual":
-        raise ConfigurationError(f"`exact`: the driver of the bench {bench.name} is {bench.driver.name!r}, allowed is 'virtual'")
+        raise ConfigurationError(
+            f"`exact`: the driver of the bench {bench.name} is {bench.driver.name!r}, allowed is 'virtual'"
+        )
     return Twin(number, bench, {})
 
 
@@ -266,7 +270,11 @@ class _Drawing:
         """Return the stinger, damped such that armature and drive point do not ring on it (5 % of critical)."""
         v = self.linear.values
         stiffness = v["stinger_stiffness_n_m"]
-        return {"at": "drive", "stiffness_n_m": stiffness, "damping_n_s_m": 0.1 * math.sqrt(stiffness * v["moving_mass_kg"])}
+        return {
+            "at": "drive",
+            "stiffness_n_m": stiffness,
+            "damping_n_s_m": 0.1 * math.sqrt(stiffness * v["moving_mass_kg"]),
+        }
 
     def _sensors(self) -> list[dict[str, Any]]:
         out = []
@@ -294,7 +302,11 @@ class _Drawing:
         if bench.driver.name == "virtual":
             own = VirtualDAQ(bench)
             converter = own.rig.converter.model_dump()
-            kept = {key: bench.driver.options[key] for key in ("queue_blocks", "delay_samples") if key in bench.driver.options}
+            kept = {
+                key: bench.driver.options[key]
+                for key in ("queue_blocks", "delay_samples")
+                if key in bench.driver.options
+            }
             return {"converter": converter, **kept, "faults": faults}
         rate = bench.sample_rate_hz
         bits = round(math.log2(2.0 * bench.output_range_v / min(c.resolution_v for c in bench.channels)))

@@ -54,7 +54,13 @@ class Share:
 
     def to_dict(self) -> dict[str, Any]:
         """Return value and interval as plain data."""
-        return {"value": self.value, "low": self.interval[0], "high": self.interval[1], "count": self.count, "of": self.n}
+        return {
+            "value": self.value,
+            "low": self.interval[0],
+            "high": self.interval[1],
+            "count": self.count,
+            "of": self.n,
+        }
 
 
 @dataclass(frozen=True)
@@ -292,7 +298,9 @@ def _influences(draws: Sequence[Draw]) -> tuple[Influence, ...]:
                     continue
                 found = spearmanr(x[kept], values[kept])
                 if found.pvalue < SIGNIFICANT / tested:
-                    out.append(Influence(outcome, of, float(found.statistic), float(found.pvalue), ADVICE.get(name, "")))
+                    out.append(
+                        Influence(outcome, of, float(found.statistic), float(found.pvalue), ADVICE.get(name, ""))
+                    )
     return tuple(sorted(out, key=lambda one: -abs(one.correlation)))
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import vibrolock
 from rig.arming.arming import armed
 from rig.arming.bench_memory import RememberedTrip, now, remember
+from rig.arming.rehearsed import Rehearsed, rehearsal_facts
 from rig.arming.run_facts import calibration_remarks
 from rig.arming.run_options import Progress, RunOptions
 from rig.bench import Bench
@@ -115,6 +117,7 @@ def take_up(
         before = MeasuredBefore(left.done, left.numbers, points)
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
+        options = _still_rehearsed(recording, options)
     plan, bench = left.plan, left.bench
     segments = plan.segments(bench.sample_rate_hz, left.done)
     if segments and not trust_code:
@@ -137,6 +140,15 @@ def take_up(
     return _whole(output, progress) if journal_path(output).exists() else Recording(output)
 
 
+def _still_rehearsed(recording: Recording, options: RunOptions) -> RunOptions:
+    """Return the options with the rehearsal of the last part, if they name none and the part has one."""
+    before = recording.parts[-1].information.get("about", {}).get("rehearsal") if recording.parts else None
+    if options.rehearsal is not None or not before or "digest" not in before:
+        return options
+    known = {one.name: before[one.name] for one in fields(Rehearsed) if one.name in before}
+    return replace(options, rehearsal=Rehearsed(**known))
+
+
 def _put_back(output: Path, progress: Progress) -> None:
     if told := put_back(output):
         progress.remark(told)
@@ -157,9 +169,12 @@ def _whole(output: Path, progress: Progress) -> Recording:
 
 def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> dict[str, Any]:
     """Arm the bench and collect the facts recorded for a part: who armed it, operator, specimen, device, code."""
+    purpose = options.about.purpose
+    rehearsed = {} if purpose else rehearsal_facts(plan, bench, options.rehearsal, options.override_rehearsal)
     facts = {
         **options.about.facts(),
-        "armed": armed(bench, session, options.about.purpose or plan.kind, options.arm),
+        **({"rehearsal": rehearsed} if rehearsed else {}),
+        "armed": armed(bench, session, purpose or plan.kind, options.arm),
         "device": session.identity,
         "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
         "code": imported_code(bench),

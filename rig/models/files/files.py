@@ -19,6 +19,7 @@ from rig.models.files.measured_backbone import MEASURED_BACKBONE
 from rig.models.files.nonlinear_mode import NONLINEAR_MODE
 from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.files.predictions import PREDICTIONS
+from rig.models.files.rehearsal import REHEARSAL
 from rig.models.files.response_matrix import RESPONSE_MATRIX
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
 from rig.text.printable import error_text
@@ -35,6 +36,7 @@ _ALL = (
     RESPONSE_MATRIX,
     MEASURED_BACKBONE,
     PREDICTIONS,
+    REHEARSAL,
 )
 KINDS = {kind.name: kind for kind in _ALL}
 """Every kind of file other than recordings, by its name in the file."""

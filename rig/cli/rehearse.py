@@ -1,0 +1,220 @@
+"""``rig rehearse``: a plan on many virtual twins of a bench, before anything moves."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rig.cli.options import Json, Overwrite, keep_existing
+
+if TYPE_CHECKING:
+    from rig.models.rehearse import Listener, Subject
+    from rig.rehearsal.foreseen import Comparison
+
+__all__ = ["rehearse_"]
+
+
+def rehearse_(
+    plan: Annotated[str, typer.Argument(help="Shipped plan or TOML file; with --compare a rehearsal (.h5).")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Rehearsal (.h5) or, with --twin, bench (.toml).")
+    ] = None,
+    bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
+    sources: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--from",
+            metavar="FILE",
+            help="What is known of the rig: a recording of rig tune, rig check or any multisine, linear modes, an exciter, a "
+            "nonlinear mode; may be given several times.",
+        ),
+    ] = None,
+    exact: Annotated[bool, typer.Option("--exact", help="A virtual bench is its own twin, with other seeds.")] = False,
+    hypotheses: Annotated[Path | None, typer.Option(help="TOML table of what is assumed of the rest.")] = None,
+    draws: Annotated[int, typer.Option("-n", "--draws", help="Number of twins.", min=1)] = 200,
+    seed: Annotated[int, typer.Option(help="Seed of the draws.", min=0)] = 0,
+    improve: Annotated[
+        Path | None, typer.Option(metavar="PLAN", help="Try what would help; write the changed plan.")
+    ] = None,
+    twin: Annotated[int | None, typer.Option(metavar="N", help="Only write twin N as a bench file.", min=1)] = None,
+    compare: Annotated[
+        Path | None, typer.Option(metavar="RECORDING", help="Where a run lies within a rehearsal.")
+    ] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    jobs: Annotated[int, typer.Option(help="Processes; -1 for one a core.")] = -1,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Run a plan on virtual twins of a bench: how probably it ends well, trips, or loses the lock, and what would help."""
+    from rig.errors import ConfigurationError
+    from rig.models.rehearse import Subject
+
+    if compare is not None:
+        _compare(Path(plan), compare, json)
+        return
+    loaded, chosen = _plan_and_bench(plan, bench)
+    subject = Subject(
+        plan=loaded,
+        bench=chosen,
+        sources=sources or [],
+        exact=exact,
+        hypotheses=hypotheses,
+        draws=draws,
+        seed=seed,
+    )
+    if output is None:
+        raise ConfigurationError("`output`: a file is wanted")
+    if twin is not None:
+        _write_twin(subject, twin, output, overwrite)
+        return
+    _check_outputs(subject, output, improve, figure, overwrite)
+    _rehearse(subject, output, improve, figure, {"overwrite": overwrite, "jobs": jobs, "json": json})
+
+
+def _plan_and_bench(plan: str, bench: str | None) -> tuple[Any, Any]:
+    from rig.bench import load_bench
+    from rig.campaigns.plans import bench_of, load_plan
+
+    loaded = load_plan(plan)
+    return loaded, load_bench(bench) if bench is not None else bench_of(loaded, plan)
+
+
+def _write_twin(subject: "Subject", number: int, output: Path, overwrite: bool) -> None:
+    from rig.errors import ConfigurationError
+    from rig.models.rehearse import request_for, twin_into
+
+    if output.suffix != ".toml":
+        raise ConfigurationError(f"-o {output}: benches are written as .toml")
+    keep_existing(list(subject.sources), output, overwrite)
+    for name, value in twin_into(request_for(subject), number, output).items():
+        print(f"{name:18} {value:.6g}")
+    print(f"twin {number} written to {output}; rig run PLAN --bench {output} --seed {number - 1}")
+
+
+def _check_outputs(
+    subject: "Subject", output: Path, improve: Path | None, figure: Path | None, overwrite: bool
+) -> None:
+    """Refuse what could not be written before anything is computed."""
+    from rig.errors import ConfigurationError
+    from rig.tuning.figure import check_figure
+
+    if output.suffix != ".h5":
+        raise ConfigurationError(f"-o {output}: rehearsals are written as .h5")
+    keep_existing(list(subject.sources), output, overwrite)
+    if improve is not None:
+        if improve.suffix != ".toml":
+            raise ConfigurationError(f"`improve` = {improve}: plans are written as .toml")
+        keep_existing([], improve, overwrite)
+        keep_existing([output], improve.with_suffix(".h5"), overwrite)
+    if figure is not None:
+        check_figure(figure, overwrite)
+
+
+def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Path | None, how: dict[str, Any]) -> None:
+    from rig.models.rehearse import improve_into, rehearse_into, request_for
+    from rig.rehearsal.report import lines, summary
+    from rig.show.figure import plot
+    from rig.text.console import print_json
+    from rig.text.printable import printable_strings
+
+    request = request_for(subject)
+    with _progress(subject.draws) as listener:
+        found = rehearse_into(request, output, overwrite=how["overwrite"], listener=listener, jobs=how["jobs"])
+    second = None
+    if improve is not None:
+        with _progress(subject.draws) as listener:
+            found, second = improve_into(request, found, output, improve, listener=listener, jobs=how["jobs"])
+    if figure is not None:
+        plot(output, figure)
+    facts = {**summary(found), "file": str(output)}
+    if improve is not None:
+        facts["improved"] = None if second is None else {**summary(second), "plan": str(improve)}
+    if how["json"]:
+        print_json(facts)
+        return
+    for line in lines(printable_strings(facts)):
+        print(line)
+    print(f"rehearsal written to {output}" + (f", figure to {figure}" if figure else ""))
+    if improve is not None and second is None:
+        print("no change of the plan helped: nothing was written to", improve)
+    elif second is not None:
+        print(f"improved plan written to {improve}, its own rehearsal to {improve.with_suffix('.h5')}:")
+        for line in lines(printable_strings(summary(second))):
+            print(line)
+
+
+class _progress:  # noqa: N801 - a context manager
+    """Shows how many draws are done: a bar on a terminal, a line now and then elsewhere."""
+
+    def __init__(self, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self.total, self.bad = total, 0
+        self.terminal = sys.stderr.isatty()
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self.bar = Progress(*columns, console=Console(stderr=True), disable=not self.terminal)
+        self.task = self.bar.add_task("rehearsing", total=total)
+
+    def __enter__(self) -> "Listener":
+        from rig.models.rehearse import Listener
+
+        self.bar.start()
+        return Listener(self.draw, self.effect)
+
+    def __exit__(self, *_: object) -> None:
+        self.bar.stop()
+
+    def draw(self, draw: Any, done: int) -> None:
+        """Show a draw."""
+        self.bad += 0 if draw.trial.completed else 1
+        text = f"rehearsing, {done - self.bad} well" if done >= self.bad else "rehearsing"
+        self.bar.update(self.task, completed=done, description=text)
+        if not self.terminal and (done % max(1, self.total // 10) == 0 or done == self.total):
+            print(f"{done} of {self.total} draws, {self.bad} did not end well", file=sys.stderr, flush=True)
+
+    def effect(self, effect: Any) -> None:
+        """Show a remedy that was tried."""
+        (well, then), (trips, later) = effect.ends_well, effect.trips
+        text = f"tried {effect.name}: ends well {well:.3f} -> {then:.3f}, trips {trips:.3f} -> {later:.3f}"
+        say: Callable[[str], None] = (
+            self.bar.console.print if self.terminal else lambda line: print(line, file=sys.stderr)
+        )
+        say(text)
+
+
+def _compare(rehearsal: Path, recording: Path, json: bool) -> None:
+    from rig.models.rehearse import compare_with, load_rehearsal
+    from rig.text.console import print_json
+
+    found = compare_with(load_rehearsal(rehearsal), recording)
+    if json:
+        print_json(found.to_dict())
+        return
+    print_comparison(found)
+
+
+def print_comparison(found: "Comparison") -> None:
+    """Print where each point lies within what was foreseen, and the findings."""
+    from rig.text.console import number, print_table
+
+    names = ("frequency_hz", "force_n", "amplitude_m", "voltage_v", "damping_ratio")
+    print_table(
+        ("point", "level", "frequency", "force", "amplitude", "voltage", "damping", "finding"),
+        [
+            (
+                str(point.number + 1),
+                number(point.level, ".4g"),
+                *(number(point.rank.get(name), ".0f", 100.0) for name in names),
+                "yes" if point.findings else "",
+            )
+            for point in found.points
+        ],
+    )
+    print("columns: per cent of the draws below what was measured")
+    for text in found.findings:
+        print(f"FINDING {text}")
+    if not found.findings:
+        print("the run lies within what was foreseen")

@@ -1,0 +1,112 @@
+"""The figure of a rehearsal: the points of every draw, how it ends, margins, accuracy, and what matters."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from rig.rehearsal.rehearsal import Rehearsal
+from rig.rehearsal.verdict import Verdict, verdict_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_rehearsal"]
+
+MOST_LIMITS, MOST_INFLUENCES = 8, 8
+ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"
+
+
+def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
+    """Draw six panels on an empty page."""
+    verdict = verdict_of(rehearsal)
+    axes = page.subplots(2, 3)
+    facts = rehearsal.facts
+    _draw_backbones(axes[0, 0], axes[0, 1], rehearsal)
+    _draw_points(axes[0, 2], verdict, facts["plan"])
+    _draw_margins(axes[1, 0], verdict)
+    _draw_times(axes[1, 1], rehearsal)
+    _draw_influences(axes[1, 2], verdict)
+    well, trips = verdict.ends_well, verdict.trips
+    title(
+        page,
+        f"{facts['bench']['specimen']['name']}: {facts['plan']['kind']} rehearsed on {len(rehearsal.draws)} twins; ends well "
+        f"{100.0 * well.value:.0f} % ({100.0 * well.interval[0]:.0f} to {100.0 * well.interval[1]:.0f}), trips "
+        f"{100.0 * trips.value:.1f} % ({100.0 * trips.interval[0]:.1f} to {100.0 * trips.interval[1]:.1f})",
+    )
+
+
+def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) -> None:
+    drawn = False
+    for draw in rehearsal.draws:
+        points = [p for p in draw.trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
+        if not points:
+            continue
+        drawn = True
+        amplitude = np.array([1e3 * p.amplitude_m for p in points])
+        colour = MAIN if draw.trial.completed else REJECTED if not draw.trial.tripped else SECOND
+        style: dict[str, Any] = {"lw": 0.7, "alpha": 0.45, "color": colour}
+        frequency.semilogx(amplitude, [p.modal_frequency_hz for p in points], "-", **style)
+        damping.semilogx(amplitude, [100.0 * p.damping_ratio for p in points], "-", **style)
+    if not drawn:
+        for axis in (frequency, damping):
+            say_why_empty(axis, "no accepted point has modal properties")
+        return
+    for colour, label in ((MAIN, "ends well"), (REJECTED, "points missing"), (SECOND, "trips")):
+        frequency.plot([], [], color=colour, label=label)
+    frequency.legend(fontsize=8)
+    frequency.set(xlabel="amplitude of the drive point, mm", ylabel="modal frequency, Hz")
+    damping.set(xlabel="amplitude of the drive point, mm", ylabel="damping as reported, %")
+
+
+def _draw_points(axis: "Axes", verdict: Verdict, plan: dict[str, Any]) -> None:
+    if not verdict.points:
+        say_why_empty(axis, "no point was begun")
+        return
+    x = np.array([point.number + 1 for point in verdict.points])
+    n = np.array([point.accepted.n for point in verdict.points])
+    accepted = np.array([point.accepted.count for point in verdict.points]) / n
+    missing = np.array([point.qualities.get("not begun", 0) for point in verdict.points]) / n
+    axis.bar(x, 100.0 * accepted, color=ACCEPTED, label="accepted")
+    axis.bar(
+        x, 100.0 * (1.0 - accepted - missing), bottom=100.0 * accepted, color=FAILED, label="refused or interrupted"
+    )
+    axis.bar(x, 100.0 * missing, bottom=100.0 * (1.0 - missing), color=MISSING, label="not begun")
+    axis.set(xlabel=f"point of the plan ({plan['kind']})", ylabel="draws, %", ylim=(0.0, 119.0))
+    axis.legend(fontsize=8, ncols=2, loc="upper left")
+
+
+def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
+    shown = list(verdict.margins.items())[:MOST_LIMITS][::-1]
+    if not shown:
+        say_why_empty(axis, "nothing moved")
+        return
+    for row, (_, band) in enumerate(shown):
+        axis.plot([100.0 * band.low, 100.0 * band.high], [row, row], color=MAIN, lw=4.0, solid_capstyle="butt")
+        axis.plot(100.0 * band.middle, row, "o", color="w", mec=MAIN, ms=6)
+        axis.plot(100.0 * band.largest, row, "|", color=SECOND, ms=10, mew=2.0)
+    axis.axvline(100.0, color=SECOND, lw=0.8, ls="--")
+    axis.set_yticks(range(len(shown)), [name for name, _ in shown], fontsize=8)
+    axis.set(xlabel="largest value over its limit, %: 5 to 95 % of draws, median, largest", xlim=(0.0, None))
+    axis.xaxis.label.set_fontsize(8)
+
+
+def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
+    times = np.array([draw.trial.duration_s for draw in rehearsal.draws])
+    done = np.array([draw.trial.completed for draw in rehearsal.draws])
+    edges = np.linspace(0.0, max(float(times.max()), 1e-9) * 1.001, 25)
+    axis.hist([times[done], times[~done]], edges, stacked=True, color=[MAIN, SECOND], label=["ends well", "does not"])
+    axis.set(xlabel="test time, s", ylabel="draws")
+    axis.legend(fontsize=8)
+
+
+def _draw_influences(axis: "Axes", verdict: Verdict) -> None:
+    shown = verdict.influences[:MOST_INFLUENCES][::-1]
+    if not shown:
+        say_why_empty(axis, "no unknown matters more than by chance")
+        return
+    axis.barh(range(len(shown)), [one.correlation for one in shown], color=MAIN)
+    axis.set_yticks(range(len(shown)), [f"{one.unknown}\nfor {one.outcome}" for one in shown], fontsize=7)
+    axis.axvline(0.0, color="k", lw=0.6)
+    axis.set(xlabel="rank correlation", xlim=(-1.0, 1.0))
