@@ -65,7 +65,7 @@ class RunOptions:
     about: About = field(default_factory=About)
     """Operator, specimen and notes, recorded with the part."""
     rehearsal: Rehearsed | None = None
-    """A rehearsal of the plan on this bench, recorded with the part. Benches with ``arming.largest_trip_probability`` need one."""
+    """A rehearsal of the plan on this bench, recorded with the part; some benches need one (`rig.arming.rehearsed`)."""
     override_rehearsal: str = ""
     """Why the plan may run although such a bench refuses; recorded with who said so."""
 

@@ -137,12 +137,14 @@ def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Pa
     for line in lines(printable_strings(facts)):
         print(line)
     print(f"rehearsal written to {output}" + (f", figure to {figure}" if figure else ""))
-    if improve is not None and second is None:
-        print("no change of the plan helped: nothing was written to", improve)
-    elif second is not None:
-        print(f"improved plan written to {improve}, its own rehearsal to {improve.with_suffix('.h5')}:")
-        for line in lines(printable_strings(summary(second))):
-            print(line)
+    if improve is None:
+        return
+    if second is None:
+        print(f"no change of the plan helped: nothing was written to {improve}")
+        return
+    print(f"improved plan written to {improve}, its own rehearsal to {improve.with_suffix('.h5')}:")
+    for line in lines(printable_strings(summary(second))):
+        print(line)
 
 
 class _progress:  # noqa: N801 - a context manager

@@ -1,6 +1,7 @@
 """``rig run`` and ``rig resume``: carry out a plan, and finish an interrupted run."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,11 @@ if TYPE_CHECKING:
 
 __all__ = ["resume", "run"]
 
+Rehearsed = Annotated[Path | None, typer.Option(help="Rehearsal of the plan on this bench, for arming and the record.")]
+Override = Annotated[
+    str, typer.Option("--override-rehearsal", metavar="WHY", help="Run although the bench asks for another rehearsal.")
+]
+
 
 @with_run_options(of_a_recording)
 def run(
@@ -23,6 +29,8 @@ def run(
     output: Output,
     bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
     daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
+    rehearsal: Rehearsed = None,
+    override_rehearsal: Override = "",
     options: "RunOptions",
     json: Json = False,
 ) -> None:
@@ -35,6 +43,7 @@ def run(
     chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
     if daq is not None:
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
+    options = _with_rehearsal(options, rehearsal, override_rehearsal)
     _carry(loaded.kind, options, lambda watched: carry_out(loaded, chosen, output, watched), json)
 
 
@@ -49,6 +58,8 @@ def resume(
     trust_code: Annotated[
         bool, typer.Option("--trust-code", help="Import the functions that the recording's bench names.")
     ] = False,
+    rehearsal: Rehearsed = None,
+    override_rehearsal: Override = "",
     options: "RunOptions",
     json: Json = False,
 ) -> None:
@@ -60,6 +71,7 @@ def resume(
     with Recording(output) as recording:
         kind = recording.kind
     change = None if plan is None else load_plan(plan)
+    options = _with_rehearsal(options, rehearsal, override_rehearsal)
     _carry(
         kind,
         options,
@@ -68,6 +80,15 @@ def resume(
         ),
         json,
     )
+
+
+def _with_rehearsal(options: "RunOptions", rehearsal: Path | None, override: str) -> "RunOptions":
+    from rig.models.rehearse import load_rehearsal
+    from rig.rehearsal.foreseen import rehearsed_in
+
+    if rehearsal is not None:
+        options = replace(options, rehearsal=rehearsed_in(load_rehearsal(rehearsal), str(rehearsal)))
+    return replace(options, override_rehearsal=override)
 
 
 def _carry(kind: str, options: "RunOptions", start: "Callable[[RunOptions], Recording]", json: bool) -> None:

@@ -55,6 +55,9 @@ def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) ->
         return
     for colour, label in ((MAIN, "ends well"), (REJECTED, "points missing"), (SECOND, "trips")):
         frequency.plot([], [], color=colour, label=label)
+    for axis in (frequency, damping):
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter("")
     frequency.legend(fontsize=8)
     frequency.set(xlabel="amplitude of the drive point, mm", ylabel="modal frequency, Hz")
     damping.set(xlabel="amplitude of the drive point, mm", ylabel="damping as reported, %")
@@ -95,7 +98,7 @@ def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
 def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
     times = np.array([draw.trial.duration_s for draw in rehearsal.draws])
     done = np.array([draw.trial.completed for draw in rehearsal.draws])
-    edges = np.linspace(0.0, max(float(times.max()), 1e-9) * 1.001, 25)
+    edges = np.linspace(0.0, max(float(times.max()), 1e-9) * 1.001, 25).tolist()
     axis.hist([times[done], times[~done]], edges, stacked=True, color=[MAIN, SECOND], label=["ends well", "does not"])
     axis.set(xlabel="test time, s", ylabel="draws")
     axis.legend(fontsize=8)

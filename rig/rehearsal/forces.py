@@ -14,24 +14,26 @@ import numpy as np
 __all__ = ["describing_function", "drag", "drag_for", "hardening_for", "softening_for"]
 
 SAMPLES = 720  # of a period
+cfunction = numba.cfunc("float64(float64, CPointer(float64))", cache=True)
+"""Compiles a force law as `simulators.sites.elements.User` wants it."""
 BOUND = 0.5  # of the highest displacement: where a softening spring begins to stop softening
 
 
-@numba.cfunc("float64(float64, CPointer(float64))", cache=True)
-def saturating(x, parameters):
+@cfunction
+def saturating(x: Any, parameters: Any) -> Any:
     """Force of a cubic spring whose secant stiffness is bounded: k3 x^3 / (1 + (x / x0)^2)."""
     ratio = x / parameters[1]
     return -parameters[0] * x * x * x / (1.0 + ratio * ratio)
 
 
-@numba.cfunc("float64(float64, CPointer(float64))", cache=True)
-def drag(v, parameters):
+@cfunction
+def drag(v: Any, parameters: Any) -> Any:
     """Damping force that grows with the velocity: (c2 |v| + c3 v^2) v."""
     return -(parameters[0] * abs(v) + parameters[1] * v * v) * v
 
 
-@numba.cfunc("float64(float64, CPointer(float64))", cache=True)
-def odd_polynomial(x, parameters):
+@cfunction
+def odd_polynomial(x: Any, parameters: Any) -> Any:
     """Force of a spring: k3 x^3 + k5 x^5 + k7 x^7."""
     square = x * x
     return -(parameters[0] + (parameters[1] + parameters[2] * square) * square) * square * x

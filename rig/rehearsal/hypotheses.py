@@ -50,7 +50,7 @@ class Hypotheses(Configured):
     gain_factor: tuple[float, float] = (0.5, 2.0)
     """That gain over the measured one."""
     frequency_drift: float = Field(0.002, ge=0.0, le=0.1)
-    """Standard deviation of the relative change of the modal frequency since the measurement: temperature, a remounted stinger."""
+    """Standard deviation of the relative change of the modal frequency since the measurement, as temperature makes it."""
     damping_drift: float = Field(0.05, ge=0.0, le=1.0)
     """Standard deviation of the logarithm of the change of damping since then."""
     held_per_s: float = Field(0.0, ge=0.0, le=1000.0)

@@ -221,7 +221,9 @@ def _plant(found: _Found, bench: Bench, plant: PlantModel, ratios: Mapping[str, 
     s = 2j * np.pi * frequency
     force, drive = plant.force_per_v(s), plant.acceleration_per_v(s)
     others = [drive * ratios.get(name, 1.0) for name in _names(bench)[2:]]
-    value = np.stack([force, drive, *others], axis=1) * np.sinc(frequency / bench.sample_rate_hz)[:, None]
+    value: NDArray[np.complex128] = np.stack([force, drive, *others], axis=1) * np.sinc(
+        frequency / bench.sample_rate_hz
+    )[:, None].astype(np.complex128)
     rms = np.sqrt(np.mean(np.abs(value) ** 2, axis=0))
     std = np.broadcast_to(max(plant.fit_error, 1e-3) * rms, value.shape).copy()
     for column, name in enumerate(_names(bench)[2:], 2):

@@ -6,7 +6,8 @@ for what the others contribute. Shaker, amplifier and stinger are those of `iden
     (1 + Z r) F = g_e V - Z A / s^2,    Z = s^2 m + s c + k + s b / (1 + s tau),    g_e = g / (1 + s tau),    r = 1 / k_s.
 
 The voltage is the number given to a converter that holds it, the inputs pass an AC coupling, as in
-`identification.prediction.exciter.VoltagePath`. Suspension damping c and back-EMF b are told apart by the coil alone, so they are one parameter here, half of it each.
+`identification.prediction.exciter.VoltagePath`. Suspension damping c and back-EMF b are told apart by the coil alone, so they
+are one parameter here, half of it each.
 
 Every parameter has a prior, wide for what nobody knows; it bounds the directions that the data do not determine. With the
 Jacobian J of the residuals over their standard deviations, prior included, the covariance is ``s^2 (J^T J)^-1`` (Tarantola,
@@ -109,8 +110,8 @@ class LinearRig:
         """Responses as `Responses.value` has them."""
         s: Complex = 2j * np.pi * np.asarray(frequency_hz, np.complex128)
         receptances = self.receptances(s)
-        late = np.sinc(frequency_hz / sample_rate_hz) * np.exp(-s * self.values["delay_s"])
-        late *= s / (s + 2.0 * np.pi * self.values["coupling_hz"])
+        late = np.asarray(np.sinc(frequency_hz / sample_rate_hz), np.complex128) * np.exp(-s * self.values["delay_s"])
+        late = late * s / (s + 2.0 * np.pi * self.values["coupling_hz"])
         force = self.force_per_v(s, receptances[0]) * late
         return np.asarray(np.vstack([force, s**2 * receptances * force]).T)
 
@@ -267,7 +268,7 @@ def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[Linea
     error = misses(found.x)
     expected = max(2 * error.size - centre.size, 1)
     inflation = float(np.sum(np.abs(error / sigma) ** 2)) / expected
-    data = found.jac[: 2 * error.size] / np.sqrt(max(1.0, inflation))
+    data = np.asarray(found.jac)[: 2 * error.size] / np.sqrt(max(1.0, inflation))
     covariance = np.linalg.inv(data.T @ data + np.diag(std**-2.0))
     whitened = covariance / np.outer(std, std)
     determined = float(np.mean(np.linalg.eigvalsh(whitened) < 0.25))

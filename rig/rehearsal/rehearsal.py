@@ -142,10 +142,10 @@ def rehearse(
 ) -> Rehearsal:
     """Run the plan on all twins and return what came of it.
 
-    With a ``journal`` every draw is written to it as it is done; a journal of the same rehearsal is taken up again, and it stays
-    until the caller removes it. ``progress`` is told of each draw and of the number done. ``jobs`` is as in joblib: None follows
-    `joblib.parallel_config`, so that a cluster is one line of the caller. Raises `RecordingError` for a journal of another
-    rehearsal, or one that cannot be written.
+    With a ``journal`` every draw is written to it as it is done; a journal of the same rehearsal is taken up again, and it
+    stays until the caller removes it. ``progress`` is told of each draw and of the number done. ``jobs`` is as in joblib: None
+    follows `joblib.parallel_config`, so that a cluster is one line of the caller. Raises `RecordingError` for a journal of
+    another rehearsal, or one that cannot be written.
     """
     done = {} if journal is None else _begun(journal, request)
     for count, draw in enumerate(done.values(), 1):

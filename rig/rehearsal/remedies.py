@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -119,9 +120,7 @@ def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
         if start is not None:
             higher["start_v"] = start * levels[1] / levels[0]
         yield Remedy("without the lowest level", higher)
-        finer = [
-            level for low, high in zip(levels, levels[1:], strict=False) for level in (low, float(np.sqrt(low * high)))
-        ]
+        finer = [level for low, high in pairwise(levels) for level in (low, float(np.sqrt(low * high)))]
         yield Remedy("steps half as large", {key: [*finer, levels[-1]]})
     tripped = [draw.trial.level for draw in draws if draw.trial.tripped and np.isfinite(draw.trial.level)]
     below = [level for level in levels if not tripped or level < min(tripped) * (1.0 - 1e-9)]
@@ -168,7 +167,8 @@ def improve(
     sample = [*_spread(failed), *_spread(well)]
     weights = {d.number: len(failed) / max(len(_spread(failed)), 1) for d in failed}
     weights |= {d.number: len(well) / max(len(_spread(well)), 1) for d in well}
-    plan, changes, effects = request.plan, {}, list[Effect]()
+    plan, effects = request.plan, list[Effect]()
+    changes: Table = {}
     now, candidates = sample, remedies_for(plan, request.bench, rehearsal.draws)
     for _ in range(MOST_STEPS):
         before = _rates(now, weights)

@@ -34,6 +34,7 @@ def summary(rehearsal: Rehearsal) -> dict[str, Any]:
         "tests": rehearsal.tests,
         "verdict": verdict_of(rehearsal).to_dict(),
         "tried": [dict(one) for one in rehearsal.tried],
+        "notes": [],
     }
 
 
@@ -62,9 +63,8 @@ def lines(found: dict[str, Any]) -> list[str]:
     time = verdict["duration_s"]
     out.append(f"test time       {_time(time['50 %'])}, nine in ten {_time(time['5 %'])} to {_time(time['95 %'])}")
     for name, band in list(verdict["margins"].items())[:CLOSE]:
-        out.append(
-            f"of its limit    {name}: {_percent(band['50 %'])}, 95 % below {_percent(band['95 %'])}, most {_percent(band['largest'])}"
-        )
+        most = f"95 % below {_percent(band['95 %'])}, most {_percent(band['largest'])}"
+        out.append(f"of its limit    {name}: {_percent(band['50 %'])}, {most}")
     out += _accuracy(verdict)
     for one in verdict["influences"][:MOST_INFLUENCES]:
         advice = f"; {one['advice']}" if one["advice"] else ""
@@ -97,7 +97,7 @@ def _accuracy(verdict: dict[str, Any]) -> list[str]:
     frequency, damping = verdict["frequency_error"], verdict["damping_error"]
     if not frequency["n"]:
         return []
-    text = f"accuracy        against harmonic balance of each twin ({frequency['n']} points): frequency {_ppm(frequency['50 %'])}"
+    text = f"accuracy        against harmonic balance ({frequency['n']} points): frequency {_ppm(frequency['50 %'])}"
     text += f", 95 % below {_ppm(frequency['95 %'])}"
     if damping["n"]:
         text += f"; damping {_percent(damping['50 %'])}, 95 % below {_percent(damping['95 %'])}"
@@ -114,7 +114,8 @@ def _tried(one: dict[str, Any]) -> str:
 
 
 def _share(share: dict[str, Any]) -> str:
-    return f"{_percent(share['value'])} ({_percent(share['low'])} to {_percent(share['high'])}; {share['count']} of {share['of']})"
+    interval = f"{_percent(share['low'])} to {_percent(share['high'])}"
+    return f"{_percent(share['value'])} ({interval}; {share['count']} of {share['of']})"
 
 
 def _percent(value: float) -> str:

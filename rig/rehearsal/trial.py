@@ -82,7 +82,7 @@ class Trial:
     duration_s: float
     """Time on the rig, s."""
     shares: Mapping[str, float]
-    """Largest value over its limit, by limit: ``voltage``, ``force``, and acceleration, displacement and range of every channel."""
+    """Largest value over its limit, by limit: ``voltage``, and force or acceleration, displacement and range of channels."""
     points: tuple[TrialPoint, ...]
     """Points that were measured or failed, in the order of measurement."""
 

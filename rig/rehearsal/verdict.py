@@ -78,7 +78,8 @@ class Band:
         """Return the band of the finite values."""
         finite = np.array([v for v in values if np.isfinite(v)])
         if not finite.size:
-            return cls(*[float("nan")] * 4, 0)
+            nothing = float("nan")
+            return cls(nothing, nothing, nothing, nothing, 0)
         low, middle, high = np.quantile(finite, [0.05, 0.5, 0.95])
         return cls(float(low), float(middle), float(high), float(finite.max()), finite.size)
 

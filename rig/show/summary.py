@@ -1,5 +1,6 @@
 """Contents of a file as one JSON-able dictionary: the output of ``rig show``."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from rig.campaigns.evaluation.drift import drift_of
 from rig.campaigns.evaluation.point import Spectrum
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.evaluation.skipped import what_was_skipped
+from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
@@ -16,7 +18,9 @@ from rig.check.report import summary
 from rig.models.files.files import KINDS, load, understood
 from rig.recording.arrays import kind_of
 from rig.recording.layout import file_integrity
+from rig.recording.parts import Part
 from rig.recording.reader import Recording
+from rig.rehearsal.foreseen import compared
 
 __all__ = ["summarise", "summarise_recording"]
 
@@ -66,7 +70,8 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
             "tripped": part.end is not None and part.end["tripped"],
             **{key: (part.end or {}).get(key) for key in ("tripped_at", "likely_cause", "what_to_do")},
             "changed": changed.get(number, []),
-            "about": part.information.get("about"),
+            "about": _about(part.information.get("about")),
+            "beside_rehearsal": _beside_rehearsal(part),
             "loop": None if part.end is None else part.end["loop"],
             "counters": None if part.end is None else part.end["counters"],
         }
@@ -95,6 +100,22 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         },
         "parts": parts,
     }
+
+
+def _about(about: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """Return the facts of a part without the values that a rehearsal foresaw, which `_beside_rehearsal` compares."""
+    if about is None or "rehearsal" not in about:
+        return None if about is None else dict(about)
+    kept = {key: value for key, value in about["rehearsal"].items() if key != "foreseen"}
+    return {**about, "rehearsal": kept}
+
+
+def _beside_rehearsal(part: Part) -> dict[str, Any] | None:
+    """Return where the points of a part lie within what its rehearsal foresaw; None without a rehearsal."""
+    foreseen = (part.information.get("about") or {}).get("rehearsal", {}).get("foreseen")
+    if foreseen is None:
+        return None
+    return compared(foreseen, [point_from(table) for table in part.points], part.end).to_dict()
 
 
 def _changes(recording: Recording) -> dict[int, list[str]]:

@@ -82,6 +82,7 @@ def print_summary(summary: dict[str, Any]) -> None:
             print(f"  not readable: {part['lost']}")
         _print_advice(part)
         _print_about(part["about"] or {})
+        _print_rehearsal((part["about"] or {}).get("rehearsal"), part.get("beside_rehearsal"))
         print_loop(part["loop"] or {}, part["counters"] or {})
 
 
@@ -118,6 +119,24 @@ def _print_about(about: dict[str, Any]) -> None:
         print(f"  device: {', '.join(f'{key} {value}' for key, value in about['device'].items())}")
     for line in [*armed.get("cautions", ()), *about.get("remarks", ()), *about.get("notes", ())]:
         print(f"  {line}")
+
+
+def _print_rehearsal(rehearsal: Mapping[str, Any] | None, beside: Mapping[str, Any] | None) -> None:
+    """Print what a rehearsal had promised, who overrode what, and where the run left what was foreseen."""
+    if not rehearsal:
+        return
+    if "digest" in rehearsal:
+        print(
+            f"  rehearsed: ends well {100.0 * rehearsal['ends_well']:.3g} %, trips {100.0 * rehearsal['trips']:.3g} % (up to "
+            f"{100.0 * rehearsal['trips_at_most']:.2g} %) of {rehearsal['draws']} draws; {rehearsal['file']}, digest "
+            f"{rehearsal['digest']}"
+        )
+    if overridden := rehearsal.get("overridden"):
+        print(f"  overridden by {overridden['by']}: {overridden['why']} (against it: {overridden['against']})")
+    for finding in (beside or {}).get("findings", ()):
+        print(f"  FINDING {finding}")
+    if beside is not None and not beside["findings"]:
+        print("  the run lies within what was foreseen")
 
 
 def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:

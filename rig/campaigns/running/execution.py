@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,13 +25,12 @@ from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
 from rig.errors import RecordingError
 from rig.loop.loop import LoopStatistics, RunningLoop
-from rig.recording.journal import JournalWriter
 from rig.system.stop_signals import asking, held
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 
-__all__ = ["Execution", "MeasuredBefore", "nothing_left"]
+__all__ = ["Execution", "Journal", "MeasuredBefore", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
@@ -59,6 +58,25 @@ class MeasuredBefore:
     """All points of the recording so far."""
 
 
+class Journal(Protocol):
+    """Takes what a part of a run produces; `rig.recording.journal.JournalWriter` writes it to a disk."""
+
+    def part(self, information: Mapping[str, Any]) -> None:
+        """Begin the part."""
+
+    def rows(self, rows: np.ndarray) -> None:
+        """Take telemetry rows."""
+
+    def event(self, event: Mapping[str, Any]) -> None:
+        """Take an event."""
+
+    def point(self, point: Mapping[str, Any]) -> None:
+        """Take a point."""
+
+    def end(self, end: Mapping[str, Any]) -> None:
+        """End the part."""
+
+
 class Execution:
     """One part of a recording: runs the control loop, writes the journal and evaluates the points."""
 
@@ -67,7 +85,7 @@ class Execution:
         plan: Plan,
         bench: Bench,
         loop: RunningLoop,
-        journal: JournalWriter,
+        journal: Journal,
         progress: Progress,
         before: MeasuredBefore | None = None,
     ) -> None:

@@ -68,14 +68,8 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> Rehearsal:
             frequency_hz=tuple(arrays["balanced/frequency_hz"][balanced].tolist()),
             damping_ratio=tuple(arrays["balanced/damping_ratio"][balanced].tolist()),
         )
-        trial = Trial(
-            shares=_row(arrays["shares"][row], attributes["limits"]),
-            points=points,
-            **{
-                name: arrays[name][row].item() if name not in ("end", "text", "channel") else str(arrays[name][row])
-                for name in TRIAL
-            },
-        )
+        one_trial: dict[str, Any] = {name: arrays[name].tolist()[row] for name in TRIAL}
+        trial = Trial(shares=_row(arrays["shares"][row], attributes["limits"]), points=points, **one_trial)
         unknowns = _row(arrays["unknowns"][row], attributes["unknowns"])
         draws.append(Draw(number=int(number), unknowns=unknowns, trial=trial, truth=truth))
     return Rehearsal(
@@ -91,6 +85,7 @@ def _row(values: NDArray[np.float64], names: Sequence[str]) -> dict[str, float]:
 
 
 def _say(found: dict[str, Any]) -> None:
+    """Print the page; the specimen stands above it."""
     for line in lines(found):
         print(line)
 
