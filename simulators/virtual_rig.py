@@ -251,12 +251,12 @@ class VirtualRig(Part):
         """Volts per newton or per m/s^2 of each channel [n_channel]."""
         return np.array([sensor.sensitivity_v_per_unit for sensor in self.sensors])
 
-    @property
+    @cached_property
     def filter_delay_samples(self) -> float:
         """Delay of every channel by the filters of the converter, in samples at low frequency; the hold not included."""
         return filter_delay(self.converter)
 
-    @property
+    @cached_property
     def channel_delays_samples(self) -> NDArray[np.float64]:
         """Delay of each channel by its own low-pass and skew [n_channel], in samples at low frequency."""
         return channel_delays(self.sensors, self.converter)
