@@ -15,7 +15,7 @@ Inverse Problem Theory, SIAM 2005, section 3.2), where s^2 is the misfit over it
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,11 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 LOW, HIGH, FLOOR_DAMPING = 0.05, 2.0, 0.005  # frequencies of the far modes over the ends of the band; their damping
+ABOVE = 1.1  # of the end of the band: least frequency of the mode above it
 UNEXPLAINED = 4.0  # misfit over its expectation above which a further mode is looked for
 EXPLAINED = 0.5  # of that misfit must be left, or less, for the mode to be kept
 MOST_BESIDE = 3
+MOST_CORRECTIONS = 12
 MODEL_FLOOR = 2e-3  # of a response: smallest standard deviation that is believed
 EXCITER = (
     "force_per_volt_n_v",
@@ -117,6 +119,22 @@ class LinearRig:
 
 
 @dataclass(frozen=True, eq=False)
+class _Linearisation:
+    """The fitted residuals of the responses near the most likely rig."""
+
+    responses: Responses
+    weight: Real
+    """Standard deviations of the residuals, misfit included [n, outputs]."""
+    jacobian: Real
+    """Slope of the weighted residuals, real parts above imaginary ones [2 n outputs, p]."""
+
+    def weighted(self, rig: LinearRig) -> Real:
+        """Weighted model of a rig [2 n outputs]."""
+        model = rig.responses(self.responses.frequency_hz, self.responses.sample_rate_hz) / self.weight
+        return np.concatenate([model.ravel().real, model.ravel().imag])
+
+
+@dataclass(frozen=True, eq=False)
 class LinearKnowledge:
     """What is known of the linear rig: the most likely parameters and their covariance."""
 
@@ -136,6 +154,8 @@ class LinearKnowledge:
     """Squared misfit over its expectation, by which the data's covariance is multiplied where it is above 1."""
     determined: float
     """Share of the parameters' directions whose standard deviation the data have at least halved."""
+    near: _Linearisation | None = None
+    """The residuals near the most likely rig; None without responses."""
 
     def rig(self, x: Real | None = None) -> LinearRig:
         """Return the rig of a parameter vector [p]; by default the most likely one."""
@@ -149,10 +169,29 @@ class LinearKnowledge:
         return float(np.sqrt(self.covariance[index, index]))
 
     def draw(self, generator: np.random.Generator) -> LinearRig:
-        """Draw a rig from the joint distribution."""
+        """Draw a rig from the joint distribution.
+
+        Along directions that the data leave wide the responses are no longer linear in the parameters. So a drawn vector is
+        moved until its responses are those that the linearisation gives it, by Gauss-Newton steps with the slope at the most
+        likely rig, as in randomised maximum likelihood (Oliver, Reynolds and Liu, Inverse Theory for Petroleum Reservoir
+        Characterization, 2008, section 10.7).
+        """
         values, vectors = np.linalg.eigh(self.covariance)
         spread = vectors * np.sqrt(np.maximum(values, 0.0))
-        return self.rig(self.mean + spread @ generator.standard_normal(self.mean.size))
+        drawn = self.mean + spread @ generator.standard_normal(self.mean.size)
+        return self.rig(drawn if self.near is None else self._corrected(drawn, self.near))
+
+    def _corrected(self, drawn: Real, near: _Linearisation) -> Real:
+        wanted = near.weighted(self.rig()) + near.jacobian @ (drawn - self.mean)
+        x, best, least = drawn, drawn, np.inf
+        for _ in range(MOST_CORRECTIONS):
+            miss = near.weighted(self.rig(x)) - wanted
+            size = float(miss @ miss)
+            if not size < least:
+                break
+            best, least = x, size
+            x = x - self.covariance @ (near.jacobian.T @ miss)
+        return best
 
 
 class _Parameters:
@@ -164,6 +203,7 @@ class _Parameters:
         self.positive: list[bool] = []
         self.centre: list[float] = []
         self.std: list[float] = []
+        self.lowest: dict[str, float] = {}
 
     def log(self, name: str, value: float, log_std: float = WIDE) -> None:
         """Add a positive parameter."""
@@ -231,6 +271,7 @@ def _parameters(
     lowest, highest = (0.4 * hertz, 2.5 * hertz) if responses is None else responses.frequency_hz[[0, -1]]
     out.mode("low", LOW * float(lowest), 0.1 * shape, log_std=(1e-3, 1e-3, 2.0))
     out.mode("high", HIGH * float(highest), shape, log_std=(0.5, 1e-3, 2.0))
+    out.lowest["frequency_hz high"] = float(np.log(ABOVE * highest))
     for number, line_hz in enumerate(beside, 2):
         out.mode(str(number), line_hz, 0.3 * shape, log_std=(0.1, 1.5, 2.0))
     return out
@@ -261,8 +302,11 @@ def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[Linea
         error = (misses(x) / sigma).ravel()
         return np.concatenate([error.real, error.imag, (x - centre) / std])
 
+    lowest = [parameters.lowest.get(name, -np.inf) for name in names]
     with np.errstate(over="ignore", invalid="ignore"):
-        found = least_squares(residuals, centre, x_scale=std, method="trf", max_nfev=100, ftol=1e-7, xtol=1e-7)
+        found = least_squares(
+            residuals, centre, bounds=(lowest, np.inf), x_scale=std, method="trf", max_nfev=100, ftol=1e-7, xtol=1e-7
+        )
     if not np.all(np.isfinite(found.fun)):
         raise ConfigurationError("the responses are not those of a shaker, a stinger and a structure near one mode")
     error = misses(found.x)
@@ -275,4 +319,5 @@ def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[Linea
     relative = np.abs(error) / scale
     worst = responses.frequency_hz[int(np.argmax(relative[:, 1]))]
     misfit = float(np.sqrt(np.mean(relative**2)))
-    return knowledge(found.x, covariance, misfit, inflation, determined), float(worst)
+    near = _Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), data)
+    return replace(knowledge(found.x, covariance, misfit, inflation, determined), near=near), float(worst)

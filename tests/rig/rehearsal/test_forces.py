@@ -1,0 +1,62 @@
+"""Hypothesised forces do to a mode what they are made for, by closed forms and by harmonic balance."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rig.drivers.virtual import VirtualDAQ
+from rig.rehearsal.forces import describing_function, drag_for, hardening_for, softening_for
+from rig.rehearsal.hypotheses import Hypotheses
+from rig.rehearsal.twins import draw_twin
+from simulators.analysis import phase_resonance_backbone
+from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
+from tests.rig.rehearsal.plans import PLAN, magnet_beam
+
+NOTHING = {
+    "hardening": 0.0,
+    "softening": 0.0,
+    "damping_growth": (1.0, 1.0),
+    "joint": 0.0,
+    "stop": 0.0,
+    "second_mode": 0.0,
+}
+NOTHING |= {"gain": 0.0, "frequency_drift": 0.0, "damping_drift": 0.0}
+
+
+def test_describing_functions_are_those_of_the_textbook():
+    assert describing_function(lambda x: x**3, 2.0) == pytest.approx(0.75 * 4.0)
+    assert describing_function(lambda x: x * np.abs(x), 2.0) == pytest.approx(8.0 / (3.0 * math.pi) * 2.0, rel=1e-5)
+
+
+def test_springs_add_their_stiffness_at_their_amplitude():
+    cubic = hardening_for("drive", 500.0, 2e-3)
+    assert 0.75 * cubic["stiffness_n_m3"] * (2e-3) ** 2 == pytest.approx(500.0)
+    factor, bound = softening_for("drive", -500.0, 2e-3)["parameters"]
+    assert describing_function(lambda x: factor * x**3 / (1 + (x / bound) ** 2), 2e-3) == pytest.approx(-500.0)
+    secant = factor * bound**2  # the most it ever takes from the stiffness
+    assert -1.0e3 < secant < -500.0
+
+
+@pytest.mark.parametrize("kind", ["hardening", "softening"])
+def test_a_twin_shifts_by_what_was_drawn(kind):
+    hypotheses = Hypotheses(**{**NOTHING, kind: 1.0, "shift": (0.03, 0.03)})
+    twin = draw_twin(magnet_beam(), PLAN, knowledge_of_the_magnet_beam(1e-6), hypotheses, 0, 0)
+    rig = VirtualDAQ(twin.bench).rig
+    low, high = 1e-6, 0.0021  # of the highest level on the linear rig, 3.0948 V
+    found = phase_resonance_backbone(rig, amplitudes_m=[low, high], near_hz=24.37)
+    shift = found.modal_frequency_hz[1] / found.modal_frequency_hz[0] - 1.0
+    assert shift == pytest.approx(0.03 if kind == "hardening" else -0.03, rel=0.1)
+    assert twin.unknowns["shift"] == pytest.approx(math.copysign(0.03, shift))
+
+
+def test_a_twins_damping_grows_by_what_was_drawn():
+    hypotheses = Hypotheses(**{**NOTHING, "damping_growth": (2.5, 2.5)})
+    twin = draw_twin(magnet_beam(), PLAN, knowledge_of_the_magnet_beam(1e-6), hypotheses, 0, 0)
+    found = phase_resonance_backbone(VirtualDAQ(twin.bench).rig, amplitudes_m=[1e-6, 0.0021], near_hz=24.37)
+    assert found.damping_ratio[1] / found.damping_ratio[0] == pytest.approx(2.5, rel=0.1)
+
+
+def test_drag_dissipates_what_a_damper_would():
+    table = drag_for("drive", 3.0, 0.4)
+    assert 8.0 / (3.0 * math.pi) * table["parameters"][0] * 0.4 == pytest.approx(3.0)
