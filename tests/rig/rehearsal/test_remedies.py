@@ -1,0 +1,83 @@
+"""A plan that is bad in one way gets the remedy for that, and not another one."""
+
+import pytest
+
+from rig.campaigns.plans import load_plan, plan_from
+from rig.rehearsal.hypotheses import Hypotheses
+from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
+from rig.rehearsal.remedies import improve, remedies_for
+from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
+from tests.rig.rehearsal.plans import SHORT, magnet_beam
+
+CALM = Hypotheses(hardening=0.0, softening=0.0, joint=0.0, stop=0.0, second_mode=0.0, gain=0.0)
+
+
+def spoilt(**changes):
+    table = SHORT.model_dump(mode="json", exclude_none=True)
+    for key, value in changes.items():
+        table[key] = table[key] | value if isinstance(value, dict) else value
+    return plan_from(table, "spoilt plan")
+
+
+def improved(plan, hypotheses=CALM, draws=4, bench=None):
+    request = RehearsalRequest(
+        plan=plan,
+        bench=bench or magnet_beam(),
+        knowledge=knowledge_of_the_magnet_beam(),
+        hypotheses=hypotheses,
+        draws=draws,
+    )
+    first = rehearse(request)
+    return first, improve(request, first)
+
+
+def test_a_plan_without_patience_is_given_some():
+    first, found = improved(spoilt(settle={"longest_periods": 30.0}))
+    assert not any(draw.trial.completed for draw in first.draws)
+    assert found.changes == {"settle": {"longest_periods": 90.0}}
+    taken = [effect for effect in found.effects if effect.taken]
+    assert [effect.name for effect in taken] == ["three times as long to settle"]
+    assert taken[0].ends_well == (0.0, 1.0)
+    assert found.plan.settle.longest_periods == 90.0
+
+
+def test_a_window_that_is_too_narrow_is_widened():
+    hypotheses = CALM.model_copy(update={"hardening": 1.0, "shift": (0.02, 0.04)})
+    narrow = spoilt(controller={"frequency_window_hz": [24.2, 24.6]}, levels_v=[0.4, 2.0])
+    first, found = improved(narrow, hypotheses)
+    assert not any(draw.trial.completed for draw in first.draws)
+    low, high = found.changes["controller"]["frequency_window_hz"]
+    assert low < 24.2 and high > 24.6
+
+
+def test_a_level_that_trips_is_left_out():
+    bench = magnet_beam()
+    bench = bench.model_copy(update={"limits": bench.limits.model_copy(update={"displacement_m": 6e-4})})
+    first, found = improved(spoilt(levels_v=[0.2, 0.4, 2.0]), bench=bench)
+    assert all(draw.trial.tripped for draw in first.draws)
+    assert found.changes == {"levels_v": [0.2, 0.4]}
+
+
+def test_a_good_plan_stays_as_it_is():
+    first, found = improved(SHORT)
+    assert all(draw.trial.completed for draw in first.draws)
+    assert (found.changes, found.effects, found.plan) == ({}, (), SHORT)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "magnet-beam/backbone",
+        "magnet-beam/stepped-phase",
+        "magnet-beam/sweep-up-1",
+        "magnet-beam/multisine-1",
+        "friction-beam/dwell",
+    ],
+)
+def test_every_kind_of_plan_has_remedies_that_are_plans(name):
+    plan = load_plan(name)
+    table = plan.model_dump(mode="json", exclude_none=True)
+    for remedy in remedies_for(plan, magnet_beam(), ()):
+        for key in remedy.changes:
+            assert key in type(plan).model_fields, remedy.name
+            assert remedy.changes[key] != table.get(key), remedy.name
