@@ -11,7 +11,7 @@ from rig.arming.run_facts import user_name
 from rig.bench import Bench
 from rig.errors import NotArmed
 
-__all__ = ["Rehearsed", "rehearsal_facts", "tested_digest"]
+__all__ = ["Rehearsed", "rehearsal_facts", "subject_digest"]
 
 BESIDE = {"name", "description", "arming"}
 """Keys of plan and bench that no test depends on."""
@@ -33,7 +33,7 @@ class Rehearsed:
     digest: str
     """Digest of the rehearsal."""
     tests: str
-    """Digest of the plan and the bench that were rehearsed (`tested_digest`)."""
+    """Digest of the plan and the bench that were rehearsed (`subject_digest`)."""
     finished: str
     """When, ISO 8601."""
     draws: int
@@ -48,7 +48,7 @@ class Rehearsed:
     """What it foresees, point by point (`rig.rehearsal.foreseen`)."""
 
 
-def tested_digest(plan: _Table, bench: _Table) -> str:
+def subject_digest(plan: _Table, bench: _Table) -> str:
     """Digest of plan and bench without what no test depends on: a rehearsal holds for these alone."""
     facts = [table.model_dump(mode="json", exclude=BESIDE) for table in (plan, bench)]
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
@@ -80,7 +80,7 @@ def _against(plan: _Table, bench: Bench, rehearsed: Rehearsed | None) -> str:
         if largest is None:
             return ""
         return f"arms only what was rehearsed, with a trip below {100.0 * largest:g} %: rig rehearse, then `rehearsal`"
-    if rehearsed.tests != tested_digest(plan, bench):
+    if rehearsed.tests != subject_digest(plan, bench):
         return f"`rehearsal` = {rehearsed.file}: is of another plan or another bench"
     if largest is None:
         return ""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import vibrolock
-from rig.arming.rehearsed import tested_digest
+from rig.arming.rehearsed import subject_digest
 from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
@@ -93,7 +93,7 @@ class RehearsalRequest:
             "most_likely": {} if known is None else dict(known.linear.rig().values),
             "relative_std": {} if known is None else {name: known.linear.std(name) for name in known.linear.names},
             "determined": None if known is None else known.linear.determined,
-            "tests": tested_digest(self.plan, self.bench),
+            "tests": subject_digest(self.plan, self.bench),
             "seed": self.seed,
             "software_version": vibrolock.__version__,
         }
@@ -120,7 +120,7 @@ class Rehearsal:
 
     @property
     def tests(self) -> str:
-        """Digest of plan and bench (`rig.arming.rehearsed.tested_digest`)."""
+        """Digest of plan and bench (`rig.arming.rehearsed.subject_digest`)."""
         return str(self.facts["tests"])
 
 

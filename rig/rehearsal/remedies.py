@@ -174,7 +174,7 @@ def improve(
         before = _rates(now, weights)
         if not any(not draw.trial.completed for draw in now):
             break
-        tried: list[tuple[float, Remedy, Plan, list[Draw]]] = []
+        tried: list[tuple[float, float, Remedy, Plan, list[Draw]]] = []
         for remedy in candidates:
             changed = _changed(plan, remedy.changes, request.bench)
             if changed is None:
@@ -184,10 +184,10 @@ def improve(
             effect = Effect(remedy.name, remedy.changes, (before[0], after[0]), (before[1], after[1]), len(sample))
             effects.append(effect)
             progress(effect)
-            tried.append((_score(after) - _score(before), remedy, changed, found))
+            tried.append((_score(after) - _score(before), -_duration_s(found), remedy, changed, found))
         if not tried:
             break
-        rise, remedy, changed, found = max(tried, key=lambda entry: entry[0])
+        rise, _, remedy, changed, found = max(tried, key=lambda entry: (round(entry[0], 6), entry[1]))
         if rise <= WORTH:
             break
         effects = [
@@ -225,6 +225,11 @@ def _rates(draws: Sequence[Draw], weights: Mapping[int, float]) -> tuple[float, 
     well = sum(weights[draw.number] for draw in draws if draw.trial.completed) / total
     trips = sum(weights[draw.number] for draw in draws if draw.trial.tripped) / total
     return well, trips
+
+
+def _duration_s(draws: Sequence[Draw]) -> float:
+    """Median test time; of remedies that help equally, the quickest is taken."""
+    return float(np.median([draw.trial.duration_s for draw in draws]))
 
 
 def _score(rates: tuple[float, float]) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import rig
-from rig.arming.rehearsed import tested_digest
+from rig.arming.rehearsed import subject_digest
 from rig.arming.run_options import RunOptions
 from rig.bench.bench import Arming
 from rig.campaigns.evaluation.recorded import points_of
@@ -68,8 +68,8 @@ def test_a_bench_that_asks_for_a_rehearsal_is_armed_by_one_alone(tmp_path, fores
         assert recording.parts[0].information["about"]["rehearsal"]["digest"] == foreseeing.digest
     with pytest.raises(NotArmed, match=r"with 16 draws up to 19.4 %; allowed is up to 10 %"):
         carry_out(SHORT, careful(largest_trip_probability=0.1), tmp_path / "other.h5", RunOptions(rehearsal=told))
+    old = replace(told, finished="2020-01-01T00:00:00+00:00")
     with pytest.raises(NotArmed, match="counts for 168 h"):
-        old = replace(told, finished="2020-01-01T00:00:00+00:00")
         carry_out(SHORT, bench, tmp_path / "other.h5", RunOptions(rehearsal=old))
 
 
@@ -77,7 +77,7 @@ def test_a_rehearsal_of_something_else_arms_nothing(tmp_path, foreseeing):
     told = rehearsed_in(foreseeing, "r.h5")
     other = SHORT.model_copy(update={"levels_v": (0.4, 0.9)})
     for plan, bench in ((other, magnet_beam()), (SHORT, bench_with({"limits": {"force_n": 30.0}}))):
-        with pytest.raises(NotArmed, match="r.h5: is of another plan or another bench"):
+        with pytest.raises(NotArmed, match=r"r\.h5: is of another plan or another bench"):
             carry_out(plan, bench, tmp_path / "run.h5", RunOptions(rehearsal=told))
 
 
@@ -91,9 +91,9 @@ def test_who_overrides_is_recorded(tmp_path, monkeypatch):
 
 
 def test_names_and_arming_change_no_digest():
-    assert tested_digest(SHORT, magnet_beam()) == tested_digest(SHORT, careful(automated=True))
-    assert tested_digest(SHORT, magnet_beam()) == tested_digest(SHORT, magnet_beam(name="another name"))
-    assert tested_digest(SHORT, magnet_beam()) != tested_digest(SHORT, magnet_beam(block=2))
+    assert subject_digest(SHORT, magnet_beam()) == subject_digest(SHORT, careful(automated=True))
+    assert subject_digest(SHORT, magnet_beam()) == subject_digest(SHORT, magnet_beam(name="another name"))
+    assert subject_digest(SHORT, magnet_beam()) != subject_digest(SHORT, magnet_beam(block=2))
 
 
 def test_a_recording_shows_its_rehearsal_and_resumes_with_it(tmp_path, foreseeing, capsys):

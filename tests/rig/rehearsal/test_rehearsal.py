@@ -37,14 +37,14 @@ def test_draws_do_not_depend_on_how_many_processes_made_them(rehearsed):
 def test_an_interrupted_rehearsal_goes_on_where_it_ended(tmp_path, rehearsed):
     journal, seen = tmp_path / "r.h5.draws", []
 
-    class Enough(Exception):
+    class EnoughError(Exception):
         pass
 
     def stop_after_two(draw, done):
         if done == 2:
-            raise Enough
+            raise EnoughError
 
-    with pytest.raises(Enough):
+    with pytest.raises(EnoughError):
         rehearse(request_of(), journal, progress=stop_after_two)
     with journal.open("a") as stream:
         stream.write('{"number": 2, "unkn')  # a power cut in mid-line

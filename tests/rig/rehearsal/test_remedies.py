@@ -32,22 +32,22 @@ def improved(plan, hypotheses=CALM, draws=4, bench=None):
 
 
 def test_a_plan_without_patience_is_given_some():
-    first, found = improved(spoilt(settle={"longest_periods": 30.0}))
+    first, found = improved(spoilt(settle={"longest_periods": 40.0}))
     assert not any(draw.trial.completed for draw in first.draws)
-    assert found.changes == {"settle": {"longest_periods": 90.0}}
+    assert found.changes == {"settle": {"longest_periods": 120.0}}
     taken = [effect for effect in found.effects if effect.taken]
     assert [effect.name for effect in taken] == ["three times as long to settle"]
     assert taken[0].ends_well == (0.0, 1.0)
-    assert found.plan.settle.longest_periods == 90.0
+    assert found.plan.settle.longest_periods == 120.0
 
 
 def test_a_window_that_is_too_narrow_is_widened():
     hypotheses = CALM.model_copy(update={"hardening": 1.0, "shift": (0.02, 0.04)})
-    narrow = spoilt(controller={"frequency_window_hz": [24.2, 24.6]}, levels_v=[0.4, 2.0])
+    narrow = spoilt(controller={"frequency_window_hz": [23.9, 24.6]}, levels_v=[0.4, 2.0])
     first, found = improved(narrow, hypotheses)
     assert not any(draw.trial.completed for draw in first.draws)
     low, high = found.changes["controller"]["frequency_window_hz"]
-    assert low < 24.2 and high > 24.6
+    assert low < 23.9 < 24.6 < high
 
 
 def test_a_level_that_trips_is_left_out():
@@ -69,7 +69,7 @@ def test_a_good_plan_stays_as_it_is():
     [
         "magnet-beam/backbone",
         "magnet-beam/stepped-phase",
-        "magnet-beam/sweep-up-1",
+        "magnet-beam/sweep-1",
         "magnet-beam/multisine-1",
         "friction-beam/dwell",
     ],

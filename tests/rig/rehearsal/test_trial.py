@@ -19,7 +19,7 @@ def test_a_trial_measures_what_a_recorded_run_measures(tmp_path):
         rows = part.read(0, part.n_rows)
     assert [p.modal_frequency_hz for p in trial.points] == [p.modal.modal_frequency_hz for p in points]
     assert [p.damping_ratio for p in trial.points] == [p.modal.damping_ratio for p in points]
-    assert trial.completed and not trial.tripped and not trial.lost_lock
+    assert (trial.completed, trial.tripped, trial.lost_lock) == (True, False, False)
     assert trial.duration_s == pytest.approx(part.n_rows / 5000.0)
     assert trial.shares["force force"] == pytest.approx(np.abs(rows["inputs"][:, 0]).max() / 34.0)
     assert trial.shares["voltage"] == pytest.approx(np.abs(rows["output_v"]).max() / 9.5)

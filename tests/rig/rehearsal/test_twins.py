@@ -101,6 +101,6 @@ def test_a_device_of_another_driver_keeps_its_block_and_its_latency():
 )
 def test_wrong_hypotheses_are_named(tmp_path, text, says):
     (tmp_path / "h.toml").write_text(text)
-    with pytest.raises(ConfigurationError, match="h.toml") as error:
+    with pytest.raises(ConfigurationError, match=r"h\.toml") as error:
         load_hypotheses(tmp_path / "h.toml")
     assert says in str(error.value)
