@@ -286,8 +286,8 @@ def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[Linea
     names, channels = tuple(parameters.names), parameters.channels
     prior = np.diag(std**2)
 
-    def knowledge(x: Real, covariance: Real, *quality: float) -> LinearKnowledge:
-        return LinearKnowledge(names, positive, x, covariance, channels, *quality)
+    def knowledge(x: Real, covariance: Real, misfit: float, inflation: float, determined: float) -> LinearKnowledge:
+        return LinearKnowledge(names, positive, x, covariance, channels, misfit, inflation, determined)
 
     if responses is None:
         return knowledge(centre, prior, float("nan"), 1.0, 0.0), 0.0
