@@ -7,6 +7,7 @@ within each run, so that the variance between runs is ``s_between^2 = s_observed
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,8 +172,16 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
         response_harmonics_m=_mean_harmonics(levels, modes, "response_harmonics_m", harmonics),
         source="several backbones",
         specimen=modes[0].specimen,
+        **_common_drive_shape(modes),
         notes=(*_scatter_notes(modes), *dict.fromkeys([note for mode in modes for note in mode.notes])),
     )
+
+
+def _common_drive_shape(modes: Sequence[NonlinearMode]) -> dict[str, Any]:
+    """Return the mode shape at the drive point if all runs were evaluated with the same, else nothing."""
+    names = ("drive_mode_shape", "drive_mode_shape_std", "drive_mode_shape_source")
+    found = [{name: getattr(mode, name) for name in names} for mode in modes]
+    return found[0] if all(one == found[0] for one in found) else {}
 
 
 def _scatter_notes(modes: Sequence[NonlinearMode]) -> tuple[str, ...]:
