@@ -21,10 +21,10 @@ Complex = NDArray[np.complex128]
 def parameter_std(jacobian: Real, residuals: Real, weights: Real, covariance: Complex | None) -> Real:
     """Return the standard errors of the parameters, float[p].
 
-    ``residuals`` float[4 n] are the weighted errors of n lines: real parts of both responses, then imaginary parts; ``jacobian``
-    float[4 n, p] is their derivative, ``weights`` float[2, n] their weights. ``covariance`` complex[n, 2, 2] is ``E[e e^H]`` of
-    both responses line by line, circular and independent between lines. If it is None, the noise is taken from the residuals,
-    equal on all lines of a response.
+    ``residuals`` float[4 n] are the weighted errors of n lines: real parts of both responses, then imaginary parts;
+    ``jacobian`` float[4 n, p] is their derivative, ``weights`` float[2, n] their weights. ``covariance`` complex[n, 2, 2] is
+    ``E[e e^H]`` of both responses line by line, circular and independent between lines. If it is None, the noise is taken from
+    the residuals, equal on all lines of a response.
     """
     lines = weights.shape[1]
     left, size, right = np.linalg.svd(jacobian / (scale := np.linalg.norm(jacobian, axis=0)), full_matrices=False)

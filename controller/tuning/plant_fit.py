@@ -35,9 +35,9 @@ def fitted(
     fit both FRFs, weighted by their standard deviations ([n] or one number each; by default the root mean square of each FRF).
     Coefficients are real, so that ``H(-i w)`` is the conjugate of ``H(i w)`` by construction.
 
-    ``covariance`` complex[n, 2, 2] is that of the errors of both FRFs, ``E[e e^H]`` line by line: it gives the standard errors of
-    the mode, increased where the model fits worse than the noise explains (`controller.tuning.plant_errors`). Without it the
-    noise is taken from the residuals.
+    ``covariance`` complex[n, 2, 2] is that of the errors of both FRFs, ``E[e e^H]`` line by line: it gives the standard errors
+    of the mode, increased where the model fits worse than the noise explains (`controller.tuning.plant_errors`). Without it
+    the noise is taken from the residuals.
 
     Raises
     ------
@@ -67,9 +67,8 @@ def fitted(
         max_nfev=4000,
     )
     x = found.x
-    frequency_std, damping_std, shape_std = parameter_std(
-        found.jac, found.fun, np.stack([weight_f, weight_a]), errors
-    )[:3]
+    deviations = parameter_std(np.asarray(found.jac), found.fun, np.stack([weight_f, weight_a]), errors)
+    frequency_std, damping_std, shape_std = deviations[:3]
     model_f, model_a = _model(x, s, centre)
     return {
         "frequency_rad_s": centre * math.exp(x[0]),

@@ -23,7 +23,6 @@ force.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +92,7 @@ def nonlinear_mode(
     NonlinearMode
         In the order of the backbone. Without any mass-normalised shape, damping and modal amplitude are NaN, the modal
         frequency is that of the vibration, and a note says so. Standard errors include the errors of the Fourier
-        coefficients, of the drift, of the shapes (if known; that of ``drive_mode_shape`` too) and of the sensors (as given here). They do not include aliasing
+        coefficients, of the drift, of the shapes (if known) and of the sensors (as given here). They do not include aliasing
         of the output's steps in inputs without an anti-aliasing filter. Nor do they include the run-to-run scatter of the
         specimen and of the reached level, which `identification.combined` estimates. At one voltage the amplitudes of the
         friction beam differ by up to 5e-5 from run to run, several times their standard error; frequency, damping and
@@ -118,6 +117,7 @@ def nonlinear_mode(
     states, rows = _states(backbone, mode_shapes, _shape_for_mac(mode_shapes, linear_shape))
     found = properties(states)
     _refuse_unreal(backbone, found)
+    alone = mode_shapes is None
     return NonlinearMode(
         **found,
         **propagated(
@@ -134,13 +134,10 @@ def nonlinear_mode(
         source="backbone",
         specimen=backbone.specimen,
         notes=(*notes, *_notes(backbone, mode_shapes)),
-        **(_drive_shape(backbone) if mode_shapes is None else {}),
+        drive_mode_shape=backbone.drive_mode_shape if alone else None,
+        drive_mode_shape_std=backbone.drive_mode_shape_std if alone else None,
+        drive_mode_shape_source=backbone.drive_mode_shape_source if alone else "",
     )
-
-
-def _drive_shape(backbone: Backbone) -> dict[str, Any]:
-    names = ("drive_mode_shape", "drive_mode_shape_std", "drive_mode_shape_source")
-    return {name: getattr(backbone, name) for name in names}
 
 
 def _refuse(name: str, point: PeriodicVibration) -> None:

@@ -153,9 +153,7 @@ def continuous_backbone(
             )
         )
     return ContinuousBackbone(
-        backbone=Backbone(
-            tuple(points), specimen, up.drive_mode_shape, drive_mode_shape_std=drive_mode_shape_std
-        ),
+        backbone=Backbone(tuple(points), specimen, up.drive_mode_shape, drive_mode_shape_std=drive_mode_shape_std),
         amplitude_m=levels,
         stiffness=stiffness,
         damping_1_s=damping,

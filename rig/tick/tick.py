@@ -29,7 +29,8 @@ class Tick:
 
     ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
     latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
-    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. ``armed = False`` keeps the output at 0 V.
+    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's.
+    ``armed = False`` keeps the output at 0 V.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """

@@ -50,7 +50,8 @@ def shapes_of(bench: Bench, plan: Plan) -> np.ndarray | None:
     drive = bench.index_of("drive")
     known = [at_drive if i == drive else channel.mode_shape for i, channel in enumerate(bench.channels)]
     ratios = np.array([math.nan if shape is None else shape for shape in known]) / at_drive
-    measured = plan.plant.response_ratios if isinstance(plan, KnownPlant) and plan.plant is not None else {}
+    plant = plan.plant if isinstance(plan, KnownPlant) else None
+    measured: dict[str, float] = {} if plant is None else plant.response_ratios
     sizes = [measured.get(channel.name, size) for channel, size in zip(bench.channels, np.abs(ratios), strict=True)]
     return np.asarray(np.copysign(sizes, ratios))
 

@@ -59,9 +59,7 @@ def drive_shape(bench: Bench, plant: PlantFacts | None) -> DriveShape:
         return DriveShape(value=fact, specimen=specimen, source="" if fact is None else f"of the bench {bench.name}")
     source, ratio = "[plant] of the plan", 1.0 if fact is None else abs(fact) / plant.drive_shape
     if abs(ratio - 1.0) > WORTH_SAYING:
-        source += (
-            f"; that of the bench, {fact:g}, is {ratio:.2f} times as large and would give {ratio**2:.2f} times the damping"
-        )
+        source += f"; that of the bench, {fact:g}, is {ratio:.2f} times as large, damping with it {ratio**2:.2f} times"
     return DriveShape(
         value=plant.drive_shape, std=plant.drive_shape_std, measured=True, specimen=specimen, source=source
     )
