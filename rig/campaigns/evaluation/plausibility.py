@@ -1,4 +1,4 @@
-"""Check whether the channels of a point fit each other, by the mode shapes of the bench and by earlier points.
+"""Check whether the channels of a point fit each other, by the mode shapes of plan and bench and by earlier points.
 
 A sensor may fail in a way that trips no limit: it reads only noise, or its sensitivity falls to a tenth. At phase resonance of
 one mode, the fundamental of response k over that of the drive is the real number ``phi_k / phi_d``; higher harmonics and other
