@@ -265,8 +265,8 @@ def _from_points(
 ) -> ContinuousBackbone:
     ways = [_both_ways(point) for point in points]
     # Points of a resumed recording may have been evaluated with another mode shape: the damping goes with its square.
-    used = [shape.value if point.modal is None else point.modal.drive_mode_shape or shape.value for point in points]
-    times = np.array([((shape.value or 1.0) / (one or 1.0)) ** 2 for one in used])
+    used = [(None if point.modal is None else point.modal.drive_mode_shape) or shape.fact for point in points]
+    times = np.array([((shape.value or 1.0) / (one or shape.value or 1.0)) ** 2 for one in used])
     vibrations = tuple(vibration_from(point, channels) for point in points)
     return ContinuousBackbone(
         backbone=shape.backbone(vibrations),

@@ -40,6 +40,7 @@ DWELL_COLUMNS = (
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
     Column("frequency_change", "frequency change", "%", "+.3f", 100.0),
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
     Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
     Column("force_n", "force", "N", ".4f", plain=True),
     Column("phase_error_deg", "phase error", "deg", ".2f"),

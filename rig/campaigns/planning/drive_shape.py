@@ -25,6 +25,8 @@ class DriveShape:
     """Mass-normalised, kg^-1/2; None if neither the plan nor the bench has it."""
     std: float | None = None
     """Standard error, kg^-1/2; None if unknown."""
+    fact: float | None = None
+    """The bench's, kg^-1/2; None if it has none."""
     measured: bool = False
     """Whether it is the measured one, of the plan's ``[plant]``."""
     specimen: str = ""
@@ -56,10 +58,17 @@ def drive_shape(bench: Bench, plant: PlantFacts | None) -> DriveShape:
     """Return the mode shape that a test is evaluated with: as measured, of the plan's ``plant``, else the bench's fact."""
     specimen, fact = bench.specimen.name, bench.specimen.drive_mode_shape
     if plant is None:
-        return DriveShape(value=fact, specimen=specimen, source="" if fact is None else f"of the bench {bench.name}")
+        return DriveShape(
+            value=fact, fact=fact, specimen=specimen, source="" if fact is None else f"of the bench {bench.name}"
+        )
     source, ratio = "[plant] of the plan", 1.0 if fact is None else abs(fact) / plant.drive_shape
     if abs(ratio - 1.0) > WORTH_SAYING:
         source += f"; that of the bench, {fact:g}, is {ratio:.2f} times as large, damping with it {ratio**2:.2f} times"
     return DriveShape(
-        value=plant.drive_shape, std=plant.drive_shape_std, measured=True, specimen=specimen, source=source
+        value=plant.drive_shape,
+        std=plant.drive_shape_std,
+        fact=fact,
+        measured=True,
+        specimen=specimen,
+        source=source,
     )

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Self
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from controller import AmplitudeLaw, PhaseLockedLoop
 from controller.tuning import (
@@ -66,6 +67,14 @@ class PlantFacts(Configured):
     bench's mode shapes when levels and channels are checked."""
     response_ratio_stds: dict[str, NonNegativeFloat] = Field(default_factory=dict)
     """Standard errors of the ratios, by channel name; a missing one is unknown."""
+
+    @model_validator(mode="after")
+    def _ratios_for_their_errors(self) -> Self:
+        for name in self.response_ratio_stds:
+            if name not in self.response_ratios:
+                known = ", ".join(self.response_ratios) or "it has none"
+                raise ValueError(f"response_ratio_stds.{name}: allowed is a channel of response_ratios: {known}")
+        return self
 
     @property
     def residual_m_n(self) -> float:

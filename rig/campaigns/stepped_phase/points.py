@@ -26,6 +26,7 @@ STEPPED_PHASE_COLUMNS = (
     Column("force_rms_n", "force RMS", "N", ".4f"),
     Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
     Column("level_error", "level error", "%", ".2f", 100.0),
     *PURITY_COLUMNS,
 )
