@@ -100,10 +100,10 @@ def lines(found: dict[str, Any]) -> list[str]:
         f"{found['specimen']} (bench {found['bench']}), tuned",
         f"multisine      {test['level_rms_v']:.4g} V RMS, coherence {test['coherence_force']:.5f} (force) and "
         f"{test['coherence_drive']:.5f} (drive), distortion {100.0 * test['distortion']:.2g} %",
-        f"structure      {plant['frequency_hz']:.3f} Hz{_bound(plant['frequency_std_hz'])} (bench "
-        f"{plant['bench_frequency_hz']:g}), damping {100.0 * plant['damping_ratio']:.3f} %"
-        f"{_bound(plant['damping_ratio_std'], 100.0)}, phi_d {plant['drive_mode_shape']:.4f} kg^-1/2"
-        f"{_bound(plant['drive_mode_shape_std'])} (bench {'none' if shape is None else format(shape, 'g')})",
+        f"structure      {plant['frequency_hz']:.3f}{_bound(plant['frequency_std_hz'])} Hz (bench "
+        f"{plant['bench_frequency_hz']:g}), damping {100.0 * plant['damping_ratio']:.3f}"
+        f"{_bound(plant['damping_ratio_std'], 100.0)} %, phi_d {plant['drive_mode_shape']:.4f}"
+        f"{_bound(plant['drive_mode_shape_std'])} kg^-1/2 (bench {'none' if shape is None else format(shape, 'g')})",
         f"with exciter   {plant['coupled_pole_hz']:.3f} Hz, damping {100.0 * plant['coupled_damping_ratio']:.2f} %, mass ratio "
         + (f"{low:.3f}" if high - low < 0.2 * abs(high) else f"could not be identified ({low:.3f} to {high:.3f})")
         + f", {plant['force_per_v_n']:.3g} N/V at resonance; model within {100.0 * plant['fit_error']:.2g} %",
