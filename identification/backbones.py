@@ -31,11 +31,16 @@ class Backbone:
         ``up`` or ``down`` for every point; empty if it was not noted.
     repeats
         Number of the pass through the levels for every point, from 1; empty if it was not noted.
+    drive_mode_shape_std
+        Standard error of ``drive_mode_shape``, kg^-1/2, the same error at all points; None if unknown.
+    drive_mode_shape_source
+        Where ``drive_mode_shape`` comes from, in words; empty if it was not noted.
 
     Raises
     ------
     IdentificationError
-        If there are no points, if their channels or numbers of harmonics differ, or if the labels do not match the points.
+        If there are no points, if their channels or numbers of harmonics differ, if the labels do not match the points, or if
+        the mode shape or its standard error is not a number that is allowed.
     """
 
     points: tuple[PeriodicVibration, ...]
@@ -43,6 +48,8 @@ class Backbone:
     drive_mode_shape: float | None = None
     directions: tuple[str, ...] = ()
     repeats: tuple[int, ...] = ()
+    drive_mode_shape_std: float | None = None
+    drive_mode_shape_source: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", tuple(self.points))
@@ -54,6 +61,9 @@ class Backbone:
                 raise IdentificationError(f"points[{number}]: channels or harmonics differ from those of points[0]")
         if self.drive_mode_shape is not None and not (np.isfinite(self.drive_mode_shape) and self.drive_mode_shape):
             raise IdentificationError(f"drive_mode_shape: is {self.drive_mode_shape}, must be finite and not zero")
+        std = self.drive_mode_shape_std
+        if std is not None and not (np.isfinite(std) and std >= 0.0):
+            raise IdentificationError(f"drive_mode_shape_std: is {std}, allowed is 0 or above")
         for name, labels in (("directions", self.directions), ("repeats", self.repeats)):
             if labels and len(labels) != len(self.points):
                 raise IdentificationError(f"{name}: {len(labels)} given for {len(self.points)} points")

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["PlantModel"]
 
 Complex = NDArray[np.complex128]
+STANDARD_ERRORS = ("frequency_std_rad_s", "damping_ratio_std", "drive_shape_std")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +52,21 @@ class PlantModel:
     """Sample rate of the loop."""
     latency_samples: float
     """Delay common to all channels, from an output sample to the input sample that shows its effect, in samples."""
+    frequency_std_rad_s: float | None = None
+    """Standard error of the frequency; None if unknown."""
+    damping_ratio_std: float | None = None
+    """Standard error of the damping ratio; None if unknown."""
+    drive_shape_std: float | None = None
+    """Standard error of the mode shape at the drive point, kg^-1/2; None if unknown."""
 
     def __post_init__(self) -> None:
         for name in ("frequency_rad_s", "damping_ratio", "drive_shape", "centre_rad_s", "sample_rate_hz"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} = {getattr(self, name):g}: allowed is above 0")
+        for name in STANDARD_ERRORS:
+            std = getattr(self, name)
+            if std is not None and not 0.0 <= std < math.inf:
+                raise ValueError(f"{name} = {std:g}: allowed is 0 or more")
         if not 0.0 <= self.latency_samples < math.inf:
             raise ValueError(f"latency_samples = {self.latency_samples:g}: allowed is 0 or more")
 
@@ -160,17 +171,18 @@ class PlantModel:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields as floats and lists of floats, for a table in a plan."""
-        return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
+        """Return the known fields as floats and lists of floats, for a table in a plan."""
+        values = ((one.name, getattr(self, one.name)) for one in fields(self))
+        return {name: _plain(value) for name, value in values if value is not None}
 
     @classmethod
     def from_dict(cls, table: Mapping[str, Any]) -> Self:
-        """Return the model from a table made by `to_dict`.
+        """Return the model from a table made by `to_dict`; standard errors may be missing.
 
         Raises ValueError if a key is missing or unknown, or if a value has the wrong shape.
         """
         names = {f.name for f in fields(cls)}
-        if wrong := sorted(names.symmetric_difference(table)):
+        if wrong := sorted(names.symmetric_difference(table) - (set(STANDARD_ERRORS) - set(table))):
             raise ValueError(f"plant.{wrong[0]}: {'missing' if wrong[0] in names else 'not known'}")
         lengths = {"residual_per_kg": 2, "force_v_n": 4, "acceleration_v_s2_m": 4, "band_hz": 2}
         values: dict[str, Any] = {}
@@ -193,11 +205,12 @@ class PlantModel:
         latency_samples: float,
         force_std: ArrayLike | None = None,
         acceleration_std: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
     ) -> Self:
         """Fit the plant to measured FRFs from voltage; see `controller.tuning.plant_fit.fitted`."""
         from controller.tuning.plant_fit import fitted
 
-        found = fitted(frequency_hz, force_per_v, acceleration_per_v, force_std, acceleration_std)
+        found = fitted(frequency_hz, force_per_v, acceleration_per_v, force_std, acceleration_std, covariance)
         return cls(**found, sample_rate_hz=sample_rate_hz, latency_samples=latency_samples)
 
 

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from controller.tuning.plant_errors import parameter_std
+
 __all__ = ["fitted"]
 
 Real = NDArray[np.float64]
@@ -24,6 +26,7 @@ def fitted(
     acceleration_per_v: ArrayLike,
     force_std: ArrayLike | None = None,
     acceleration_std: ArrayLike | None = None,
+    covariance: ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Fit the FRFs [n] in a band around one mode; return the identified fields of a `PlantModel`.
 
@@ -32,10 +35,15 @@ def fitted(
     fit both FRFs, weighted by their standard deviations ([n] or one number each; by default the root mean square of each FRF).
     Coefficients are real, so that ``H(-i w)`` is the conjugate of ``H(i w)`` by construction.
 
+    ``covariance`` complex[n, 2, 2] is that of the errors of both FRFs, ``E[e e^H]`` line by line: it gives the standard errors
+    of the mode, increased where the model fits worse than the noise explains (`controller.tuning.plant_errors`). Without it
+    the noise is taken from the residuals.
+
     Raises
     ------
     ValueError
-        If the FRFs are not finite, differ in length, have too few lines, or show no resonance of the structure.
+        If the FRFs or their covariance are not finite, differ in length, have too few lines, or show no resonance of the
+        structure.
     """
     from scipy.optimize import least_squares
 
@@ -43,6 +51,7 @@ def fitted(
     s: Complex = 2j * np.pi * frequency.astype(np.complex128)
     weight_f = 1.0 / np.broadcast_to(_rms(h_f) if force_std is None else np.asarray(force_std, float), h_f.shape)
     weight_a = 1.0 / np.broadcast_to(_rms(h_a) if acceleration_std is None else np.asarray(acceleration_std), h_a.shape)
+    errors = _checked_covariance(covariance, frequency.size)
     centre, start = _start(s, h_f, h_a)
 
     def residuals(x: Real) -> Real:
@@ -50,18 +59,25 @@ def fitted(
         error = np.concatenate([(model_f - h_f) * weight_f, (model_a - h_a) * weight_a])
         return np.concatenate([error.real, error.imag])
 
-    x = least_squares(
+    found = least_squares(
         residuals,
         start,
         method="lm",
         x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
         max_nfev=4000,
-    ).x
+    )
+    x = found.x
+    deviations = parameter_std(np.asarray(found.jac), found.fun, np.stack([weight_f, weight_a]), errors)
+    frequency_std, damping_std, shape_std = deviations[:3]
     model_f, model_a = _model(x, s, centre)
     return {
         "frequency_rad_s": centre * math.exp(x[0]),
         "damping_ratio": math.exp(x[1]),
         "drive_shape": math.exp(0.5 * x[2]),
+        # of the logarithms of frequency, damping and squared shape
+        "frequency_std_rad_s": centre * math.exp(x[0]) * float(frequency_std),
+        "damping_ratio_std": math.exp(x[1]) * float(damping_std),
+        "drive_shape_std": 0.5 * math.exp(0.5 * x[2]) * float(shape_std),
         "residual_per_kg": (float(x[3]), float(x[4])),
         "force_v_n": tuple(map(float, x[5:9])),
         "acceleration_v_s2_m": tuple(map(float, x[9:13])),
@@ -86,6 +102,15 @@ def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike)
             "frequency_hz, force_per_v, acceleration_per_v: allowed are finite numbers, frequencies above 0"
         )
     return frequency, h_f, h_a
+
+
+def _checked_covariance(covariance: ArrayLike | None, lines: int) -> Complex | None:
+    if covariance is None:
+        return None
+    found = np.asarray(covariance, np.complex128)
+    if found.shape != (lines, 2, 2) or not np.all(np.isfinite(found)):
+        raise ValueError(f"covariance: shape {found.shape}, allowed are finite numbers of shape {(lines, 2, 2)}")
+    return found
 
 
 def _rms(values: Complex) -> float:

@@ -38,6 +38,7 @@ _TABLE = (
     *(name for name in STANDARD_ERRORS.values() if name not in ("modal_frequency_std_hz", "damping_ratio_std")),
 )
 _TEXT = ("source", "specimen")
+_DRIVE_SHAPE = ("drive_mode_shape", "drive_mode_shape_std", "drive_mode_shape_source")
 
 
 def _unknown() -> Float:
@@ -95,6 +96,11 @@ class NonlinearMode:
         Name of what was tested.
     notes
         Remarks on the quality of the result, one line each.
+    drive_mode_shape, drive_mode_shape_std
+        Mass-normalised mode shape at the drive point that damping and modal amplitude were computed with, kg^-1/2, and its
+        standard error, which is in those of both; None if unknown, or if the shapes of a linear model were used.
+    drive_mode_shape_source
+        Where this mode shape comes from, in words; empty if it was not noted.
     """
 
     force_n: Float
@@ -118,6 +124,9 @@ class NonlinearMode:
     source: str
     specimen: str = ""
     notes: tuple[str, ...] = ()
+    drive_mode_shape: float | None = None
+    drive_mode_shape_std: float | None = None
+    drive_mode_shape_source: str = ""
     force_std_n: Float = field(default_factory=_unknown)
     amplitude_std_m: Float = field(default_factory=_unknown)
     phase_lag_std_deg: Float = field(default_factory=_unknown)
@@ -194,7 +203,8 @@ class NonlinearMode:
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Return arrays by name, and the JSON-able attributes that go with them."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        return arrays, {**{name: getattr(self, name) for name in _TEXT}, "notes": list(self.notes)}
+        named = {name: getattr(self, name) for name in (*_TEXT, *_DRIVE_SHAPE)}
+        return arrays, {**named, "notes": list(self.notes)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "NonlinearMode":
@@ -208,13 +218,14 @@ class NonlinearMode:
             raise IdentificationError(f"nonlinear mode: {', '.join(missing)} missing")
         values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS if name in arrays}
         values |= {name: str(attributes[name]) for name in _TEXT}
+        values |= {name: attributes[name] for name in _DRIVE_SHAPE if name in attributes}
         notes = tuple(attributes.get("notes", ()))
         if any(name not in arrays for name in _ADDED) and _EARLIER not in notes:
             notes = (*notes, _EARLIER)
         return cls(**values, notes=notes)
 
 
-_ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if entry.name not in (*_TEXT, "notes"))
+_ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if entry.name not in (*_TEXT, *_DRIVE_SHAPE, "notes"))
 _ADDED = tuple(entry.name for entry in fields(NonlinearMode) if entry.default_factory is _unknown)
 _EARLIER = "written by an earlier version: identify the recording again for the standard errors that are missing"
 _HARMONICS = ("force_harmonics", "response_harmonics_m")

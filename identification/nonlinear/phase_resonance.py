@@ -117,6 +117,7 @@ def nonlinear_mode(
     states, rows = _states(backbone, mode_shapes, _shape_for_mac(mode_shapes, linear_shape))
     found = properties(states)
     _refuse_unreal(backbone, found)
+    alone = mode_shapes is None
     return NonlinearMode(
         **found,
         **propagated(
@@ -133,6 +134,9 @@ def nonlinear_mode(
         source="backbone",
         specimen=backbone.specimen,
         notes=(*notes, *_notes(backbone, mode_shapes)),
+        drive_mode_shape=backbone.drive_mode_shape if alone else None,
+        drive_mode_shape_std=backbone.drive_mode_shape_std if alone else None,
+        drive_mode_shape_source=backbone.drive_mode_shape_source if alone else "",
     )
 
 

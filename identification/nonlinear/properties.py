@@ -33,7 +33,8 @@ class States:
     inverse
         float[..., M, C], pseudo-inverse of the mass-normalised shapes; None without shapes.
     drive_shape
-        Mass-normalised shape at the drive point, used without ``inverse``; None if unknown.
+        Mass-normalised shape at the drive point, used without ``inverse``; a number, or float[..., 1] for draws that differ.
+        None if unknown.
     linear_shape, linear_columns
         float[..., K], linear shape for the MAC, and its K columns in ``deflection_m``; K = 0 for none.
     """
@@ -44,7 +45,7 @@ class States:
     drift: Complex
     deflection_m: Complex
     inverse: Float | None
-    drive_shape: float | None
+    drive_shape: float | Float | None
     linear_shape: Float
     linear_columns: tuple[int, ...]
 
@@ -94,7 +95,7 @@ def _modal_amplitude(states: States) -> Float | None:
         modal = np.einsum("...mc,...nc->...nm", states.inverse, states.deflection_m)
         return np.asarray(np.linalg.norm(modal, axis=-1))
     if states.drive_shape is not None:
-        return np.asarray(np.abs(states.drive_m[..., 1]) / abs(states.drive_shape))
+        return np.asarray(np.abs(states.drive_m[..., 1]) / np.abs(states.drive_shape))
     return None
 
 

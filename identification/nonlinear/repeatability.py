@@ -161,6 +161,7 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
             intervals[:, column] = np.clip(intervals[:, column], 0.0, 1.0)
     for name in ("frequency_hz", "damping_ratio_uncorrected", "fit_residual"):
         out[name] = np.mean([_at(levels, mode, getattr(mode, name)) for mode in modes], axis=0)
+    shape, shape_std, shape_source = _common_drive_shape(modes)
     harmonics = min(mode.force_harmonics.shape[1] for mode in modes)
     return NonlinearMode(
         **out,
@@ -171,8 +172,17 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
         response_harmonics_m=_mean_harmonics(levels, modes, "response_harmonics_m", harmonics),
         source="several backbones",
         specimen=modes[0].specimen,
+        drive_mode_shape=shape,
+        drive_mode_shape_std=shape_std,
+        drive_mode_shape_source=shape_source,
         notes=(*_scatter_notes(modes), *dict.fromkeys([note for mode in modes for note in mode.notes])),
     )
+
+
+def _common_drive_shape(modes: Sequence[NonlinearMode]) -> tuple[float | None, float | None, str]:
+    """Return mode shape at the drive point, its standard error and its source if all runs have the same; else none."""
+    found = {(mode.drive_mode_shape, mode.drive_mode_shape_std, mode.drive_mode_shape_source) for mode in modes}
+    return next(iter(found)) if len(found) == 1 else (None, None, "")
 
 
 def _scatter_notes(modes: Sequence[NonlinearMode]) -> tuple[str, ...]:

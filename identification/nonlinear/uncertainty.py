@@ -3,7 +3,8 @@
 Random errors are independent between points: those of the Fourier coefficients of all channels and harmonics, drawn from
 Student's distribution for the number of batches behind a standard error, and that of the slope of the drift. Systematic
 errors are the same at all points: mass-normalised shapes, gains of the channels, and phase skew (a delay: the phase of
-harmonic h changes h times as much).
+harmonic h changes h times as much). The damping goes with the square of the mode shape at the drive point, so that twice the
+relative standard error of this shape is in that of the damping.
 """
 
 from collections.abc import Mapping
@@ -149,7 +150,9 @@ def _systematic(
     calibration = model.per_channel("calibration_std", backbone)
     skew = np.radians(model.per_channel("phase_skew_std_deg", backbone))
     drawn = None if shapes is None else shapes.draw(model.draws, rng)
-    if not (calibration.any() or skew.any() or drawn is not None):
+    shape, shape_std = states.drive_shape, backbone.drive_mode_shape_std
+    uncertain = shapes is None and shape is not None and bool(shape_std)
+    if not (calibration.any() or skew.any() or drawn is not None or uncertain):
         return None
     count = len(backbone.channels)
     gain = 1.0 + calibration * rng.standard_normal((model.draws, count))
@@ -165,6 +168,9 @@ def _systematic(
     if rows:
         turns = np.stack([turned(row)[..., 1] for row in rows], axis=-1)
         wrong = replace(wrong, deflection_m=wrong.deflection_m * turns)
+    if uncertain and shape is not None and shape_std is not None:
+        relative = shape_std / np.abs(shape) * rng.standard_normal((model.draws, 1))
+        wrong = replace(wrong, drive_shape=shape * np.exp(relative))  # of one sign, however uncertain
     if shapes is None or drawn is None:
         return wrong
     inverse = np.zeros((model.draws, drawn.shape[2], len(rows)))

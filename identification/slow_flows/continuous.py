@@ -96,6 +96,7 @@ def continuous_backbone(
     bandwidth: float = 0.15,
     accuracy: float = 0.008,
     specimen: str = "",
+    drive_mode_shape_std: float | None = None,
 ) -> ContinuousBackbone:
     """Compute a backbone from a ramp of the level up and one down, in any order.
 
@@ -115,6 +116,8 @@ def continuous_backbone(
         not enough, the width is increased up to one in ln(amplitude).
     specimen
         Name of what was tested.
+    drive_mode_shape_std
+        Standard error of the ramps' mode shape at the drive point, kg^-1/2; None if unknown.
 
     Raises
     ------
@@ -150,7 +153,7 @@ def continuous_backbone(
             )
         )
     return ContinuousBackbone(
-        backbone=Backbone(tuple(points), specimen, up.drive_mode_shape),
+        backbone=Backbone(tuple(points), specimen, up.drive_mode_shape, drive_mode_shape_std=drive_mode_shape_std),
         amplitude_m=levels,
         stiffness=stiffness,
         damping_1_s=damping,

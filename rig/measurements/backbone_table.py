@@ -34,6 +34,8 @@ def backbone_parts(backbone: Backbone) -> Contents:
         "channels": [vars(channel) for channel in channels],
         "specimen": backbone.specimen,
         "drive_mode_shape": backbone.drive_mode_shape,
+        "drive_mode_shape_std": backbone.drive_mode_shape_std,
+        "drive_mode_shape_source": backbone.drive_mode_shape_source,
         "directions": list(backbone.directions),
         "repeats": list(backbone.repeats),
         "warnings": [list(point.warnings) for point in points],
@@ -75,7 +77,15 @@ def backbone_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> B
     )
     shape = attributes.get("drive_mode_shape")
     directions, repeats = attributes.get("directions", ()), attributes.get("repeats", ())
-    return Backbone(points, attributes["specimen"], shape, tuple(directions), tuple(repeats))
+    return Backbone(
+        points,
+        attributes["specimen"],
+        shape,
+        tuple(directions),
+        tuple(repeats),
+        attributes.get("drive_mode_shape_std"),
+        attributes.get("drive_mode_shape_source", ""),
+    )
 
 
 def _known(values: Any, row: int) -> Any:

@@ -1,13 +1,13 @@
 """Contents of a file as one JSON-able dictionary: the output of ``rig show``."""
 
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from rig.campaigns.evaluation.drift import drift_of
-from rig.campaigns.evaluation.point import Spectrum
-from rig.campaigns.evaluation.recorded import points_of
+from rig.campaigns.evaluation.point import Point, Spectrum
+from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.evaluation.skipped import what_was_skipped
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
@@ -90,6 +90,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "complete": recording.complete,
         "points_planned": len(plan.targets()),
         "skipped": what_was_skipped(points, len(plan.targets())),
+        "drive_mode_shape": _mode_shape(recording, points, plan.kind),
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
         "drift": drift_of(points),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
@@ -116,6 +117,19 @@ def _beside_rehearsal(part: Part) -> dict[str, Any] | None:
     if foreseen is None:
         return None
     return compared(foreseen, [point_from(table) for table in part.points], part.end).to_dict()
+
+
+def _mode_shape(recording: Recording, points: Sequence[Point[Any]], kind: str) -> dict[str, Any] | None:
+    """Return the mode shape at the drive point that a model takes; None for kinds of campaigns that evaluate no damping.
+
+    ``others`` are the numbers of points that were evaluated with another one, under an earlier plan.
+    """
+    if all(column.key != "damping_ratio" for column in CAMPAIGNS[kind].columns):
+        return None
+    shape = recorded_drive_shape(recording, points)
+    own = shape.value if shape.measured else None
+    others = [one.number for one in points if one.modal is not None and one.modal.drive_mode_shape != own]
+    return {**asdict(shape), "text": str(shape), "others": others}
 
 
 def _changes(recording: Recording) -> dict[int, list[str]]:

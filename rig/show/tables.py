@@ -67,6 +67,7 @@ def print_summary(summary: dict[str, Any]) -> None:
     if summary["skipped"]:
         print(summary["skipped"])
     _print_drift(summary["drift"])
+    _print_mode_shape(summary["drive_mode_shape"])
     if summary["former_points"]:
         print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
         _print_points(summary["kind"], summary["former_points"])
@@ -101,6 +102,18 @@ def _print_drift(drift: dict[str, Any] | None) -> None:
         for name, pattern in (("frequency", "+.4f"), ("damping", "+.2f"), ("amplitude", "+.2f"))
     ]
     print(f"drift from the first point to the same again ({point_name(drift['again'])}): {', '.join(told)}")
+
+
+def _print_mode_shape(shape: dict[str, Any] | None) -> None:
+    """Print the mode shape that damping was computed with, and which points were evaluated with another."""
+    if shape is None:
+        return
+    print(shape["text"])
+    if shape["others"]:
+        print(
+            f"evaluated with that of an earlier plan: {', '.join(map(point_name, shape['others']))}; a model takes the above "
+            "for all points"
+        )
 
 
 def _print_about(about: dict[str, Any]) -> None:

@@ -29,7 +29,8 @@ class Tick:
 
     ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
     latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
-    the fundamentals are checked against its ``exciter``. ``armed = False`` keeps the output at 0 V.
+    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's.
+    ``armed = False`` keeps the output at 0 V.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """
@@ -47,10 +48,9 @@ class Tick:
         exciter: PlantModel | None = None,
         armed: bool = True,
     ) -> None:
+        shape = bench.specimen.drive_mode_shape if exciter is None else exciter.drive_shape
         try:
-            law_record = law.build(
-                bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, bench.specimen.drive_mode_shape
-            )
+            law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, shape)
         except ValueError as error:
             raise ConfigurationError(f"controller.{error}") from None
         if lead_samples < 1.0:

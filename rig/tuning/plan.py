@@ -24,12 +24,15 @@ def plan_text(
     bench_name: str,
     bench: Bench,
     plant: PlantModel,
-    ratios: Mapping[str, float],
+    ratios: tuple[Mapping[str, float], Mapping[str, float]],
     chosen: Chosen,
     levels: LevelChoice,
     recording: Path,
 ) -> str:
-    """Return a backbone plan as TOML; ``ratios`` are the measured ratios of response channels to the drive point."""
+    """Return a backbone plan as TOML.
+
+    ``ratios`` are the measured ratios of response channels to the drive point, and their standard errors.
+    """
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     volts = chosen.law == "phase"
     settling = chosen.design.settling.longest
@@ -78,9 +81,11 @@ def plan_text(
         f"# The plant as measured ({recording.name}): gains and levels are checked against it before anything moves.",
     ]
     facts += ["[plant]", *(_line(key, value) for key, value in plant.to_dict().items())]
-    if ratios:
-        listed = ", ".join(f"{name} = {significant(ratio)}" for name, ratio in ratios.items())
-        facts += ["# Motion of the response channels for that of the drive point.", f"response_ratios = {{ {listed} }}"]
+    if ratios[0]:
+        facts.append("# Motion of the response channels for that of the drive point, and standard errors.")
+        for key, values in zip(("response_ratios", "response_ratio_stds"), ratios, strict=True):
+            listed = ", ".join(f"{name} = {significant(value)}" for name, value in values.items())
+            facts.append(f"{key} = {{ {listed} }}")
     return (
         "\n".join([*_summary(plant, chosen), *head, *controller, *(settle if math.isfinite(settling) else []), *facts])
         + "\n"

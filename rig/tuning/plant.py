@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,7 @@ __all__ = [
     "densities",
     "largest_outside",
     "mass_ratios",
+    "measured_ratio_stds",
     "measured_ratios",
     "near",
     "plant_of",
@@ -34,6 +37,7 @@ class TuningError(RigError):
 Real = NDArray[np.float64]
 
 FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
+NARROWER = ((0.7, 1.4), (0.8, 1.25))  # bands of further fits, whose differences show what the model lacks
 
 
 def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
@@ -83,39 +87,66 @@ TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-err
 def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float) -> PlantModel:
     """Fit the plant to force and drive acceleration per volt around the bench's linear frequency.
 
+    The standard errors of the mode are those of noise and distortion (`controller.tuning.plant_errors`) and, in addition, the
+    largest difference to the fits over the `NARROWER` bands: what the model lacks, such as modes beyond its residual terms,
+    acts differently on each of them. All hold for the plant at the level of the test: how frequency and damping change with
+    the level is not in them. A wrong sensitivity of force or drive is not in them either; it cancels in damping that is
+    computed with this mode shape from the same sensors.
+
     ``lead_samples`` is the number of samples between an output and its effect in the inputs, in the run that measured the
     responses. Raises `TuningError` if they show no mode of the structure.
     """
     linear = bench.specimen.linear_frequency_hz
-    frequency = responses.frequency_hz
-    around = near(bench, frequency)
     try:
-        plant = PlantModel.from_frequency_responses(
-            frequency[around],
-            responses.value[around, 0, 0],
-            responses.value[around, 1, 0],
-            sample_rate_hz=bench.sample_rate_hz,
-            latency_samples=lead_samples,
-        )
+        plant = _fitted(bench, responses, lead_samples, FIT_BAND)
         plant.lock_frequency_rad_s()
     except ValueError as error:
         raise TuningError(
             f"no mode near specimen.linear_frequency_hz = {linear:g} Hz, between {FIT_BAND[0] * linear:.4g} and "
             f"{FIT_BAND[1] * linear:.4g} Hz: {error}"
         ) from None
-    return plant
+    others = []
+    for band in NARROWER:
+        with suppress(ValueError):  # too few lines, or too little of the resonance
+            others.append(_fitted(bench, responses, lead_samples, band))
+    return replace(
+        plant,
+        frequency_std_rad_s=_with_spread("frequency_rad_s", plant.frequency_std_rad_s, plant, others),
+        damping_ratio_std=_with_spread("damping_ratio", plant.damping_ratio_std, plant, others),
+        drive_shape_std=_with_spread("drive_shape", plant.drive_shape_std, plant, others),
+    )
+
+
+def _fitted(
+    bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float, band: tuple[float, float]
+) -> PlantModel:
+    """Fit the plant to the lines in a band, given as parts of the linear frequency; raise ValueError if that fails."""
+    linear, frequency = bench.specimen.linear_frequency_hz, responses.frequency_hz
+    around = (frequency > band[0] * linear) & (frequency < band[1] * linear)
+    covariance = responses.total_covariance if responses.total_covariance is not None else responses.noise_covariance
+    return PlantModel.from_frequency_responses(
+        frequency[around],
+        responses.value[around, 0, 0],
+        responses.value[around, 1, 0],
+        sample_rate_hz=bench.sample_rate_hz,
+        latency_samples=lead_samples,
+        covariance=None if covariance is None else covariance[around, :2, :2],
+    )
+
+
+def _with_spread(name: str, std: float | None, plant: PlantModel, others: Sequence[PlantModel]) -> float:
+    """Return the standard error of a property of the mode together with its largest difference to other fits."""
+    apart = [abs(getattr(other, name) - getattr(plant, name)) for other in others]
+    return math.hypot(std or 0.0, max(apart, default=0.0))
 
 
 def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
     """Return the displacement of each response channel per displacement of the drive point at resonance, by name.
 
     Each ratio is a least-squares fit of the channel's response to that of the drive point, over the lines within a bandwidth of
-    the mode. A channel that does not stand out of the noise is left out.
+    the mode. A channel that does not stand out of the noise is left out. `measured_ratio_stds` has the standard errors.
     """
-    hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
-    frequency = responses.frequency_hz
-    half = max(2.0 * plant.damping_ratio * hertz, float(np.diff(frequency).max()))
-    around = np.abs(frequency - hertz) <= half
+    around = _within_bandwidth(responses, plant)
     drive = responses.value[around, 1, 0]
     power = float(np.sum(np.abs(drive) ** 2))
     out = {}
@@ -125,6 +156,48 @@ def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> di
         if ratio > TOLD * error:
             out[channel.name] = ratio
     return out
+
+
+def measured_ratio_stds(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
+    """Return the standard errors of the `measured_ratios`, by name.
+
+    They are those of noise and distortion in both channels, increased where the fit is worse than these explain, and in
+    addition the difference to the fit within half the bandwidth, where other modes contribute less. Where the covariance is
+    unknown, the noise is taken from the misfit.
+    """
+    wide, narrow = (_within_bandwidth(responses, plant, part) for part in (1.0, 0.5))
+    rows = {channel.name: row for row, channel in enumerate(responses.outputs)}
+    out = {}
+    for name, value in measured_ratios(responses, plant).items():
+        errors = [_ratio(responses, around, rows[name]) for around in (wide, narrow)]
+        out[name] = math.hypot(errors[0][1], value - errors[1][0])
+    return out
+
+
+def _ratio(responses: FrequencyResponseMatrix, around: NDArray[np.bool_], row: int) -> tuple[float, float]:
+    """Return the size of an output over the drive, fitted over some lines, and its standard error without other modes'."""
+    drive, own = responses.value[around, 1, 0], responses.value[around, row, 0]
+    power = float(np.sum(np.abs(drive) ** 2))
+    ratio = complex(np.vdot(drive, own)) / power
+    left = np.abs(own - ratio * drive) ** 2
+    covariance = responses.total_covariance if responses.total_covariance is not None else responses.noise_covariance
+    if covariance is None:
+        noise, excess = np.full(left.shape, float(np.sum(left)) / max(left.size - 1, 1)), 1.0
+    else:
+        both = covariance[around][:, [1, row]][:, :, [1, row]]
+        turn = np.array([-ratio, 1.0])
+        noise = np.einsum("i,kij,j->k", turn, both, turn.conj()).real
+        expected = float(np.sum(noise)) * (1.0 - 1.0 / left.size)
+        excess = max(1.0, float(np.sum(left)) / expected) if expected > 0.0 else 1.0
+    # half of the complex error lies along the ratio
+    return abs(ratio), math.sqrt(0.5 * excess * float(np.sum(np.abs(drive) ** 2 * noise))) / power
+
+
+def _within_bandwidth(responses: FrequencyResponseMatrix, plant: PlantModel, part: float = 1.0) -> NDArray[np.bool_]:
+    """Return which lines lie within this part of a bandwidth of the resonance, on either side; at least the next one."""
+    hertz, frequency = plant.lock_frequency_rad_s() / (2.0 * math.pi), responses.frequency_hz
+    half = max(2.0 * part * plant.damping_ratio * hertz, float(np.diff(frequency).max()))
+    return np.asarray(np.abs(frequency - hertz) <= half)
 
 
 def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
@@ -148,16 +221,16 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
         )
     if facts.drive_mode_shape is None:
         out.append(
-            f"specimen.drive_mode_shape: the bench has none, measured is {plant.drive_shape:.4g} kg^-1/2; damping from a "
-            "backbone needs it in the bench"
+            f"specimen.drive_mode_shape: the bench has none, measured is {plant.drive_shape:.4g} kg^-1/2: the plan uses it, "
+            "for control and for damping"
         )
         return tuple(out)
     ratio = abs(facts.drive_mode_shape) / plant.drive_shape
     if abs(ratio - 1.0) > WORTH_SAYING_SHAPE:
         text = (
             f"specimen.drive_mode_shape = {facts.drive_mode_shape:g} kg^-1/2 of the bench is {ratio:.2f} times the measured "
-            f"{plant.drive_shape:.4g}: the plan's controller uses the measured one; damping with the bench's would be "
-            f"read {ratio**2:.2f} times as large"
+            f"{plant.drive_shape:.4g}: the plan uses the measured one, for control and for damping; with the bench's the "
+            f"damping would be read {ratio**2:.2f} times as large"
         )
         if max(ratio, 1.0 / ratio) > TOLERATED_SHAPE:
             text += f"; a frequency-error loop tolerates a factor of {TOLERATED_SHAPE:g}"

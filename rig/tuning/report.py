@@ -31,8 +31,13 @@ def summary(tuning: Tuning) -> dict[str, Any]:
         "plant": {
             "frequency_hz": plant.frequency_rad_s / (2.0 * math.pi),
             "bench_frequency_hz": facts.linear_frequency_hz,
+            "frequency_std_hz": None
+            if plant.frequency_std_rad_s is None
+            else plant.frequency_std_rad_s / (2.0 * math.pi),
             "damping_ratio": plant.damping_ratio,
+            "damping_ratio_std": plant.damping_ratio_std,
             "drive_mode_shape": plant.drive_shape,
+            "drive_mode_shape_std": plant.drive_shape_std,
             "bench_drive_mode_shape": facts.drive_mode_shape,
             "coupled_pole_hz": plant.coupled_pole_rad_s.imag / (2.0 * math.pi),
             "coupled_damping_ratio": -plant.coupled_pole_rad_s.real / abs(plant.coupled_pole_rad_s),
@@ -41,6 +46,7 @@ def summary(tuning: Tuning) -> dict[str, Any]:
             "force_per_v_n": 1.0 / plant.volts_per_newton(),
             "fit_error": plant.fit_error,
             "response_ratios": dict(tuning.response_ratios),
+            "response_ratio_stds": dict(tuning.response_ratio_stds),
         },
         "law": chosen.law,
         "low_pass_rad_s": chosen.low_pass_rad_s,
@@ -94,9 +100,10 @@ def lines(found: dict[str, Any]) -> list[str]:
         f"{found['specimen']} (bench {found['bench']}), tuned",
         f"multisine      {test['level_rms_v']:.4g} V RMS, coherence {test['coherence_force']:.5f} (force) and "
         f"{test['coherence_drive']:.5f} (drive), distortion {100.0 * test['distortion']:.2g} %",
-        f"structure      {plant['frequency_hz']:.3f} Hz (bench {plant['bench_frequency_hz']:g}), damping "
-        f"{100.0 * plant['damping_ratio']:.3f} %, phi_d {plant['drive_mode_shape']:.4f} kg^-1/2 "
-        f"(bench {'none' if shape is None else format(shape, 'g')})",
+        f"structure      {plant['frequency_hz']:.3f}{_bound(plant['frequency_std_hz'])} Hz (bench "
+        f"{plant['bench_frequency_hz']:g}), damping {100.0 * plant['damping_ratio']:.3f}"
+        f"{_bound(plant['damping_ratio_std'], 100.0)} %, phi_d {plant['drive_mode_shape']:.4f}"
+        f"{_bound(plant['drive_mode_shape_std'])} kg^-1/2 (bench {'none' if shape is None else format(shape, 'g')})",
         f"with exciter   {plant['coupled_pole_hz']:.3f} Hz, damping {100.0 * plant['coupled_damping_ratio']:.2f} %, mass ratio "
         + (f"{low:.3f}" if high - low < 0.2 * abs(high) else f"could not be identified ({low:.3f} to {high:.3f})")
         + f", {plant['force_per_v_n']:.3g} N/V at resonance; model within {100.0 * plant['fit_error']:.2g} %",
@@ -127,6 +134,11 @@ def _design_lines(design: dict[str, Any]) -> list[str]:
                 f"{found['gain_margin']:.2f}, phase margin {found['phase_margin_deg']:.0f} deg"
             )
     return [*out, *(f"  {reason}" for reason in design["reasons"])]
+
+
+def _bound(std: float | None, scale: float = 1.0) -> str:
+    """Return the 95 % bound of a standard error, as a text to follow a number."""
+    return "" if std is None else f" +- {1.96 * scale * std:.2g}"
 
 
 def _number(value: float | list[float]) -> str:

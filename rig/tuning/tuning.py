@@ -15,7 +15,7 @@ from rig.tuning.design import Chosen, LawName, choose
 from rig.tuning.levels import PART, LevelChoice, choose_levels, low_pass, lowest_force_n, reach_m
 from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.plan import plan_text
-from rig.tuning.plant import compared_with_bench, measured_ratios, plant_of
+from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_ratios, plant_of
 
 __all__ = ["Tuning", "TuningRequest", "tune"]
 
@@ -77,6 +77,8 @@ class Tuning:
     """The plant near the mode."""
     response_ratios: dict[str, float]
     """Measured displacement of each response channel per displacement of the drive point at resonance, by name."""
+    response_ratio_stds: dict[str, float]
+    """Standard errors of these ratios, by name."""
     chosen: Chosen
     """The chosen gains."""
     levels: LevelChoice
@@ -124,7 +126,7 @@ def tune(
     )
     plant = plant_of(bench, test.responses, test.lead_samples)
     notes = compared_with_bench(bench, plant)
-    measured = measured_ratios(test.responses, plant)
+    measured, ratio_stds = measured_ratios(test.responses, plant), measured_ratio_stds(test.responses, plant)
     ratios = bench.response_ratios | measured
     highest_m = PART * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
     lowest_n = lowest_force_n(bench, plant, highest_m)
@@ -141,10 +143,11 @@ def tune(
         recording=Path(recording),
         plant=plant,
         response_ratios=measured,
+        response_ratio_stds=ratio_stds,
         chosen=chosen,
         levels=levels,
         notes=notes,
-        plan_toml=plan_text(named or name, bench, plant, measured, chosen, levels, Path(recording)),
+        plan_toml=plan_text(named or name, bench, plant, (measured, ratio_stds), chosen, levels, Path(recording)),
     )
 
 

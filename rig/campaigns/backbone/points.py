@@ -12,7 +12,6 @@ from identification import (
     IdentificationError,
     ShortPoint,
     SlowFlow,
-    nonlinear_mode,
     short_point,
 )
 from rig.bench import Bench
@@ -30,17 +29,19 @@ from rig.campaigns.evaluation.acceptance import (
 from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.drift import of_the_result
 from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
-from rig.campaigns.evaluation.recorded import bench_of_recording, points_of
+from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import (
     channels_from,
+    measured_with,
     modal_part,
     not_evaluated,
     recorded_vibration,
     vibration_from,
     within_periods,
 )
+from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Column, Target
 from rig.recording.reader import Recording
 
@@ -59,6 +60,7 @@ BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
     Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
     Column("phase_error_deg", "phase error", "deg", ".2f"),
     *PURITY_COLUMNS,
@@ -92,23 +94,23 @@ def measure_backbone_point(
         vibration = recorded_vibration(
             bench, rows, plan.harmonics, phase_lag_target_deg=plan.controller.phase_lag_deg + 180.0
         )
-        mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
+        modal = modal_part(vibration, drive_shape(bench, plan.plant))
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=True)
     point = settled_point(plan, target, bench, vibration, rows)
-    return with_settling(replace(point, modal=modal_part(mode)), settling)
+    return with_settling(replace(point, modal=modal), settling)
 
 
 def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> Point[ShortPointResult]:
     """Evaluate a point from its ramp and the time at the point, whether or not the vibration settled."""
     try:
-        flow = recorded_flow(bench, rows, plan.harmonics)
+        flow = recorded_flow(bench, rows, plan.harmonics, plan.plant, other_modes=False)
         found = short_point(flow, start_s=_arrival_s(flow))
         vibration = found.vibration
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=False)
     error_deg = (plan.controller.phase_lag_deg + 180.0 - found.phase_lag_deg + 180.0) % 360.0 - 180.0
-    alien = alien_force(bench, [rows])
+    alien, shape = alien_force(bench, [rows]), drive_shape(bench, plan.plant)
     reason = _short_objection(plan, found, error_deg, alien)
     reason = reason or next((why for why, at in flagged(bench, rows, flow).items() if at.any()), "")
     turned = np.unwrap(rows["theta_rad"].astype(float))
@@ -125,7 +127,8 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndar
             modal_frequency_hz=found.modal_frequency_hz,
             damping_ratio=found.damping_ratio,
             modal_frequency_std_hz=found.modal_frequency_std_hz,
-            damping_ratio_std=found.damping_ratio_std,
+            damping_ratio_std=shape.damping_std(found.damping_ratio, found.damping_ratio_std),
+            **measured_with(shape),
         ),
         lock=Lock(phase_error_deg=error_deg),
         result=ShortPointResult(
@@ -159,8 +162,7 @@ def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, al
 def backbone_of(
     points: Iterable[Point[Any]],
     channels: Sequence[Mapping[str, Any]],
-    specimen: str,
-    drive_mode_shape: float | None,
+    shape: DriveShape,
     phase_lag_target_deg: float,
 ) -> Backbone:
     """Return the accepted points of a recording as a backbone; raise `IdentificationError` if no point was accepted."""
@@ -169,24 +171,17 @@ def backbone_of(
         raise IdentificationError("points: none of the recording was accepted")
     kinds = channels_from(channels)
     vibrations = tuple(vibration_from(point, kinds, phase_lag_target_deg) for point in accepted)
-    return Backbone(
-        vibrations,
-        specimen,
-        drive_mode_shape,
-        tuple(point.direction for point in accepted),
-        tuple(point.repeat for point in accepted),
-    )
+    return shape.backbone(vibrations, [point.direction for point in accepted], [point.repeat for point in accepted])
 
 
 def recorded_backbone(recording: Recording) -> Backbone:
     """Return the accepted points of the current plan as a backbone, in the order of the plan."""
-    bench = bench_of_recording(recording)
+    points = points_of(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
     return backbone_of(
-        points_of(recording),
+        points,
         recording.channels,
-        bench.specimen.name,
-        bench.specimen.drive_mode_shape,
+        recorded_drive_shape(recording, points),
         plan.controller.phase_lag_deg + 180.0,
     )
 

@@ -33,10 +33,11 @@ from rig.campaigns.evaluation.point import (
     result_of,
     vibration_of,
 )
-from rig.campaigns.evaluation.recorded import bench_of_recording, points_of
+from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.evaluation.recorded_flow import recorded_flow
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
-from rig.campaigns.evaluation.vibrations import channels_from, not_evaluated, vibration_from
+from rig.campaigns.evaluation.vibrations import channels_from, measured_with, not_evaluated, vibration_from
+from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Column, Target
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
@@ -193,7 +194,7 @@ def _point(
     # A single way is used in both places, so its noise does not average out.
     single = math.sqrt(2.0) if len(covered) == 1 else 1.0
     frequency_std = single * float(mode.modal_frequency_std_hz[index])
-    damping_std = single * float(mode.damping_ratio_std[index])
+    damping_std, shape = single * float(mode.damping_ratio_std[index]), drive_shape(bench, plan.plant)
     stds = (frequency_std / frequency, damping_std / abs(damping))
     alien = alien_force(bench, pieces)
     reason = first_of(
@@ -220,7 +221,8 @@ def _point(
             modal_frequency_hz=frequency,
             damping_ratio=damping,
             modal_frequency_std_hz=frequency_std,
-            damping_ratio_std=damping_std,
+            damping_ratio_std=shape.damping_std(damping, damping_std),
+            **measured_with(shape),
         ),
         lock=Lock(phase_error_deg=float(lags[np.argmax(np.abs(lags))]) if lags.size else None),
         result=ContinuousBackboneResult(periods_of_both_ways=found.periods, up=ways.get("up"), down=ways.get("down")),
@@ -243,8 +245,7 @@ def _one_way(found: ContinuousBackbone, way: int, index: int) -> OneWay:
 def continuous_backbones_of(
     points: Iterable[Point[ContinuousBackboneResult]],
     channels: Sequence[Mapping[str, Any]],
-    specimen: str,
-    drive_mode_shape: float | None,
+    shape: DriveShape,
 ) -> tuple[ContinuousBackbone, ...]:
     """Return the accepted points as one continuous backbone per repeat; raise `IdentificationError` if there are none."""
     kinds = channels_from(channels)
@@ -254,24 +255,26 @@ def continuous_backbones_of(
             repeats.setdefault(point.repeat, []).append(point)
     if not repeats:
         raise IdentificationError("points: none of the recording was accepted")
-    return tuple(_from_points(accepted, kinds, specimen, drive_mode_shape) for accepted in repeats.values())
+    return tuple(_from_points(accepted, kinds, shape) for accepted in repeats.values())
 
 
 def _from_points(
     points: Sequence[Point[ContinuousBackboneResult]],
     channels: tuple[Channel, ...],
-    specimen: str,
-    drive_mode_shape: float | None,
+    shape: DriveShape,
 ) -> ContinuousBackbone:
     ways = [_both_ways(point) for point in points]
+    # Points of a resumed recording may have been evaluated with another mode shape: the damping goes with its square.
+    used = [(None if point.modal is None else point.modal.drive_mode_shape) or shape.fact for point in points]
+    times = np.array([((shape.value or 1.0) / (one or shape.value or 1.0)) ** 2 for one in used])
     vibrations = tuple(vibration_from(point, channels) for point in points)
     return ContinuousBackbone(
-        backbone=Backbone(vibrations, specimen, drive_mode_shape),
+        backbone=shape.backbone(vibrations),
         amplitude_m=np.array([vibration_of(point).amplitude_m for point in points]),
         stiffness=np.array([[way.stiffness for way in both] for both in ways]).T,
-        damping_1_s=np.array([[way.damping_1_s for way in both] for both in ways]).T,
+        damping_1_s=times * np.array([[way.damping_1_s for way in both] for both in ways]).T,
         stiffness_std=np.array([[way.stiffness_std for way in both] for both in ways]).T,
-        damping_std_1_s=np.array([[way.damping_std_1_s for way in both] for both in ways]).T,
+        damping_std_1_s=times * np.array([[way.damping_std_1_s for way in both] for both in ways]).T,
         periods=result_of(points[0]).periods_of_both_ways,
     )
 
@@ -286,10 +289,8 @@ def _both_ways(point: Point[ContinuousBackboneResult]) -> tuple[OneWay, OneWay]:
 
 def recorded_continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
     """Return the accepted points as one backbone per repeat, with the results of the way up and of the way down."""
-    specimen = bench_of_recording(recording).specimen
-    return continuous_backbones_of(
-        points_of(recording, ContinuousBackboneResult), recording.channels, specimen.name, specimen.drive_mode_shape
-    )
+    points = points_of(recording, ContinuousBackboneResult)
+    return continuous_backbones_of(points, recording.channels, recorded_drive_shape(recording, points))
 
 
 def recorded_mean_backbone(recording: Recording) -> Backbone:
@@ -297,8 +298,7 @@ def recorded_mean_backbone(recording: Recording) -> Backbone:
     passes = recorded_continuous_backbones(recording)
     points = [point for one in passes for point in one.backbone.points]
     repeats = [number for number, one in enumerate(passes, 1) for _ in one.backbone.points]
-    first = passes[0].backbone
-    return Backbone(tuple(points), first.specimen, first.drive_mode_shape, repeats=tuple(repeats))
+    return replace(passes[0].backbone, points=tuple(points), repeats=tuple(repeats))
 
 
 CONTINUOUS_BACKBONE = Campaign(

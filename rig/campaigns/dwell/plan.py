@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from rig.bench import Bench
 from rig.bench.configuration import Configured
+from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
@@ -134,8 +135,8 @@ class DwellPlan(SettledPlan):
         """Refuse, before anything moves, what the bench cannot do, and damping limits if the damping cannot be determined."""
         super().check(bench)
         for name, limits in (("alarm", self.alarm), ("abort", self.abort)):
-            if limits.damping is not None and bench.specimen.drive_mode_shape is None:
+            if limits.damping is not None and drive_shape(bench, self.plant).value is None:
                 raise ConfigurationError(
                     f"{name}.damping = {limits.damping:g}: the damping is unknown, for the bench {bench.name} has no "
-                    "specimen.drive_mode_shape"
+                    "specimen.drive_mode_shape and the plan no [plant]"
                 )

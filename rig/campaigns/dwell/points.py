@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import Backbone, IdentificationError, nonlinear_mode
+from identification import IdentificationError
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.dwell.plan import DwellPlan
@@ -17,6 +17,7 @@ from rig.campaigns.evaluation.point import PART, Point, vibration_of
 from rig.campaigns.evaluation.recorded import accepted_points, specimen_of
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Column, Target
 from rig.recording.reader import Recording
 from rig.text.contents import Contents
@@ -39,6 +40,7 @@ DWELL_COLUMNS = (
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
     Column("frequency_change", "frequency change", "%", "+.3f", 100.0),
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
     Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
     Column("force_n", "force", "N", ".4f", plain=True),
     Column("phase_error_deg", "phase error", "deg", ".2f"),
@@ -73,7 +75,7 @@ class Changes:
     frequency_change: float | None
     """Relative change of the modal frequency."""
     damping_change: float | None
-    """Relative change of the damping ratio."""
+    """Relative change of the damping ratio, from the first accepted mean that was evaluated with the same mode shape."""
     amplitude_change: float | None
     """Relative change of the displacement amplitude at the drive point; if the displacement is held, of the force."""
 
@@ -105,7 +107,7 @@ def measure_mean(
     try:
         lag_deg = plan.controller.phase_lag_deg + 180.0
         vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=lag_deg)
-        mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
+        modal = modal_part(vibration, drive_shape(bench, plan.plant))
     except (IdentificationError, ArithmeticError) as error:
         return replace(not_evaluated(plan, target, error, settled=True), result=DwellResult(length=length))
     force_rms_n = float(bridged(rows)[:-1, bench.index_of("force")].std())
@@ -113,7 +115,7 @@ def measure_mean(
     off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
     point = settled_point(plan, target, bench, vibration, rows, off_level)
     held = HeldLevel(force_rms_n=force_rms_n, level_error=missed)
-    return replace(point, modal=modal_part(mode), result=DwellResult(length=length, held=held))
+    return replace(point, modal=modal, result=DwellResult(length=length, held=held))
 
 
 def watch_drift(
@@ -121,7 +123,8 @@ def watch_drift(
 ) -> tuple[Point[DwellResult], str]:
     """Add cycles, time and changes to a mean; also return why the test ends, or an empty string.
 
-    The changes are relative to the first accepted mean. Cycles and seconds refer to the middle of the mean and count from the
+    The changes are relative to the first accepted mean, those of the damping to the first one that was evaluated with the same
+    mode shape: a resumed plan may have another. Cycles and seconds refer to the middle of the mean and count from the
     first mean, over all parts of a recording. Failed means count too; the ramp and the settling at the beginning of a part do
     not.
     """
@@ -132,6 +135,8 @@ def watch_drift(
         return replace(point, result=result), ""
     first = next((one for one in known if one.accepted), point)
     before, now = _watched(plan, first), _watched(plan, point)
+    alike = (one for one in known if one.accepted and _mode_shape(one) == _mode_shape(point))
+    before["damping"] = _watched(plan, next(alike, point))["damping"]
     changes = {name: _change(before[name], now[name]) for name in now}
     result = replace(
         result,
@@ -156,6 +161,10 @@ def _watched(plan: DwellPlan, point: Point[DwellResult]) -> dict[str, float | No
         "damping": None if modal is None else modal.damping_ratio,
         "amplitude": amplitude,
     }
+
+
+def _mode_shape(point: Point[DwellResult]) -> float | None:
+    return None if point.modal is None else point.modal.drive_mode_shape
 
 
 def _cycles(point: Point[DwellResult]) -> float:
@@ -202,7 +211,7 @@ class DwellCourse:
     modal_frequency_hz: NDArray[np.float64]
     """Frequency at exact phase resonance: the held frequency corrected for the remaining phase error."""
     damping_ratio: NDArray[np.float64]
-    """Modal damping ratio; NaN if the bench has no mode shape of the drive point."""
+    """Modal damping ratio; NaN if neither plan nor bench has a mode shape of the drive point."""
     amplitude_m: NDArray[np.float64]
     """Displacement amplitude of the drive point, m."""
     force_n: NDArray[np.float64]

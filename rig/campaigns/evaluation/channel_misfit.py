@@ -12,7 +12,7 @@ ALIKE = 1.5  # ratios within this factor, up or down, count as equal: the channe
 class Seen(Enum):
     """Source of an expectation."""
 
-    SHAPES = "by the mode shapes of the bench"
+    SHAPES = "by the mode shapes"
     BEFORE = "by the points before"
     NOT_TRUSTED = "where it did not fit"
     OTHER_WAY = "by the other way past the level"

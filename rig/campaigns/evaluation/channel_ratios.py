@@ -8,6 +8,8 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
+from rig.campaigns.planning.plan import Plan
+from rig.campaigns.planning.plant import KnownPlant
 
 __all__ = ["motions_of", "ratios_of", "resistance_of", "rms_ratios_of", "shapes_of", "softened", "spread_of"]
 
@@ -37,14 +39,21 @@ def spread_of(bench: Bench, point: Point[Any], drive: int) -> np.ndarray | None:
     return None if not size[drive] > 0.0 else np.hypot(std, steps / math.sqrt(12.0)) / size[drive]
 
 
-def shapes_of(bench: Bench) -> np.ndarray | None:
-    """Mode shapes over that of the drive point; NaN for channels without a mode shape. None if the drive point has none."""
+def shapes_of(bench: Bench, plan: Plan) -> np.ndarray | None:
+    """Mode shapes over that of the drive point; NaN for channels without a mode shape. None if the drive point has none.
+
+    The signs are those of the bench; the sizes are those that the plan's ``[plant]`` has as measured, else the bench's.
+    """
     at_drive = bench.specimen.drive_mode_shape
     if at_drive is None:
         return None
     drive = bench.index_of("drive")
     known = [at_drive if i == drive else channel.mode_shape for i, channel in enumerate(bench.channels)]
-    return np.array([math.nan if shape is None else shape for shape in known]) / at_drive
+    ratios = np.array([math.nan if shape is None else shape for shape in known]) / at_drive
+    plant = plan.plant if isinstance(plan, KnownPlant) else None
+    measured: dict[str, float] = {} if plant is None else plant.response_ratios
+    sizes = [measured.get(channel.name, size) for channel, size in zip(bench.channels, np.abs(ratios), strict=True)]
+    return np.asarray(np.copysign(sizes, ratios))
 
 
 def motions_of(bench: Bench) -> list[int]:

@@ -1,4 +1,4 @@
-"""Check whether the channels of a point fit each other, by the mode shapes of the bench and by earlier points.
+"""Check whether the channels of a point fit each other, by the mode shapes of plan and bench and by earlier points.
 
 A sensor may fail in a way that trips no limit: it reads only noise, or its sensitivity falls to a tenth. At phase resonance of
 one mode, the fundamental of response k over that of the drive is the real number ``phi_k / phi_d``; higher harmonics and other
@@ -109,7 +109,7 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Poi
         off = [abs(math.log(vibration_of(one).frequency_hz / frequency_hz)) for one in before]
         before = [before[i] for i in np.argsort(off, kind="stable")[:FEW] if off[i] < NEAR]
     usual = np.median([ratios_of(one, drive) for one in before[-MANY:]], axis=0) if before else None
-    shapes = shapes_of(bench) if locked or _near_the_mode(bench, point) else None
+    shapes = shapes_of(bench, plan) if locked or _near_the_mode(bench, point) else None
     out = []
     for index, channel in enumerate(bench.channels):
         if channel.role != "response" or spread is None:

@@ -144,11 +144,16 @@ class Modal:
     modal_frequency_hz: float
     """Frequency at exact phase resonance, corrected for the remaining phase error, Hz."""
     damping_ratio: float | None
-    """Modal damping ratio; None if the bench has no mode shape of the drive point."""
+    """Modal damping ratio; None if neither plan nor bench has a mode shape of the drive point."""
     modal_frequency_std_hz: float | None = None
     """Standard error of the modal frequency, Hz."""
     damping_ratio_std: float | None = None
-    """Standard error of the damping ratio."""
+    """Standard error of the damping ratio, that of a measured mode shape included; None if unknown."""
+    drive_mode_shape: float | None = None
+    """Mode shape at the drive point, of the plan's ``[plant]``, that the damping was computed with, kg^-1/2; None if it was the
+    bench's."""
+    drive_mode_shape_std: float | None = None
+    """Standard error of this mode shape; None if unknown."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 """Read a recording as objects: its bench, its points, and the rows of a point."""
 
+from collections.abc import Sequence
 from typing import Any, TypeVar, overload
 
 import numpy as np
@@ -9,10 +10,12 @@ from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.evaluation.point import Point, point_name
 from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
+from rig.campaigns.planning.plant import PlantFacts
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
-__all__ = ["accepted_points", "bench_of_recording", "point_rows", "points_of", "specimen_of"]
+__all__ = ["accepted_points", "bench_of_recording", "point_rows", "points_of", "recorded_drive_shape", "specimen_of"]
 
 Result = TypeVar("Result")
 
@@ -25,6 +28,19 @@ def bench_of_recording(recording: Recording) -> Bench:
 def specimen_of(recording: Recording) -> str:
     """Return the name of the specimen."""
     return str(recording.configuration["bench"]["specimen"]["name"])
+
+
+def recorded_drive_shape(recording: Recording, points: Sequence[Point[Any]]) -> DriveShape:
+    """Return the mode shape that a model of these points takes: that of the current plan's ``[plant]``, else the bench's.
+
+    Points of a resumed recording may have been evaluated with that of an earlier plan. Their vibrations do not depend on it, so
+    that a model takes the current one for all. In files of versions that evaluated with the bench's fact alone no point names
+    another mode shape; the bench's is used for them, as it was then.
+    """
+    table = recording.configuration["plan"].get("plant")
+    named = any(point.modal is not None and point.modal.drive_mode_shape is not None for point in points)
+    plant = validated(PlantFacts, table, "plant of the recording") if table and named else None
+    return drive_shape(bench_of_recording(recording), plant)
 
 
 @overload

@@ -6,6 +6,7 @@ from identification import SlowFlow, slow_flow
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.vibrations import channels_of
+from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plant import PlantFacts
 from rig.tick.layout import FREQUENCY_CLAMPED, SAMPLE_LOST, SATURATED, SENSOR_AT_RANGE
 
@@ -16,21 +17,24 @@ AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
 HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far its window reaches to either side of an instant
 
 
-def recorded_flow(bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFacts | None = None) -> SlowFlow:
+def recorded_flow(
+    bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFacts | None, *, other_modes: bool = True
+) -> SlowFlow:
     """Compute the slow flow of recorded rows.
 
-    The skew of the channels is removed. If the plant is known, the contribution of its other modes is removed too. Raises
-    `identification.IdentificationError` if the rows contain no vibration.
+    The skew of the channels is removed. If the plant is known, the mode shape at the drive point is the measured one, and with
+    ``other_modes`` the contribution of its other modes is removed too. Raises `identification.IdentificationError` if the rows
+    contain no vibration.
     """
     return slow_flow(
         rows["theta_rad"].astype(float),
         bridged(rows).T,
         channels_of(bench),
         sample_rate_hz=bench.sample_rate_hz,
-        drive_mode_shape=bench.specimen.drive_mode_shape or 0.0,
+        drive_mode_shape=drive_shape(bench, plant).value or 0.0,
         harmonics=harmonics,
         skew_samples=[channel.skew_samples for channel in bench.channels],
-        residual_m_n=0.0 if plant is None else plant.residual_m_n,
+        residual_m_n=plant.residual_m_n if plant is not None and other_modes else 0.0,
     )
 
 

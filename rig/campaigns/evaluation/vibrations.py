@@ -7,10 +7,11 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from identification import Channel, NonlinearMode, PeriodicVibration, periodic_vibration
+from identification import Channel, PeriodicVibration, nonlinear_mode, periodic_vibration
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Modal, Point, Quality, planned_point, spectrum_of, vibration_of
+from rig.campaigns.planning.drive_shape import DriveShape
 from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
 from rig.tick.safety.layout import POLARITY_HINT
 from rig.tick.sequencer.layout import Outcome
@@ -21,6 +22,7 @@ __all__ = [
     "channels_of",
     "failed_point",
     "frequency_scatter",
+    "measured_with",
     "modal_part",
     "not_evaluated",
     "quantisation_warnings",
@@ -97,13 +99,25 @@ def recorded_vibration(
     return _without_skew(vibration, bench)
 
 
-def modal_part(mode: NonlinearMode) -> Modal:
-    """Return the part of a point that holds modal properties, from the nonlinear mode identified from this point alone."""
-    damping = float(mode.damping_ratio[0])
+def modal_part(vibration: PeriodicVibration, shape: DriveShape) -> Modal:
+    """Identify modal properties from one settled vibration alone, evaluated with this mode shape at the drive point.
+
+    The standard error of the damping is given if that of the mode shape is known. Raises `identification.IdentificationError`
+    if there are no such properties.
+    """
+    mode = nonlinear_mode(shape.backbone((vibration,)))
+    damping, std = float(mode.damping_ratio[0]), float(mode.damping_ratio_std[0])
     return Modal(
         modal_frequency_hz=float(mode.modal_frequency_hz[0]),
         damping_ratio=damping if math.isfinite(damping) else None,
+        damping_ratio_std=std if shape.std is not None and math.isfinite(std) else None,
+        **measured_with(shape),
     )
+
+
+def measured_with(shape: DriveShape) -> dict[str, Any]:
+    """Return the fields of `Modal` that say with which measured mode shape it was evaluated; empty for that of the bench."""
+    return {"drive_mode_shape": shape.value, "drive_mode_shape_std": shape.std} if shape.measured else {}
 
 
 def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from controller import PhaseLockedLoop
 from rig.bench import Bench
+from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.planning.plant import KnownPlant
 from rig.errors import ConfigurationError
@@ -71,9 +72,10 @@ class LockedPlan(KnownPlant, Plan):
 
     def _check_slow_flow(self, bench: Bench) -> None:
         """Refuse a bench without the mode shape that the slow flow needs."""
-        if bench.specimen.drive_mode_shape is None:
+        if drive_shape(bench, self.plant).value is None:
             raise ConfigurationError(
-                f"specimen.drive_mode_shape of the bench {bench.name} is missing: the slow flow needs it"
+                f"specimen.drive_mode_shape of the bench {bench.name} is missing, and the plan has no [plant]: the slow flow "
+                "needs it"
             )
 
 

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Self
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from controller import AmplitudeLaw, PhaseLockedLoop
 from controller.tuning import (
@@ -55,9 +56,25 @@ class PlantFacts(Configured):
     """Sample rate of the loop, Hz."""
     latency_samples: float = Field(ge=0)
     """Samples between an output and the input that responds to it."""
+    frequency_std_rad_s: float | None = Field(None, ge=0)
+    """Standard error of the frequency, rad/s; None if unknown."""
+    damping_ratio_std: float | None = Field(None, ge=0)
+    """Standard error of the damping ratio; None if unknown."""
+    drive_shape_std: float | None = Field(None, ge=0)
+    """Standard error of the mode shape, kg^-1/2, which is in that of every damping of the test; None if unknown."""
     response_ratios: dict[str, PositiveFloat] = Field(default_factory=dict)
     """Motion of each response channel per metre at the drive point, at resonance, by channel name. These ratios replace the
-    bench's mode shapes when levels are checked."""
+    bench's mode shapes when levels and channels are checked."""
+    response_ratio_stds: dict[str, NonNegativeFloat] = Field(default_factory=dict)
+    """Standard errors of the ratios, by channel name; a missing one is unknown."""
+
+    @model_validator(mode="after")
+    def _ratios_for_their_errors(self) -> Self:
+        for name in self.response_ratio_stds:
+            if name not in self.response_ratios:
+                known = ", ".join(self.response_ratios) or "it has none"
+                raise ValueError(f"response_ratio_stds.{name}: allowed is a channel of response_ratios: {known}")
+        return self
 
     @property
     def residual_m_n(self) -> float:
@@ -68,7 +85,7 @@ class PlantFacts(Configured):
     @property
     def model(self) -> PlantModel:
         """The plant model."""
-        return PlantModel(**self.model_dump(exclude={"response_ratios"}))
+        return PlantModel(**self.model_dump(exclude={"response_ratios", "response_ratio_stds"}))
 
 
 class KnownPlant(Levels):
@@ -122,10 +139,8 @@ class KnownPlant(Levels):
         if law.rest_low_pass_rad_s > 0.0 and amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
             through = law.force_loop == "through-response"
             amplitude_law = AmplitudeLaw.RESPONSE if through else AmplitudeLaw.VOLTAGE
-        shape = bench.specimen.drive_mode_shape
-        return [
-            control_loop(plant, law.model_copy(update={"phase_lag_deg": lag}), amplitude_law, shape) for lag in lags_deg
-        ]
+        laws = [law.model_copy(update={"phase_lag_deg": lag}) for lag in lags_deg]
+        return [control_loop(plant, at_lag, amplitude_law, plant.drive_shape) for at_lag in laws]
 
 
 def _apart(lags_deg: Sequence[float]) -> list[float]:

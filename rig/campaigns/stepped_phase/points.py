@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import Backbone, FrequencyResponse, IdentificationError, nonlinear_mode
+from identification import FrequencyResponse, IdentificationError
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point, with_settling
@@ -13,6 +13,7 @@ from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
 
@@ -25,6 +26,7 @@ STEPPED_PHASE_COLUMNS = (
     Column("force_rms_n", "force RMS", "N", ".4f"),
     Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
     Column("level_error", "level error", "%", ".2f", 100.0),
     *PURITY_COLUMNS,
 )
@@ -50,7 +52,7 @@ def measure_stepped_phase_point(
     rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
     try:
         vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=lag_deg + 180.0)
-        mode = nonlinear_mode(Backbone((vibration,), bench.specimen.name, bench.specimen.drive_mode_shape))
+        modal = modal_part(vibration, drive_shape(bench, plan.plant))
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=True)
     force_rms_n = float(bridged(rows)[:-1, bench.index_of("force")].std())
@@ -60,7 +62,7 @@ def measure_stepped_phase_point(
     result = SteppedPhaseResult(
         force_rms_n=force_rms_n, phase_lag_deg=lag_deg - vibration.phase_error_deg, level_error=missed
     )
-    return with_settling(replace(point, modal=modal_part(mode), result=result), settling)
+    return with_settling(replace(point, modal=modal, result=result), settling)
 
 
 STEPPED_PHASE = Campaign(

@@ -14,6 +14,9 @@ def _summarise(mode: NonlinearMode) -> dict[str, Any]:
         "specimen": mode.specimen,
         "source": mode.source,
         "frequency_shift": mode.frequency_shift,
+        "drive_mode_shape": mode.drive_mode_shape,
+        "drive_mode_shape_std": mode.drive_mode_shape_std,
+        "drive_mode_shape_source": mode.drive_mode_shape_source,
         "points": mode.table(),
         "notes": list(mode.notes),
     }
@@ -37,6 +40,13 @@ def _say(summary: dict[str, Any]) -> None:
         ],
     )
     print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
+    if summary["drive_mode_shape"] is not None:
+        std, source = summary["drive_mode_shape_std"], summary["drive_mode_shape_source"]
+        bound = "" if std is None else f" +- {1.96 * std:.2g}"
+        print(
+            f"mode shape at the drive point: {summary['drive_mode_shape']:.5g}{bound} kg^-1/2"
+            + (f", {source}" if source else "")
+        )
 
 
 NONLINEAR_MODE = FileKind(

@@ -56,6 +56,36 @@ def test_one_percent_of_the_shape_is_two_percent_of_the_damping_at_all_points_al
     np.testing.assert_allclose(mode.systematic("force_n"), 0.0)
 
 
+def test_the_standard_error_of_the_drive_shape_is_twice_in_the_damping_and_in_nothing_measured() -> None:
+    points = tuple(noisy_point(relative=1e-6, forces=(0, force, 0)) for force in (0.1, 0.2, 0.3))
+    known = identify(Backbone(points, drive_mode_shape=PHI))
+    mode = identify(
+        Backbone(points, drive_mode_shape=PHI, drive_mode_shape_std=0.01 * PHI, drive_mode_shape_source="x")
+    )
+    np.testing.assert_array_equal(mode.damping_ratio, known.damping_ratio)
+    np.testing.assert_allclose(mode.systematic("damping_ratio") / mode.damping_ratio, 0.02, rtol=0.1)
+    np.testing.assert_allclose(mode.systematic("modal_amplitude") / mode.modal_amplitude, 0.01, rtol=0.1)
+    np.testing.assert_allclose(mode.systematic("force_n"), 0.0)
+    np.testing.assert_allclose(mode.random_std, known.random_std, rtol=0.2)
+    read = NonlinearMode.from_arrays(*mode.to_arrays())
+    assert (read.drive_mode_shape, read.drive_mode_shape_std) == (PHI, 0.01 * PHI)
+    assert read.drive_mode_shape_source == "x"
+
+
+@pytest.mark.parametrize("std", [0.0, None])
+def test_a_drive_shape_without_a_standard_error_changes_no_number(std: float | None) -> None:
+    points = tuple(noisy_point(forces=(0, force, 0)) for force in (0.1, 0.2))
+    plain = identify(Backbone(points, drive_mode_shape=PHI))
+    mode = identify(Backbone(points, drive_mode_shape=PHI, drive_mode_shape_std=std))
+    np.testing.assert_array_equal(mode.interval_95, plain.interval_95)
+    assert not mode.systematic_std.any()
+
+
+def test_a_negative_standard_error_of_the_drive_shape_is_refused() -> None:
+    with pytest.raises(IdentificationError, match=r"drive_mode_shape_std: is -0\.1, allowed is 0 or above"):
+        Backbone((noisy_point(),), drive_mode_shape=PHI, drive_mode_shape_std=-0.1)
+
+
 def test_the_random_part_is_the_same_however_large_the_systematic_one_is() -> None:
     backbone = Backbone(tuple(noisy_point(90.0, 1e-3, (0, force, 0.1)) for force in (0.1, 0.2, 0.3)), "beam", PHI)
     plain = identify(backbone)

@@ -220,3 +220,22 @@ def test_levels_are_metres():
 def test_a_level_whose_margin_leads_beyond_the_limit_is_refused():
     with pytest.raises(ConfigurationError, match=r"margin = 0\.05: .* 0\.003885 m; .* allows up to 0\.00377 m"):
         plan_with(levels_m=[1e-4, 3.7e-3]).check(bench_with())
+
+
+def test_the_shape_of_the_plant_is_used_with_its_error_and_not_that_of_the_bench(tmp_path, truth):
+    shape = PLAN.plant.drive_shape
+    plant = PLAN.plant.model_copy(update={"drive_shape_std": 0.02 * shape})
+    plan = plan_with(
+        levels_m=[1.144e-4, *truth[0].tolist(), 2.036e-3], plant=plant.model_dump(), accepted_damping_std=0.03
+    )
+    bench = bench_with({"specimen": {"drive_mode_shape": 1.3 * shape}})
+    with rig.run(plan, bench=bench, output=tmp_path / "out.h5", seed=3) as run:
+        points = summarise(tmp_path / "out.h5")["points"][1:-1]
+        (mode,) = (one.nonlinear_mode() for one in continuous_backbones(run.recording))
+    assert all(point["accepted"] for point in points)  # 4 % by the shape is no reason to measure again
+    found = np.array([[point[name] for name in ("damping_ratio", "damping_ratio_std")] for point in points])
+    np.testing.assert_allclose(found[:, 0], truth[2], rtol=0.03)
+    assert np.all(found[:, 1] > 0.04 * found[:, 0])
+    np.testing.assert_allclose(found[:, 1], 0.04 * found[:, 0], rtol=0.2)
+    np.testing.assert_allclose(mode.damping_ratio[1:-1], truth[2], rtol=0.03)
+    assert np.all(mode.systematic("damping_ratio") > 0.035 * mode.damping_ratio)

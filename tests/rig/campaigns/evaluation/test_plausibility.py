@@ -61,7 +61,7 @@ def test_a_channel_is_warned_of_and_then_refused_as_it_leaves_its_mode_shape(tip
 
 def test_the_reason_names_what_was_seen_what_was_expected_and_where_to_look():
     assert judged(point(1.010938, 0.0144)).reason == (
-        "channel acc_magnet has 0.0159 times the size of the drive channel, expected 1.59 by the mode shapes of the bench, "
+        "channel acc_magnet has 0.0159 times the size of the drive channel, expected 1.59 by the mode shapes, "
         "refused from a factor 4: look at sensor, cable and sensitivity_v_per_unit of acc_magnet"
     )
 

@@ -83,6 +83,15 @@ def test_a_ratio_that_is_none_is_refused_when_the_plan_is_read():
         plan_of("backbone-short", plant=plant)
 
 
+def test_a_standard_error_of_no_ratio_is_refused_when_the_plan_is_read():
+    plant = plant_of("magnet-beam").to_dict() | {
+        "response_ratios": {"acc_magnet": 1.6},
+        "response_ratio_stds": {"tip": 0.1},
+    }
+    with pytest.raises(ConfigurationError, match=r"response_ratio_stds\.tip: .* response_ratios: acc_magnet"):
+        plan_of("backbone-short", plant=plant)
+
+
 @pytest.mark.parametrize("name", ["magnet-beam", "magnet-beam-symmetric", "friction-beam"])
 def test_the_ratios_of_the_shipped_benches_are_those_of_their_shapes(name):
     ratios = load_bench(name).response_ratios

@@ -1,0 +1,73 @@
+"""Intervals of mode and channels as `rig tune` fits them, from responses of virtual rigs whose modes are given."""
+
+import math
+
+import numpy as np
+import pytest
+
+from identification import Channel, FrequencyResponseMatrix
+from rig.drivers import make_daq
+from rig.tuning.plant import measured_ratio_stds, measured_ratios, plant_of
+from simulators.analysis import frequency_response
+from tests.rig.rigs import bench_with
+
+HERTZ, SHAPE, DAMPING = 24.0, 0.9, 0.004
+OUTPUTS = ("force", "drive", "acc_magnet")
+
+
+def bench_of(neighbour):
+    """A rig with a second mode at ``neighbour`` times the frequency of the first, which moves the tip the other way."""
+    shapes = {name: [SHAPE, 0.8 * SHAPE] for name in ("drive", "acc_drive")}
+    shapes["acc_magnet"] = shapes["magnet"] = [1.6 * SHAPE, -1.2 * SHAPE]
+    frequency_hz, damping_ratio = [HERTZ, neighbour * HERTZ], [DAMPING, DAMPING]
+    structure = {"kind": "modal", "frequency_hz": frequency_hz, "damping_ratio": damping_ratio, "shapes": shapes}
+    return bench_with({"specimen": {"linear_frequency_hz": HERTZ}}, structure=structure, elements=[], friction=[])
+
+
+def responses(bench, noise, rng):
+    """Responses per volt with circular noise, ``noise`` of each one's size at every line, and its covariance."""
+    virtual = make_daq(bench).rig
+    frequency = np.arange(0.4 * HERTZ, 2.5 * HERTZ, 0.005 * HERTZ)
+    found = frequency_response(virtual, frequency)
+    values = np.stack([found.force_n_per_v, *(found.sensor_per_v[name] for name in OUTPUTS[1:])], axis=1)
+    std = noise * np.abs(values)
+    white = rng.standard_normal((2, *values.shape)) / math.sqrt(2.0)
+    units = {"force": "N"}
+    channels = [
+        Channel(name, role, units.get(name, "m/s^2"))
+        for name, role in zip(OUTPUTS, ("force", "drive", "response"), strict=True)
+    ]
+    return FrequencyResponseMatrix(
+        outputs=channels,
+        inputs=[Channel("voltage", "monitor", "V")],
+        frequency_hz=frequency,
+        value=(values + std * (white[0] + 1j * white[1]))[:, :, None],
+        total_covariance=np.einsum("ki,ij->kij", std**2, np.eye(3)).astype(np.complex128),
+    )
+
+
+def errors(neighbour, seeds, noise=1e-3):
+    """Relative errors of frequency, damping, shape and ratio, and the stated ones, [seed, 2, 4]."""
+    bench, out = bench_of(neighbour), []
+    true = np.array([2.0 * math.pi * HERTZ, DAMPING, SHAPE, 1.6])
+    for seed in seeds:
+        matrix = responses(bench, noise, np.random.default_rng(seed))
+        plant = plant_of(bench, matrix, 0.0)
+        ratios, stds = measured_ratios(matrix, plant), measured_ratio_stds(matrix, plant)
+        found = [plant.frequency_rad_s, plant.damping_ratio, plant.drive_shape, ratios["acc_magnet"]]
+        std = [plant.frequency_std_rad_s, plant.damping_ratio_std, plant.drive_shape_std, stds["acc_magnet"]]
+        out.append([np.array(found) / true - 1.0, np.array(std) / true])
+    return np.array(out)
+
+
+@pytest.mark.parametrize("neighbour", [6.0, 2.0])
+def test_the_intervals_hold_the_truth_with_a_neighbouring_mode_far_away_and_near(neighbour):
+    error, std = np.moveaxis(errors(neighbour, range(6)), 1, 0)
+    inside = np.abs(error) < 1.96 * std
+    assert np.all(np.mean(inside, axis=0) > 0.6)  # 0.95 less four standard deviations of a share of six
+    assert np.median(std[:, 2]) < 0.02
+
+
+def test_a_mode_that_the_model_lacks_is_seen_by_the_narrower_fits():
+    far, near = (errors(neighbour, [0], noise=1e-4)[0] for neighbour in (6.0, 2.0))
+    assert near[1][2] > 5.0 * far[1][2]
