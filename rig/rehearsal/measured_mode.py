@@ -44,9 +44,9 @@ def elements_of(mode: NonlinearMode, rig: LinearRig, generator: np.random.Genera
 
 
 def _drawn(mode: NonlinearMode, quantity: str, generator: np.random.Generator, least: float) -> Real:
-    """Draw relative errors of a quantity [n], within half its 95 % interval, the same for all levels."""
+    """Draw relative errors of a quantity [n], within its 95 % bound, the same for all levels."""
     values = np.asarray(getattr(mode, quantity))
-    relative = np.nan_to_num(np.asarray(mode.interval(quantity)) / 1.96 / np.abs(values), nan=0.0, posinf=0.0)
+    relative = np.nan_to_num(np.asarray(mode.bound_95(quantity)) / 1.96 / np.abs(values), nan=0.0, posinf=0.0)
     return np.asarray(np.maximum(relative, least) * generator.standard_normal())
 
 
