@@ -1,7 +1,7 @@
 """Execution of one part of a run: the control loop, the journal, the evaluated points, and every way to stop."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,19 +10,22 @@ from controller import LockState
 from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.measured_together import round_at
+from rig.campaigns.evaluation.passing import was_refused_in_passing
 from rig.campaigns.evaluation.plausibility import with_plausibility
-from rig.campaigns.evaluation.point import Point, Quality, RowRange
+from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
 from rig.campaigns.evaluation.skipped import what_was_skipped
-from rig.campaigns.evaluation.stored_point import stored
+from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.device_remarks import flag_names, with_device_remarks
+from rig.campaigns.running.attempts import RefusedRecords, after_attempts, attempt_at
+from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.campaigns.running.evaluation_thread import EvaluationThread
 from rig.campaigns.running.row_buffer import RowBuffer
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
+from rig.daq import flag_names
 from rig.errors import RecordingError
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.recording.journal import JournalWriter
@@ -57,6 +60,10 @@ class MeasuredBefore:
     """Number in the recording of every point of the plan; None if it equals the number in the plan."""
     points: tuple[Point[Any], ...] = ()
     """All points of the recording so far."""
+    given_up: frozenset[int] = frozenset()
+    """Numbers in the plan of the points that were not accepted and are not measured again."""
+    attempts: Mapping[int, tuple[Attempt, ...]] = field(default_factory=dict)
+    """Refused attempts of the same run at points that are measured again, by their number in the plan."""
 
 
 class Execution:
@@ -78,13 +85,17 @@ class Execution:
         self.in_one_go = KINDS[plan.kind].in_one_go
         self.watch = KINDS[plan.kind].watch
         self.targets = plan.targets()
-        self.measured_before = before.done
+        self.measured_before = before.done | before.given_up
         self.numbers = range(len(self.targets)) if before.numbers is None else before.numbers
         self.known = list(before.points)
         self.done = len(before.done)
-        self.finished = self.done
+        self.finished = len(self.measured_before)
         self.accepted = self.done
-        self.reported: dict[int, Point[Any]] = {}
+        given_up = {self.numbers[number] for number in before.given_up}
+        self.reported = {point.number: point for point in before.points if point.number in given_up}
+        self.attempts: dict[int, tuple[Attempt, ...]] = dict(before.attempts)
+        self.refused = RefusedRecords()
+        self.passing: set[int] = set()
         self.next_segment = 0
         self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
@@ -175,6 +186,7 @@ class Execution:
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the current point, and request the evaluation of points that are over."""
         self.kept.add(self.tick.sample - rows.size, rows)
+        self._note_refused()
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
             if self.in_one_go and int(segments[self.next_segment]["point"]) >= 0:
@@ -193,21 +205,33 @@ class Execution:
                 elif kind in EVALUATED:
                     settling = outcomes[self.next_segment - 1].copy()
                     rows = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
-                    self.evaluations.ask(self._measured, first, rows, target, settling)
+                    self.evaluations.ask(self._measured, first, rows, kind == SegmentKind.RECORD, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
         while self.evaluations if self.loop.waits else self.evaluations.ready():
             for point in self.evaluations.take():
                 self._report(point)
 
-    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[Point[Any]]:
-        """Evaluate the points in rows that begin with sample ``first``."""
+    def _note_refused(self) -> None:
+        """Keep what the sequencer has refused and measures again."""
+        for number, sample, attempt in self.refused.take(self.tick, self.stored):
+            self.attempts[number] = (*self.attempts.get(number, ()), attempt)
+            name, tried = point_name(self.numbers[number]), len(self.attempts[number])
+            text = f"{name}, attempt {tried}: {attempt.reason}; measured again"
+            self._write(self.journal.event, {"sample": sample, "what": "refused", "text": text})
+            self.progress.remark(text)
+
+    def _measured(self, first: int, rows: np.ndarray, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
+        """Evaluate the points in rows that begin with sample ``first``; ``steady``: they hold one vibration at one level."""
         found = self.measure(self.bench, self.plan, target, rows, *told)
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
+        for point in points:
+            if was_refused_in_passing(point, self.bench, rows, self.loop.counters, steady):
+                self.passing.add(point.number)
         return [replace(point, rows=where) for point in points]
 
     def _report_rest(self) -> None:
@@ -249,7 +273,7 @@ class Execution:
         rows = self.kept.take(first, first + passages[-1].end)
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
-        self.evaluations.ask(self._measured, first, rows, targets, passages, ended)
+        self.evaluations.ask(self._measured, first, rows, False, targets, passages, ended)
         self.next_segment = found.end_segment
         return True
 
@@ -262,13 +286,35 @@ class Execution:
                 self.loop.request_stop(stop)
         if point.quality is Quality.GOOD and point.warnings:
             point = replace(point, quality=Quality.WARNED)
-        point = replace(point, number=self.numbers[point.number])
+        number = point.number
+        point = after_attempts(point, self.attempts.get(number, ()))
+        if point.quality is not Quality.REJECTED or point.attempts > self.plan.retries:
+            self.passing.discard(number)
+        point = replace(point, number=self.numbers[number])
         self.known.append(point)
         self._write(self.journal.point, stored(point))
         self.reported[point.number] = point
         self.finished += 1
         self.accepted += 1 if point.accepted else 0
         self.progress.point(point, self.finished, len(self.targets))
+
+    @property
+    def worth_another(self) -> frozenset[int]:
+        """Numbers in the plan of the points that were refused for something that passes, once the whole plan was carried out."""
+        completed = EndReason(int(self.tick.guard["reason"][0])) is EndReason.COMPLETED and self.loop.failure is None
+        return frozenset(self.passing) if completed else frozenset()
+
+    def before_another(self, points: Iterable[Mapping[str, Any]]) -> MeasuredBefore:
+        """Return what was measured before the points in `worth_another` are measured again; ``points``: all of the recording."""
+        result: type[Any] = KINDS[self.plan.kind].result
+        known = tuple(point_from(table, result) for table in points)
+        last = {point.number: point for point in known}
+        places = {number: place for place, number in enumerate(self.numbers)}
+        again = self.worth_another
+        done = {places[n] for n, point in last.items() if n in places and point.accepted}
+        given_up = frozenset(range(len(self.targets))) - done - again
+        attempts = {place: (*self.attempts.get(place, ()), attempt_at(last[self.numbers[place]])) for place in again}
+        return MeasuredBefore(frozenset(done), self.numbers, known, given_up, attempts)
 
     def _mark_unlocked(self) -> None:
         """If no lock was found at the start voltage, mark all remaining points of the plan as failed for that reason."""

@@ -1,6 +1,6 @@
 """The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -73,7 +73,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
         ):
             execution = Execution(plan, bench, loop, journal, options.progress)
             execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
-    return _whole(output, options.progress)
+    return _with_further_attempts(_whole(output, options.progress), execution, options, facts)
 
 
 @ended_in_order()
@@ -116,25 +116,63 @@ def take_up(
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench
-    segments = plan.segments(bench.sample_rate_hz, left.done)
-    if segments and not trust_code:
-        refuse_code(bench, output.name)
-    if segments:
-        with open_session(bench, drawn, realtime=options.realtime) as session:
-            facts = _facts(plan, bench, session, options)
-            columns = [Column(**column) for column in ROW_COLUMNS]
-            rows = recorded_row(len(bench.channels))
-            with (
-                _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
-                _started(session, _settings(plan, bench, segments), output) as loop,
-            ):
-                execution = Execution(plan, bench, loop, journal, progress, before)
-                execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
-    elif not finished:
+    if plan.segments(bench.sample_rate_hz, left.done):
+        if not trust_code:
+            refuse_code(bench, output.name)
+        execution, facts = _further_part(plan, bench, output, options, information, before)
+        return _with_further_attempts(_whole(output, progress), execution, options, facts)
+    if not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
             journal.end(nothing_left(bench))
     return _whole(output, progress) if journal_path(output).exists() else Recording(output)
+
+
+def _further_part(
+    plan: Plan,
+    bench: Bench,
+    output: Path,
+    options: RunOptions,
+    information: Mapping[str, Any],
+    before: MeasuredBefore,
+    facts: Mapping[str, Any] | None = None,
+) -> tuple[Execution, dict[str, Any]]:
+    """Measure in a new part of a recording what was not measured ``before``; return its execution and its facts.
+
+    ``facts`` are those of the part before if it is the same run, which was armed then; ``information`` holds the seed.
+    """
+    segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
+    with open_session(bench, information["seed"], realtime=options.realtime) as session:
+        told = _facts(plan, bench, session, options) if facts is None else {**facts, "device": session.identity}
+        columns = [Column(**column) for column in ROW_COLUMNS]
+        rows = recorded_row(len(bench.channels))
+        with (
+            _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
+            _started(session, _settings(plan, bench, segments), output) as loop,
+        ):
+            execution = Execution(plan, bench, loop, journal, options.progress, before)
+            execution.go({**information, "about": {**told, "lead_samples": _lead(loop)}})
+    return execution, told
+
+
+def _with_further_attempts(
+    recording: Recording, execution: Execution, options: RunOptions, facts: Mapping[str, Any]
+) -> Recording:
+    """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
+
+    They are approached as the plan says, as in a resumed run. This ends when no such point is left, or none with attempts left.
+    """
+    while again := execution.worth_another:
+        with recording:
+            before = execution.before_another(recording.points)
+            seed = (recording.seed or 0) + len(recording.parts)  # other noise than in the parts before
+            information = {"first_sample": recording.n_rows, "seed": seed}
+        names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
+        options.progress.remark(f"measured again, for what was in the way may have passed: point {names}")
+        plan, bench, output = execution.plan, execution.bench, recording.path
+        execution, _ = _further_part(plan, bench, output, options, information, before, facts)
+        recording = _whole(output, options.progress)
+    return recording
 
 
 def _put_back(output: Path, progress: Progress) -> None:
@@ -229,4 +267,5 @@ def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSe
         segments,
         plan.waveforms(bench.sample_rate_hz),
         plan.known_plant,
+        plan.retries,
     )

@@ -28,6 +28,7 @@ from rig.tick.sequencer.layout import (
     LOOP_DRIVE,
     RAMP,
     RECORD,
+    RING,
     SETTLE,
     START,
     SWEEP,
@@ -45,8 +46,12 @@ NO_LOCK = int(EndReason.NO_LOCK)
 
 SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
+PENDING = int(Outcome.PENDING)
+OUTPUT_HELD = int(Outcome.OUTPUT_HELD)
+SAMPLES_LOST = int(Outcome.SAMPLES_LOST)
 STOP = int(OnFailure.STOP)
 
+LARGEST_LOST = 0.05  # of a record's samples; with more lost, its evaluation refuses it
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
 
 
@@ -59,6 +64,7 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
     entry.periods = progress.cycle - progress.start_cycle
     entry.mean_error_rad = settling.mean_error_rad
     entry.drift = settling.drift
+    entry.faults = progress.held + progress.lost
     progress.segment += 1
     progress.entered = 0
 
@@ -73,6 +79,48 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray) -> 
         entry.first_sample = progress.sample
         entry.end_sample = progress.sample
         progress.segment += 1
+
+
+@kernel
+def passing_fault(progress: Record, samples: int, over: bool) -> int:
+    """Return why the present record is refused for a passing fault of the device, or DONE.
+
+    A held output refuses it as soon as the device follows its outputs again, lost samples at its end if they are too many.
+    """
+    if progress.held > 0 and (over or progress.disturbed == 0):
+        return OUTPUT_HELD
+    if over and progress.lost > LARGEST_LOST * samples:
+        return SAMPLES_LOST
+    return DONE
+
+
+@kernel
+def measure_again(progress: Record, segments: np.ndarray, outcomes: np.ndarray, settling: Record, outcome: int) -> bool:
+    """Note a record that is refused for something that passes, and go back to where its point settles.
+
+    Returns False, and does nothing, if the record may not be measured again.
+    """
+    segment = segments[progress.segment]
+    if segment.again < 0 or progress.tries_left < 1:
+        return False
+    entry = progress.refused[progress.n_refused % RING]
+    entry.segment = progress.segment
+    entry.outcome = outcome
+    entry.first_sample = outcomes[progress.segment].first_sample
+    entry.end_sample = progress.sample
+    entry.periods = progress.cycle - progress.start_cycle
+    entry.mean_error_rad = settling.mean_error_rad
+    entry.drift = settling.drift
+    entry.held = progress.held
+    entry.lost = progress.lost
+    entry.force_n = settling.forces[(settling.count - 1) % settling.forces.size] if settling.count > 0 else math.nan
+    progress.n_refused += 1
+    progress.tries_left -= 1
+    for index in range(segment.again, progress.segment + 1):
+        outcomes[index].outcome = PENDING
+    progress.segment = segment.again
+    progress.entered = 0
+    return True
 
 
 @kernel
@@ -161,6 +209,11 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     progress.start_lag = progress.lag
     progress.last_cycle = progress.cycle
     progress.frozen_cycles = 0.0
+    progress.held = 0
+    progress.lost = 0
+    if segment.point != progress.point:
+        progress.point = segment.point
+        progress.tries_left = progress.retries
     entry.outcome = RUNNING
     entry.first_sample = progress.sample
     if is_ramp(segment.kind) and lock.state == LOST:
@@ -233,6 +286,8 @@ def advance(
         return
     if segment.kind == SETTLE or segment.kind == RECORD:
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
+        if failure == DISTURBED and measure_again(progress, segments, outcomes, settling, DISTURBED):
+            return
         if failure != RUNNING:
             give_up(progress, segments, outcomes, settling, lock, guard, failure)
             return
@@ -244,6 +299,12 @@ def advance(
             give_up(progress, segments, outcomes, settling, lock, guard, verdict)
         return
     over = samples >= segment.samples if segment.samples > 0 else elapsed >= segment.periods
+    if segment.kind == RECORD and progress.held + progress.lost > 0:
+        fault = passing_fault(progress, samples, over)
+        if fault != DONE and measure_again(progress, segments, outcomes, settling, fault):
+            return
     if segment.kind != SETTLE and over and not (segment.kind == RECORD and is_slipping(lock)):
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
+        if spoilt and measure_again(progress, segments, outcomes, settling, DISTURBED):
+            return
         close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE)
