@@ -7,7 +7,7 @@ from typing import Any
 from rig.campaigns.evaluation.drift import drift_of
 from rig.campaigns.evaluation.point import Spectrum
 from rig.campaigns.evaluation.recorded import points_of
-from rig.campaigns.evaluation.skipped import what_was_skipped
+from rig.campaigns.evaluation.skipped import what_was_measured_again, what_was_skipped
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
@@ -86,6 +86,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "points_planned": len(plan.targets()),
         "skipped": what_was_skipped(points, len(plan.targets())),
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
+        "measured_again": what_was_measured_again(points),
         "drift": drift_of(points),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),

@@ -29,8 +29,8 @@ class Tick:
 
     ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
     latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
-    the fundamentals are checked against its ``exciter``. A record that is refused for something that passes is measured again up
-    to ``retries`` times. ``armed = False`` keeps the output at 0 V.
+    the fundamentals are checked against its ``exciter``. A record that is refused for something that passes is measured again
+    up to ``retries`` times. ``armed = False`` keeps the output at 0 V.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """

@@ -1,7 +1,7 @@
 """Execution of one part of a run: the control loop, the journal, the evaluated points, and every way to stop."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,10 @@ from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.attempts import RefusedRecords, after_attempts, attempt_at
+from rig.campaigns.running.attempts import RefusedRecords, after_attempts
 from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.campaigns.running.evaluation_thread import EvaluationThread
+from rig.campaigns.running.measured_before import MeasuredBefore, before_another
 from rig.campaigns.running.row_buffer import RowBuffer
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
@@ -34,7 +35,7 @@ from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 
-__all__ = ["Execution", "MeasuredBefore", "nothing_left"]
+__all__ = ["Execution", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
@@ -48,22 +49,6 @@ OVER = {
     Outcome.OUTSIDE_WINDOW,
     Outcome.NOT_LOCKED,
 }
-
-
-@dataclass(frozen=True)
-class MeasuredBefore:
-    """Results of earlier parts of the recording that concern the plan."""
-
-    done: frozenset[int] = frozenset()
-    """Numbers in the plan of the points that were accepted."""
-    numbers: Sequence[int] | None = None
-    """Number in the recording of every point of the plan; None if it equals the number in the plan."""
-    points: tuple[Point[Any], ...] = ()
-    """All points of the recording so far."""
-    given_up: frozenset[int] = frozenset()
-    """Numbers in the plan of the points that were not accepted and are not measured again."""
-    attempts: Mapping[int, tuple[Attempt, ...]] = field(default_factory=dict)
-    """Refused attempts of the same run at points that are measured again, by their number in the plan."""
 
 
 class Execution:
@@ -300,21 +285,15 @@ class Execution:
 
     @property
     def worth_another(self) -> frozenset[int]:
-        """Numbers in the plan of the points that were refused for something that passes, once the whole plan was carried out."""
+        """Numbers in the plan of points refused for something that passes, once the whole plan was carried out."""
         completed = EndReason(int(self.tick.guard["reason"][0])) is EndReason.COMPLETED and self.loop.failure is None
         return frozenset(self.passing) if completed else frozenset()
 
     def before_another(self, points: Iterable[Mapping[str, Any]]) -> MeasuredBefore:
-        """Return what was measured before the points in `worth_another` are measured again; ``points``: all of the recording."""
+        """Return what was measured before the next attempts at `worth_another`; ``points``: all of the recording."""
         result: type[Any] = KINDS[self.plan.kind].result
         known = tuple(point_from(table, result) for table in points)
-        last = {point.number: point for point in known}
-        places = {number: place for place, number in enumerate(self.numbers)}
-        again = self.worth_another
-        done = {places[n] for n, point in last.items() if n in places and point.accepted}
-        given_up = frozenset(range(len(self.targets))) - done - again
-        attempts = {place: (*self.attempts.get(place, ()), attempt_at(last[self.numbers[place]])) for place in again}
-        return MeasuredBefore(frozenset(done), self.numbers, known, given_up, attempts)
+        return before_another(self.numbers, known, self.worth_another, self.attempts)
 
     def _mark_unlocked(self) -> None:
         """If no lock was found at the start voltage, mark all remaining points of the plan as failed for that reason."""

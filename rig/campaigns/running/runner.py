@@ -18,7 +18,8 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.continuation import what_is_left
-from rig.campaigns.running.execution import Execution, MeasuredBefore, nothing_left
+from rig.campaigns.running.execution import Execution, nothing_left
+from rig.campaigns.running.measured_before import MeasuredBefore
 from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
 from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.errors import RigError

@@ -28,13 +28,13 @@ from rig.tick.sequencer.layout import (
     LOOP_DRIVE,
     RAMP,
     RECORD,
-    RING,
     SETTLE,
     START,
     SWEEP,
     OnFailure,
     Outcome,
 )
+from rig.tick.sequencer.repetition import measure_again, passing_fault
 from vibrolock.compiled import Record, kernel
 
 COMPLETED = int(EndReason.COMPLETED)
@@ -46,12 +46,8 @@ NO_LOCK = int(EndReason.NO_LOCK)
 
 SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
-PENDING = int(Outcome.PENDING)
-OUTPUT_HELD = int(Outcome.OUTPUT_HELD)
-SAMPLES_LOST = int(Outcome.SAMPLES_LOST)
 STOP = int(OnFailure.STOP)
 
-LARGEST_LOST = 0.05  # of a record's samples; with more lost, its evaluation refuses it
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
 
 
@@ -79,48 +75,6 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray) -> 
         entry.first_sample = progress.sample
         entry.end_sample = progress.sample
         progress.segment += 1
-
-
-@kernel
-def passing_fault(progress: Record, samples: int, over: bool) -> int:
-    """Return why the present record is refused for a passing fault of the device, or DONE.
-
-    A held output refuses it as soon as the device follows its outputs again, lost samples at its end if they are too many.
-    """
-    if progress.held > 0 and (over or progress.disturbed == 0):
-        return OUTPUT_HELD
-    if over and progress.lost > LARGEST_LOST * samples:
-        return SAMPLES_LOST
-    return DONE
-
-
-@kernel
-def measure_again(progress: Record, segments: np.ndarray, outcomes: np.ndarray, settling: Record, outcome: int) -> bool:
-    """Note a record that is refused for something that passes, and go back to where its point settles.
-
-    Returns False, and does nothing, if the record may not be measured again.
-    """
-    segment = segments[progress.segment]
-    if segment.again < 0 or progress.tries_left < 1:
-        return False
-    entry = progress.refused[progress.n_refused % RING]
-    entry.segment = progress.segment
-    entry.outcome = outcome
-    entry.first_sample = outcomes[progress.segment].first_sample
-    entry.end_sample = progress.sample
-    entry.periods = progress.cycle - progress.start_cycle
-    entry.mean_error_rad = settling.mean_error_rad
-    entry.drift = settling.drift
-    entry.held = progress.held
-    entry.lost = progress.lost
-    entry.force_n = settling.forces[(settling.count - 1) % settling.forces.size] if settling.count > 0 else math.nan
-    progress.n_refused += 1
-    progress.tries_left -= 1
-    for index in range(segment.again, progress.segment + 1):
-        outcomes[index].outcome = PENDING
-    progress.segment = segment.again
-    progress.entered = 0
-    return True
 
 
 @kernel

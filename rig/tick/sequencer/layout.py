@@ -99,8 +99,8 @@ SEGMENT = np.dtype(
 
 ``level``: in the unit of the amplitude law (V, N, m); ``geometric``: ramped by the logarithm. ``lag_rad``: wanted phase lag.
 ``omega``: final frequency of a tone (rad/s). ``rate``: of a sweep, in rad/s per sample, or in 1 per sample if ``logarithmic``.
-``waveform``: number of the waveform that is played. ``again``: of a record that may be measured again, the number of the segment
-with which that begins; else -1."""
+``waveform``: number of the waveform that is played. ``again``: of a record, the number of the segment with which its
+repetition begins; else -1."""
 
 OUTCOME = np.dtype(
     [
@@ -130,8 +130,8 @@ REFUSED = np.dtype(
         ("force_n", "f8"),
     ]
 )
-"""A record that was refused and is measured again: what `OUTCOME` says of it, the number of samples with a held output and of lost
-ones, and the force's fundamental, N."""
+"""A record that was refused and is measured again: what `OUTCOME` says of it, the number of samples with a held output and of
+lost ones, and the force's fundamental, N."""
 
 RING = 64
 """Refused records that are kept for the campaign, which reads them every few hundredths of a second."""
