@@ -203,7 +203,7 @@ class Execution:
             self.attempts[number] = (*self.attempts.get(number, ()), attempt)
             name, tried = point_name(self.numbers[number]), len(self.attempts[number])
             text = f"{name}, attempt {tried}: {attempt.reason}; measured again"
-            self._write(self.journal.event, {"sample": sample, "what": "refused", "text": text})
+            self._write(self.journal.event, {"sample": sample, "what": "attempt", "state": "refused", "text": text})
             self.progress.remark(text)
 
     def _measured(self, first: int, rows: np.ndarray, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
