@@ -150,7 +150,9 @@ def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
     print_table(headings, rows)
     for point in points:
         for number_shown, attempt in enumerate(point.refused_before, 1):
-            print(f"note: {point_name(point.number)}: attempt {number_shown} refused{_where(attempt)}: {attempt.reason}")
+            print(
+                f"note: {point_name(point.number)}: attempt {number_shown} refused{_where(attempt)}: {attempt.reason}"
+            )
         for warning in point.warnings or ():
             print(f"warning: {point_name(point.number)}: {warning}")
 
@@ -158,6 +160,8 @@ def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
 def _where(attempt: Attempt) -> str:
     """Return frequency and force of a refused attempt as far as they are known."""
     told = [
-        f"{value:.4g} {unit}" for value, unit in ((attempt.frequency_hz, "Hz"), (attempt.force_n, "N")) if value is not None
+        f"{value:.4g} {unit}"
+        for value, unit in ((attempt.frequency_hz, "Hz"), (attempt.force_n, "N"))
+        if value is not None
     ]
     return f" at {', '.join(told)}" if told else ""

@@ -150,6 +150,7 @@ def test_a_knock_that_breaks_the_settle_rule_is_followed_by_another_record_at_on
 
 def test_a_stopped_run_with_repeated_points_is_resumed_to_all_of_them(tmp_path):
     """The first point's line asks for the stop; what was measured again before stays as it is."""
+
     class StopAfter(Silent):
         def __init__(self, points):
             self.left = points

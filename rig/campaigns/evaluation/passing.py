@@ -1,6 +1,5 @@
 """Tell whether a recorded point was refused for something that passes: a fault of the device for a while, or a disturbance."""
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -8,10 +7,8 @@ import numpy as np
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point, Quality
-from rig.daq import HELD, LOST, flag_names
-from rig.tick.layout import DEVICE_SHIFT
 
-__all__ = ["came_and_went", "device_faults", "was_refused_in_passing"]
+__all__ = ["came_and_went", "was_refused_in_passing"]
 
 STANDS_OUT = (
     4.0  # times the usual change from period to period; noise in a whole period, or a lasting beat, stays below 2
@@ -19,24 +16,13 @@ STANDS_OUT = (
 FEWEST_PERIODS = 4
 
 
-def was_refused_in_passing(
-    point: Point[Any], bench: Bench, rows: np.ndarray, counters: Iterable[str], steady: bool
-) -> bool:
-    """Return whether a point was refused although its ``rows`` show something that passes, so that it is worth another attempt.
+def was_refused_in_passing(point: Point[Any], bench: Bench, rows: np.ndarray, faults: int, steady: bool) -> bool:
+    """Return whether a point was refused, but for something that passes, so that it is worth another attempt.
 
-    That is a held output or a lost sample by the device's flags (named by the driver's ``counters``), or, of a ``steady``
-    vibration, a disturbance that came and went.
+    That is a passing fault of the device (``faults``: samples with a held output, and lost ones, while the point was approached and
+    recorded), or, in the ``rows`` of a ``steady`` vibration, a disturbance that came and went.
     """
-    if point.quality is not Quality.REJECTED:
-        return False
-    return device_faults(rows, counters) > 0 or (steady and came_and_went(bench, rows))
-
-
-def device_faults(rows: np.ndarray, counters: Iterable[str]) -> int:
-    """Return the number of rows with a held output or a lost sample."""
-    names = flag_names(counters)
-    bits = LOST | (1 << names.index(HELD) if HELD in names else 0)
-    return int(np.count_nonzero((rows["flags"] >> DEVICE_SHIFT) & bits))
+    return point.quality is Quality.REJECTED and (faults > 0 or (steady and came_and_went(bench, rows)))
 
 
 def came_and_went(bench: Bench, rows: np.ndarray) -> bool:

@@ -190,7 +190,9 @@ class Execution:
                 elif kind in EVALUATED:
                     settling = outcomes[self.next_segment - 1].copy()
                     rows = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
-                    self.evaluations.ask(self._measured, first, rows, kind == SegmentKind.RECORD, target, settling)
+                    steady = kind == SegmentKind.RECORD
+                    faults = self._faults(self.next_segment, self.next_segment + 1, settled=steady)
+                    self.evaluations.ask(self._measured, first, rows, faults, steady, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
         while self.evaluations if self.loop.waits else self.evaluations.ready():
@@ -206,8 +208,23 @@ class Execution:
             self._write(self.journal.event, {"sample": sample, "what": "attempt", "state": "refused", "text": text})
             self.progress.remark(text)
 
-    def _measured(self, first: int, rows: np.ndarray, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
-        """Evaluate the points in rows that begin with sample ``first``; ``steady``: they hold one vibration at one level."""
+    def _faults(self, first: int, end: int, *, settled: bool) -> int:
+        """Return the samples with passing faults of the device from where the point of segment ``first`` begins to ``end``.
+
+        Unless the vibration has ``settled``, those of the point before count too: they may still be felt.
+        """
+        first = self._point_begins(first)
+        if first > 0 and not settled:
+            first = self._point_begins(first - 1)
+        return int(self.tick.outcomes["faults"][first:end].sum())
+
+    def _measured(
+        self, first: int, rows: np.ndarray, faults: int, steady: bool, target: Any, *told: Any
+    ) -> list[Point[Any]]:
+        """Evaluate the points in rows that begin with sample ``first``.
+
+        ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
+        """
         found = self.measure(self.bench, self.plan, target, rows, *told)
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
@@ -215,7 +232,7 @@ class Execution:
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
         for point in points:
-            if was_refused_in_passing(point, self.bench, rows, self.loop.counters, steady):
+            if was_refused_in_passing(point, self.bench, rows, faults, steady):
                 self.passing.add(point.number)
         return [replace(point, rows=where) for point in points]
 
@@ -227,11 +244,16 @@ class Execution:
 
     def _begin(self, segment: int) -> int:
         """Return the first sample of the rows with which a segment is evaluated."""
-        points = self.tick.arrays.segments["point"]
         if self.plan.evaluates_approach:
-            while segment > 0 and points[segment - 1] == points[segment]:
-                segment -= 1
+            segment = self._point_begins(segment)
         return int(self.tick.outcomes[segment]["first_sample"])
+
+    def _point_begins(self, segment: int) -> int:
+        """Return the first segment of the point that a segment belongs to."""
+        points = self.tick.arrays.segments["point"]
+        while segment > 0 and points[segment - 1] == points[segment]:
+            segment -= 1
+        return segment
 
     def _first_needed(self) -> int:
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
@@ -258,7 +280,8 @@ class Execution:
         rows = self.kept.take(first, first + passages[-1].end)
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
-        self.evaluations.ask(self._measured, first, rows, False, targets, passages, ended)
+        faults = self._faults(self.next_segment, found.end_segment, settled=False)
+        self.evaluations.ask(self._measured, first, rows, faults, False, targets, passages, ended)
         self.next_segment = found.end_segment
         return True
 
