@@ -1,7 +1,7 @@
 """A backbone over emulated devices, run after run: ``python -m benchmarks.repeated_attempts [--runs 2] [--retries 2] [PLAN]``.
 
-The plan runs unchanged on an emulated serial device and on an emulated CAN FD device, each at wall-clock pace with the loop in a
-process of its own, as often as asked, in turns. A row of the table is one run: points accepted, points that were measured
+The plan runs unchanged on an emulated serial device and on an emulated CAN FD device, each at wall-clock pace with the loop in
+a process of its own, as often as asked, in turns. A row of the table is one run: points accepted, points that were measured
 again and how many attempts were refused for what, held outputs and lost samples of the whole run, its length. ``--retries 0``
 shows what the same machine makes of the plan without repetition.
 """
@@ -50,8 +50,9 @@ def run_once(wire: str, plan_name: str, retries: int, seed: int) -> dict[str, An
 def line(number: int, run: dict[str, Any]) -> str:
     """A row of the table."""
     again = ", ".join(map(str, run["measured_again"])) or "-"
+    points = f"{run['accepted']:>2}/{run['planned']:<2}"
     return (
-        f"{number:>3}  {run['wire']:<6}  {run['accepted']:>2}/{run['planned']:<2}  {len(run['refused_attempts']):>8}  {again:<16}  "
+        f"{number:>3}  {run['wire']:<6}  {points}  {len(run['refused_attempts']):>8}  {again:<16}  "
         f"{run['parts']:>5}  {run['held']:>6}  {run['lost']:>5}  {run['samples']:>8}  {run['seconds']:>5.0f}"
     )
 

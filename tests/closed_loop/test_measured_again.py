@@ -1,5 +1,6 @@
 """Points refused for something that passes are measured again; what does not pass is not tried again."""
 
+import json
 from functools import partial
 
 import numpy as np
@@ -14,10 +15,12 @@ from rig.campaigns.plans import load_plan
 from rig.campaigns.running.runner import carry_out, take_up
 from rig.emulator.emulated import emulated
 from rig.loop.loop import Loop
+from rig.show.summary import summarise_recording
+from rig.show.tables import print_summary
 from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.sequencer.segments import SettleRule
 from tests.closed_loop.laws import knock, plan_of
-from tests.reference.harmonic_balance import backbone_at_voltages
+from tests.reference.harmonic_balance import backbone, backbone_at_voltages
 from tests.reference.parameters import ONE_SIDED
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.rigs import bench_with
@@ -174,14 +177,16 @@ def test_a_stopped_run_with_repeated_points_is_resumed_to_all_of_them(tmp_path):
 def test_a_loop_in_a_process_of_its_own_repeats_points_over_a_wire(wire):
     plan = plan_with(levels_v=(0.4, 0.8), record_periods=20)
     faults = {"held_per_s": 0.4, "held_s": 0.014}
-    with emulated(late_bench(faults), wire, lockstep=True, seed=1, options={"queue_blocks": 2}) as bench:
-        with rig.run(plan, bench=bench, seed=1) as run:
-            points = points_of(run.recording)
-            assert run.complete
-            refused = [attempt for point in points for attempt in point.refused_before]
-            assert refused
-            assert all("outputs came too late" in attempt.reason for attempt in refused)
-            assert run.recording.parts[-1].end["counters"]["output_held"] > 0
+    with (
+        emulated(late_bench(faults), wire, lockstep=True, seed=1, options={"queue_blocks": 2}) as bench,
+        rig.run(plan, bench=bench, seed=1) as run,
+    ):
+        points = points_of(run.recording)
+        assert run.complete
+        refused = [attempt for point in points for attempt in point.refused_before]
+        assert refused
+        assert all("outputs came too late" in attempt.reason for attempt in refused)
+        assert run.recording.parts[-1].end["counters"]["output_held"] > 0
 
 
 def again_at_the_end(plan, bench, seed=0):
@@ -206,6 +211,22 @@ def test_short_points_are_measured_again_after_the_last_level_for_their_ramp_bel
     assert [point for point in points if not point.refused_before and point.part != 0] == []
 
 
+def test_a_continuous_backbone_goes_up_and_down_again_over_the_levels_that_are_missing():
+    plan = load_plan("magnet-beam/continuous-backbone")
+    points, parts, complete = again_at_the_end(plan, late_bench({"held_per_s": 0.3, "held_s": 0.014}))
+    assert complete
+    assert len(parts) == 2
+    accepted_at_once = {table["number"] for table in parts[0].points if table["accepted"]}
+    assert 0 < len(accepted_at_once) < 13
+    for point in points:
+        assert point.attempts == (1 if point.number in accepted_at_once else 2)
+        assert point.part == point.attempts - 1
+    truth = backbone(ONE_SIDED, [point.vibration.force_n for point in points])
+    np.testing.assert_allclose(
+        [point.modal.modal_frequency_hz for point in points], [t.frequency_hz for t in truth], rtol=1e-3
+    )
+
+
 def test_a_multisine_is_played_again_at_once():
     plan = load_plan("magnet-beam/multisine-1")
     with rig.run(plan, bench=late_bench({"held_per_s": 0.05, "held_s": 0.014})) as run:
@@ -219,3 +240,42 @@ def test_a_multisine_is_played_again_at_once():
     for point, whole in zip(points, undisturbed, strict=True):
         assert point.accepted
         assert point.channel_rms == pytest.approx(whole.channel_rms, rel=0.02)
+
+
+def test_a_knock_that_only_the_evaluation_sees_is_measured_again_after_the_last_level(monkeypatch, tmp_path):
+    class UntilAgain(Silent):
+        """The knocks are over when the run goes on for another attempt."""
+
+        def remark(self, text):
+            if "measured again" in text:
+                monkeypatch.undo()
+
+    knock(monkeypatch, 2, 2.0, 0.01)
+    plan = plan_of("friction-beam", levels_m=(5e-5, 6e-5), start_v=0.05, record_periods=200)
+    bench = bench_with({"block": 5}, "friction-beam")
+    with carry_out(plan, bench, tmp_path / "knocked.h5", RunOptions(progress=UntilAgain())) as recording:
+        first, second = points_of(recording)
+        assert recording.complete
+        assert len(recording.parts) == 2
+        assert recording.parts[0].end["skipped"] == "1 of 2 points skipped: rejected (5e-05 m)"
+        assert recording.parts[1].end["skipped"] == ""
+    assert first.part == 1
+    (attempt,) = first.refused_before
+    assert "of the force's RMS are no harmonics" in attempt.reason
+    assert attempt.part == 0
+    assert attempt.frequency_hz == pytest.approx(first.vibration.frequency_hz, rel=1e-4)
+    assert second.part == 0
+    assert second.attempts == 1
+
+
+def test_show_says_what_was_refused_before_and_json_has_it(measured, capsys):
+    summary = summarise_recording(measured.recording)
+    again = [point for point in summary["points"] if point.get("refused_before")]
+    refused = sum(len(point["refused_before"]) for point in again)
+    assert summary["measured_again"].startswith("measured again: points ")
+    assert summary["measured_again"].endswith(f"; {refused} attempts refused")
+    json.dumps(summary)
+    print_summary(summary)
+    shown = capsys.readouterr().out
+    assert summary["measured_again"] in shown
+    assert shown.count(" refused at 24.") == refused

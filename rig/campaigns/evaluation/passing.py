@@ -19,8 +19,8 @@ FEWEST_PERIODS = 4
 def was_refused_in_passing(point: Point[Any], bench: Bench, rows: np.ndarray, faults: int, steady: bool) -> bool:
     """Return whether a point was refused, but for something that passes, so that it is worth another attempt.
 
-    That is a passing fault of the device (``faults``: samples with a held output, and lost ones, while the point was approached and
-    recorded), or, in the ``rows`` of a ``steady`` vibration, a disturbance that came and went.
+    That is a passing fault of the device (``faults``: samples with a held output, and lost ones, while the point was approached
+    and recorded), or, in the ``rows`` of a ``steady`` vibration, a disturbance that came and went.
     """
     return point.quality is Quality.REJECTED and (faults > 0 or (steady and came_and_went(bench, rows)))
 

@@ -95,7 +95,7 @@ class Execution:
 
         ``information`` is written to the journal before the first row of the part. A run that ends early raises no error.
         """
-        flags = {"points_done": self.finished, "device_flags": flag_names(self.loop.counters)}
+        flags = {"points_done": self.done, "device_flags": flag_names(self.loop.counters)}
         self._write(self.journal.part, {**information, **flags})
         for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
