@@ -1,6 +1,7 @@
 """Points refused for something that passes are measured again; what does not pass is not tried again."""
 
 import json
+from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
@@ -15,6 +16,7 @@ from rig.campaigns.plans import load_plan
 from rig.campaigns.running.runner import carry_out, take_up
 from rig.emulator.emulated import emulated
 from rig.loop.loop import Loop
+from rig.loop.session import open_session
 from rig.show.summary import summarise_recording
 from rig.show.tables import print_summary
 from rig.tick.layout import DEVICE_SHIFT
@@ -279,3 +281,33 @@ def test_show_says_what_was_refused_before_and_json_has_it(measured, capsys):
     shown = capsys.readouterr().out
     assert summary["measured_again"] in shown
     assert shown.count(" refused at 24.") == refused
+
+
+def test_a_device_that_has_latched_meanwhile_is_left_alone(monkeypatch, tmp_path):
+    """The emergency stop was pressed between the last level and the next attempt."""
+    sessions = []
+
+    @contextmanager
+    def open_latched(*arguments, **keys):
+        with open_session(*arguments, **keys) as session:
+            session.latched = "the emergency stop has latched" if sessions else ""
+            sessions.append(session)
+            yield session
+
+    remarks = []
+
+    class Heard(Silent):
+        def remark(self, text):
+            remarks.append(text)
+
+    monkeypatch.setattr("rig.campaigns.running.runner.open_session", open_latched)
+    plan = load_plan("magnet-beam/backbone-short")
+    options = RunOptions(progress=Heard())
+    with carry_out(plan, late_bench(LATE), tmp_path / "latched.h5", options) as recording:
+        assert len(recording.parts) == 1
+        assert not recording.complete
+    assert len(sessions) == 2
+    assert any("nothing is measured again: the emergency stop has latched" in text for text in remarks)
+    monkeypatch.undo()
+    with take_up(tmp_path / "latched.h5") as recording:
+        assert recording.complete

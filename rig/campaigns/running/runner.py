@@ -1,8 +1,9 @@
 """The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -117,10 +118,14 @@ def take_up(
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
     plan, bench = left.plan, left.bench
-    if plan.segments(bench.sample_rate_hz, left.done):
+    if segments := plan.segments(bench.sample_rate_hz, left.done):
         if not trust_code:
             refuse_code(bench, output.name)
-        execution, facts = _further_part(plan, bench, output, options, information, before)
+        with open_session(bench, drawn, realtime=options.realtime) as session:
+            facts = _facts(plan, bench, session, options)
+            settings = _settings(plan, bench, segments)
+            begin = partial(_execution, plan, bench, progress, before)
+            execution = _further_part(output, session, settings, begin, {**information, "about": facts})
         return _with_further_attempts(_whole(output, progress), execution, options, facts)
     if not finished:
         with continue_recording(output) as journal:
@@ -130,30 +135,22 @@ def take_up(
 
 
 def _further_part(
-    plan: Plan,
-    bench: Bench,
     output: Path,
-    options: RunOptions,
+    session: Session,
+    settings: TickSettings,
+    begin: Callable[[RunningLoop, JournalWriter], Execution],
     information: Mapping[str, Any],
-    before: MeasuredBefore,
-    facts: Mapping[str, Any] | None = None,
-) -> tuple[Execution, dict[str, Any]]:
-    """Measure in a new part of a recording what was not measured ``before``; return its execution and its facts.
-
-    ``facts`` are those of the part before if it is the same run, which was armed then; ``information`` holds the seed.
-    """
-    segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
-    with open_session(bench, information["seed"], realtime=options.realtime) as session:
-        told = _facts(plan, bench, session, options) if facts is None else {**facts, "device": session.identity}
-        columns = [Column(**column) for column in ROW_COLUMNS]
-        rows = recorded_row(len(bench.channels))
-        with (
-            _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
-            _started(session, _settings(plan, bench, segments), output) as loop,
-        ):
-            execution = Execution(plan, bench, loop, journal, options.progress, before)
-            execution.go({**information, "about": {**told, "lead_samples": _lead(loop)}})
-    return execution, told
+) -> Execution:
+    """Measure in a new part of a recording; ``begin`` makes its execution, ``information`` is what the part says of itself."""
+    columns = [Column(**column) for column in ROW_COLUMNS]
+    rows = recorded_row(len(settings.bench.channels))
+    with (
+        _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
+        _started(session, settings, output) as loop,
+    ):
+        execution = begin(loop, journal)
+        execution.go({**information, "about": {**information["about"], "lead_samples": _lead(loop)}})
+    return execution
 
 
 def _with_further_attempts(
@@ -161,19 +158,36 @@ def _with_further_attempts(
 ) -> Recording:
     """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
 
-    They are approached as the plan says, as in a resumed run. This ends when no such point is left, or none with attempts left.
+    They are approached as the plan says, as in a resumed run. The run stays armed. It ends when no such point is left, or none
+    with attempts left, and where the device has latched meanwhile: only a person clears that.
     """
+    plan, bench, output, progress = execution.plan, execution.bench, recording.path, options.progress
     while again := execution.worth_another:
         with recording:
             before = execution.before_another(recording.points)
             seed = (recording.seed or 0) + len(recording.parts)  # other noise than in the parts before
-            information = {"first_sample": recording.n_rows, "seed": seed}
-        names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
-        options.progress.remark(f"measured again, for what was in the way may have passed: point {names}")
-        plan, bench, output = execution.plan, execution.bench, recording.path
-        execution, _ = _further_part(plan, bench, output, options, information, before, facts)
-        recording = _whole(output, options.progress)
+            first_sample = recording.n_rows
+        with open_session(bench, seed, realtime=options.realtime) as session:
+            if session.latched:
+                progress.remark(
+                    f"nothing is measured again: {session.latched}; `rig resume {output}` goes on once armed"
+                )
+                return Recording(output)
+            names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
+            progress.remark(f"measured again, for what was in the way may have passed: point {names}")
+            about = {**facts, "device": session.identity}
+            information = {"first_sample": first_sample, "seed": seed, "about": about}
+            settings = _settings(plan, bench, plan.segments(bench.sample_rate_hz, before.done | before.given_up))
+            begin = partial(_execution, plan, bench, progress, before)
+            execution = _further_part(output, session, settings, begin, information)
+        recording = _whole(output, progress)
     return recording
+
+
+def _execution(
+    plan: Plan, bench: Bench, progress: Progress, before: MeasuredBefore, loop: RunningLoop, journal: JournalWriter
+) -> Execution:
+    return Execution(plan, bench, loop, journal, progress, before)
 
 
 def _put_back(output: Path, progress: Progress) -> None:
