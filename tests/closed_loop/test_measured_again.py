@@ -311,3 +311,18 @@ def test_a_device_that_has_latched_meanwhile_is_left_alone(monkeypatch, tmp_path
     monkeypatch.undo()
     with take_up(tmp_path / "latched.h5") as recording:
         assert recording.complete
+
+
+def test_a_sweep_is_one_attempt_and_swept_again_after_the_last_level():
+    """So many outputs are held that no sweep can be accepted; each attempt is a part of the recording."""
+    plan = load_plan("magnet-beam/sweep-1").model_copy(
+        update={"start_hz": 22.0, "stop_hz": 27.0, "rate_hz_per_s": 1.0, "retries": 1}
+    )
+    points, parts, complete = again_at_the_end(plan, late_bench({"held_per_s": 2.0, "held_s": 0.06}))
+    assert not complete
+    assert len(parts) == 2
+    (point,) = points
+    assert point.reason.startswith("outputs came too late")
+    assert point.reason.endswith("; refused in 2 attempts")
+    assert point.refused_before[0].part == 0
+    assert parts[1].end["skipped"].startswith("1 of 1 points skipped")
