@@ -7,6 +7,7 @@ sample-synchronous hardware.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from enum import Enum
 from types import TracebackType
 from typing import ClassVar, Self
@@ -18,10 +19,17 @@ from rig.bench.channels import Channel, Role
 from rig.bench.configuration import Configured
 from rig.errors import DaqError, DaqRefused, RigError, as_daq_error
 
-__all__ = ["DAQ", "LOST", "Capabilities", "Channel", "Role", "State"]
+__all__ = ["DAQ", "HELD", "LOST", "Capabilities", "Channel", "Role", "State", "flag_names"]
 
 LOST = 1 << 15
 """Bit of `DAQ.flags`: the sample was lost in transfer; its inputs are NaN."""
+HELD = "output_held"
+"""Name of the flag of a sample at which the converter repeated its last output, because the next one came too late."""
+
+
+def flag_names(counters: Iterable[str]) -> list[str]:
+    """Return the names of the device's flags, lowest bit first: the driver's first counters, one for each bit below `LOST`."""
+    return [*counters][: LOST.bit_length() - 1]
 
 
 class Capabilities(Configured):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.daq import DAQ, LOST
+from rig.daq import DAQ, HELD, LOST, flag_names
 from rig.errors import DaqError, as_daq_error
 from rig.tick.safety.layout import GuardMode
 from rig.tick.safety.limits import end_reason_of
@@ -48,6 +48,8 @@ class DrivenLoop:
         self.interruption: BaseException | None = None
         self._counted: dict[str, int] | None = None
         self._voltages = np.zeros(daq.block)
+        flags = flag_names(daq.counters)
+        tick.arrays.loop["held_flag"] = 1 << flags.index(HELD) if HELD in flags else 0
 
     @property
     def counters(self) -> dict[str, int]:

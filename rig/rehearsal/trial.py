@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,14 @@ from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.execution import Execution
+from rig.campaigns.running.measured_before import MeasuredBefore
+from rig.campaigns.running.runner import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
-from rig.tick.tick import TickSettings
 
 __all__ = ["Trial", "TrialPoint", "run_trial"]
 
+FURTHER_PART = 1 << 32  # between the seeds of the parts of a run: other noise in each
 REFUSED = "REFUSED"
 """End of a trial whose plan the bench refuses before anything moves."""
 
@@ -56,6 +59,8 @@ class TrialPoint:
     """Wanted minus measured lag, deg."""
     settle_periods: float = np.nan
     """Periods until it settled or failed."""
+    refused_before: int = 0
+    """Attempts that were refused for something that passes, before this result."""
 
     @property
     def accepted(self) -> bool:
@@ -168,24 +173,33 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
     except RigError as error:
         return _refused(str(error))
     notes = _Notebook()
+    execution, samples = _part(plan, bench, seed, notes, None)
+    for number in count(1):
+        if not execution.worth_another:
+            break
+        before = execution.before_another(notes.points)
+        execution, more = _part(plan, bench, seed + number * FURTHER_PART, notes, before)
+        samples += more
+    return _trial(bench, execution, samples, notes)
+
+
+def _part(
+    plan: Plan, bench: Bench, seed: int, notes: "_Notebook", before: MeasuredBefore | None
+) -> tuple[Execution, int]:
+    """Run a part of the test: all of the plan, or again what was refused for something that passes."""
+    done = frozenset[int]() if before is None else before.done | before.given_up
     with open_session(bench, seed) as session:
-        settings = TickSettings(
-            bench,
-            plan.law,
-            plan.amplitude_law,
-            plan.settle_rule,
-            plan.segments(bench.sample_rate_hz),
-            plan.waveforms(bench.sample_rate_hz),
-            plan.known_plant,
-        )
+        settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz, done))
         loop = session.start(settings)
-        notes.peaks = _Peaks(bench, loop.tick.arrays.limits)
-        execution = Execution(plan, bench, loop, notes, Silent())
+        notes.peaks = notes.peaks or _Peaks(bench, loop.tick.arrays.limits)
+        execution = Execution(plan, bench, loop, notes, Silent(), before)
         execution.go({})
-        samples, channel = loop.statistics.samples, int(loop.tick.guard["channel"][0])
-    end = notes.ended
-    at = end.get("tripped_at")
-    tripped = bool(end["tripped"])
+        return execution, loop.statistics.samples
+
+
+def _trial(bench: Bench, execution: Execution, samples: int, notes: "_Notebook") -> Trial:
+    end, tripped = notes.ended, bool(notes.ended["tripped"])
+    at, channel = end.get("tripped_at"), int(execution.tick.guard["channel"][0])
     return Trial(
         end=str(end["reason"]).upper(),
         text=str(end["text"]),
@@ -194,8 +208,8 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
         channel=bench.channels[channel].name if tripped and channel >= 0 else "",
         level=float(at["level"]) if at else float("nan"),
         duration_s=samples / bench.sample_rate_hz,
-        shares=notes.peaks.shares(),
-        points=tuple(_points(plan, notes.points)),
+        shares=notes.peaks.shares() if notes.peaks is not None else {},
+        points=tuple(_points(execution.plan, notes.points)),
     )
 
 
@@ -216,7 +230,8 @@ def _refused(text: str) -> Trial:
 
 def _points(plan: Plan, stored: Sequence[Mapping[str, Any]]) -> list[TrialPoint]:
     result: type[Any] = KINDS[plan.kind].result
-    return [_point(point_from(table, result)) for table in stored]
+    latest = {table["number"]: table for table in stored}
+    return [_point(point_from(table, result)) for table in latest.values()]
 
 
 def _point(point: Point[Any]) -> TrialPoint:
@@ -236,5 +251,6 @@ def _point(point: Point[Any]) -> TrialPoint:
         level=point.level,
         quality=str(point.quality),
         reason=point.reason,
+        refused_before=len(point.refused_before or ()),
         **{name: float(value) for name, value in found.items() if value is not None},
     )

@@ -52,6 +52,8 @@ class RunProgress:
             parts += [_in_a_line(column, point) for column in shown]
             if point.settle_periods is not None:
                 parts.append(f"settled in {number(point.settle_periods, '.0f'):>4} periods")
+        if point.attempts > 1:
+            parts.append(f"attempt {point.attempts}")
         if point.quality is not Quality.GOOD:
             parts.append(str(point.quality) + (f": {point.reason}" if point.reason not in ("", point.quality) else ""))
         self._print("  ".join(parts))

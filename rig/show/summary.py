@@ -8,7 +8,7 @@ from typing import Any
 from rig.campaigns.evaluation.drift import drift_of
 from rig.campaigns.evaluation.point import Point, Spectrum
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
-from rig.campaigns.evaluation.skipped import what_was_skipped
+from rig.campaigns.evaluation.skipped import what_was_measured_again, what_was_skipped
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
@@ -92,6 +92,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "skipped": what_was_skipped(points, len(plan.targets())),
         "drive_mode_shape": _mode_shape(recording, points, plan.kind),
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
+        "measured_again": what_was_measured_again(points),
         "drift": drift_of(points),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),

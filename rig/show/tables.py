@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.arming.run_facts import About, user_name
-from rig.campaigns.evaluation.point import point_name
+from rig.campaigns.evaluation.point import Attempt, point_name
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.report import say
@@ -29,8 +29,9 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     pace = f", {factor:.0f} times real time in the loop" if factor else ""
     ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
     print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
-    if summary["skipped"]:
-        print(summary["skipped"])
+    for line in (summary["skipped"], summary["measured_again"]):
+        if line:
+            print(line)
     last = summary["parts"][-1] if summary["parts"] else {"tripped": False}
     _print_advice(last)
     if last["tripped"] and not summary["complete"]:
@@ -64,8 +65,9 @@ def print_summary(summary: dict[str, Any]) -> None:
     loop = summary["loop"]
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
     _print_points(summary["kind"], summary["points"])
-    if summary["skipped"]:
-        print(summary["skipped"])
+    for line in (summary["skipped"], summary["measured_again"]):
+        if line:
+            print(line)
     _print_drift(summary["drift"])
     _print_mode_shape(summary["drive_mode_shape"])
     if summary["former_points"]:
@@ -179,5 +181,19 @@ def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
         rows = [(*row, remark) for row, remark in zip(rows, remarks, strict=True)]
     print_table(headings, rows)
     for point in points:
+        for number_shown, attempt in enumerate(point.refused_before, 1):
+            print(
+                f"note: {point_name(point.number)}: attempt {number_shown} refused{_where(attempt)}: {attempt.reason}"
+            )
         for warning in point.warnings or ():
             print(f"warning: {point_name(point.number)}: {warning}")
+
+
+def _where(attempt: Attempt) -> str:
+    """Return frequency and force of a refused attempt as far as they are known."""
+    told = [
+        f"{value:.4g} {unit}"
+        for value, unit in ((attempt.frequency_hz, "Hz"), (attempt.force_n, "N"))
+        if value is not None
+    ]
+    return f" at {', '.join(told)}" if told else ""

@@ -50,6 +50,16 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 
 
 @inner_kernel
+def note_faults(t: TickArrays, flags: int) -> None:
+    """Count a sample with a held output or a lost one, by the device's ``flags``, in the present segment."""
+    loop, progress = t.loop[0], t.progress[0]
+    progress.disturbed = 1 if flags & (loop.held_flag | LOST) else 0
+    if progress.disturbed == 1:
+        progress.held += 1 if flags & loop.held_flag else 0
+        progress.lost += 1 if flags & LOST else 0
+
+
+@inner_kernel
 def measure_rms(t: TickArrays, amplitude_law: int) -> None:
     """Update the root mean square of the force if ``amplitude_law`` holds it."""
     if amplitude_law == FORCE_RMS:
@@ -247,5 +257,6 @@ def tick_block(
     """
     for index in range(outputs.size):
         lost = (flags[index] & LOST) != 0
+        note_faults(t, flags[index])
         outputs[index] = tick(t, volts[index], lost, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags[index]) << np.uint32(DEVICE_SHIFT)

@@ -31,12 +31,14 @@ LOOP = np.dtype(
         ("play", "i8"),
         ("lost", "i8"),
         ("seen", "i8"),
+        ("held_flag", "i8"),
     ]
 )
 """State of the tick itself (one record): sample counter, delay from output to input, channels, oscillator phase at the output
 and at the inputs, readings of the sample, source of the frequency. ``skew_samples``: delay of the force channel minus that of
 the drive channel. ``held``: the level is not being ramped. ``lost``: counts up with each lost sample and down with each
-received one, never below 0. ``seen``: number of samples received."""
+received one, never below 0. ``seen``: number of samples received. ``held_flag``: the device's flag of a held output; 0 if it
+has none."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """Outputs sent whose effect the inputs do not yet show; a ring."""

@@ -29,8 +29,9 @@ class Tick:
 
     ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
     latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
-    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's.
-    ``armed = False`` keeps the output at 0 V.
+    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. A record
+    that is refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the output at
+    0 V.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """
@@ -46,6 +47,7 @@ class Tick:
         *,
         waveforms: np.ndarray | None = None,
         exciter: PlantModel | None = None,
+        retries: int = 0,
         armed: bool = True,
     ) -> None:
         shape = bench.specimen.drive_mode_shape if exciter is None else exciter.drive_shape
@@ -79,6 +81,7 @@ class Tick:
         progress["unlocked"] = 1
         progress["lag"] = table["lag_rad"][:1] if len(segments) else lag_rad
         progress["segments"] = len(segments)
+        progress["retries"], progress["point"] = retries, -1
         expected, following = expected_record(bench, smallest[force], smallest[drive], exciter), np.zeros(1, FOLLOWING)
         following["reference_v"] = expected["floor_v"]
         see_frequency(expected[0], following[0], omega)
@@ -160,6 +163,7 @@ class TickSettings:
     segments: Sequence[Segment]
     waveforms: np.ndarray | None = None
     exciter: PlantModel | None = None
+    retries: int = 0
     armed: bool = True
 
     def build(self, latency_samples: float) -> Tick:
@@ -173,6 +177,7 @@ class TickSettings:
             self.bench.block + latency_samples,
             waveforms=self.waveforms,
             exciter=self.exciter,
+            retries=self.retries,
             armed=self.armed,
         )
 

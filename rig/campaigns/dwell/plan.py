@@ -66,6 +66,8 @@ class DwellPlan(SettledPlan):
     """A lost lock trips."""
     repeats: Literal[1] = 1
     """Always 1: a specimen ages only once."""
+    retries: Literal[0] = 0
+    """Always 0: the specimen would age while a mean is measured again."""
 
     @model_validator(mode="after")
     def _one_length(self) -> Self:

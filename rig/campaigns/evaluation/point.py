@@ -19,6 +19,7 @@ __all__ = [
     "ARRAY",
     "PAIRS",
     "PART",
+    "Attempt",
     "Lock",
     "Modal",
     "Point",
@@ -168,6 +169,24 @@ class Lock:
     """Relative standard deviation of the frequency from period to period."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """An earlier attempt at a point, which was refused for something that passes."""
+
+    reason: str
+    """Why it was refused."""
+    quality: Quality
+    """Its quality."""
+    rows: RowRange | None = field(default=None, metadata=PART)
+    """Its rows, in its part of the recording; None if not all of them were recorded."""
+    part: int | None = None
+    """Number of its part of the recording, from 0; None if it is the part of the point."""
+    frequency_hz: float | None = None
+    """Frequency of the output, Hz; None if there was no single one."""
+    force_n: float | None = None
+    """Peak of the force's fundamental, N; None if it is not known."""
+
+
 Result = TypeVar("Result")
 
 
@@ -228,6 +247,8 @@ class Point(Generic[Result]):
     """How accurately the phase was held."""
     result: Result | None = field(default=None, metadata=PART)
     """Results that only this kind of campaign has."""
+    refused_before: tuple[Attempt, ...] = ()
+    """Earlier attempts at the point in the same run, in their order. This one was made because they were refused."""
     part: int | None = None
     """Number of the part of the recording that contains the point, from 0; None before it is recorded."""
 
@@ -240,6 +261,11 @@ class Point(Generic[Result]):
     def evaluated(self) -> bool:
         """Whether the rows of the point gave a result."""
         return self.vibration is not None or self.channel_rms is not None
+
+    @property
+    def attempts(self) -> int:
+        """How often the point was measured in this run."""
+        return 1 + len(self.refused_before)
 
     @property
     def spectrum(self) -> Spectrum | None:

@@ -1,11 +1,11 @@
-"""Summarise in one line what a run has not measured, and why."""
+"""Summarise in one line what a run has not measured, and what it has measured again."""
 
 from collections.abc import Iterable
 from typing import Any
 
 from rig.campaigns.evaluation.point import Point
 
-__all__ = ["what_was_skipped"]
+__all__ = ["what_was_measured_again", "what_was_skipped"]
 
 
 def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
@@ -25,6 +25,15 @@ def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
         causes.append(f"not tried ({untried})")
     skipped = sum(map(len, places.values())) + untried
     return f"{skipped} of {planned} points skipped: {'; '.join(causes)}" if skipped else ""
+
+
+def what_was_measured_again(points: Iterable[Point[Any]]) -> str:
+    """Return which points were measured again: ``measured again: points 3, 7; 3 attempts refused``; empty if none was."""
+    again = [point for point in points if point.refused_before]
+    refused = sum(len(point.refused_before) for point in again)
+    names = ", ".join(str(point.number + 1) for point in again)
+    counted = f"{refused} attempts" if refused > 1 else "1 attempt"
+    return f"measured again: point{'s' if len(again) > 1 else ''} {names}; {counted} refused" if again else ""
 
 
 def _place(point: Point[Any]) -> str:

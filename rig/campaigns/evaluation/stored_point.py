@@ -96,12 +96,14 @@ def _read(kind: Any, table: Mapping[str, Any], result: type[Any] | None = None) 
                 found[one.name] = table[one.name] if kind is Point and not optional else None
             continue
         value = table[one.name]
-        if value is not None and one.metadata == PAIRS:
+        if one.name == "quality":
+            value = Quality(value) if value in set(Quality) else Quality.REJECTED
+        elif value is not None and one.metadata == PAIRS:
             value = as_complex(value)
         elif value is not None and one.metadata == ARRAY:
             value = np.asarray(value, float)
         elif isinstance(value, list):
-            value = _tuples(value)
+            value = tuple(_read(inner, item) for item in value) if inner is not None else _tuples(value)
         elif isinstance(value, Mapping) and inner is not None:
             value = _read(inner, value)
         found[one.name] = value

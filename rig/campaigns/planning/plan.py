@@ -81,6 +81,9 @@ class Plan(Configured):
     """Purpose of the plan."""
     bench: str = Field(min_length=1)
     """Name of a shipped bench or a TOML file."""
+    retries: int = Field(2, ge=0, le=20)
+    """How often a point is measured again, at most, that was refused for something that passes: held outputs, lost samples, a
+    disturbance of the vibration."""
 
     @property
     @abstractmethod

@@ -8,18 +8,12 @@ import numpy as np
 
 from rig.campaigns.evaluation.lost_samples import lost_rows, lost_warnings
 from rig.campaigns.evaluation.point import Point
-from rig.daq import LOST
+from rig.daq import HELD, flag_names
 from rig.tick.layout import DEVICE_SHIFT
 
-__all__ = ["flag_names", "with_device_remarks"]
+__all__ = ["with_device_remarks"]
 
-HELD = "output_held"
 LARGEST_HELD = 0.05  # of a point's samples: above this, the recorded voltage is not the voltage that was put out
-
-
-def flag_names(counters: Iterable[str]) -> list[str]:
-    """Return the names of the device's flags, lowest bit first: the driver's first counters, one for each bit below `LOST`."""
-    return [*counters][: LOST.bit_length() - 1]
 
 
 def with_device_remarks(point: Point[Any], rows: np.ndarray, counters: Iterable[str]) -> Point[Any]:

@@ -1,7 +1,7 @@
 """Execution of one part of a run: the control loop, the journal, the evaluated points, and every way to stop."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,19 +10,23 @@ from controller import LockState
 from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.measured_together import round_at
+from rig.campaigns.evaluation.passing import was_refused_in_passing
 from rig.campaigns.evaluation.plausibility import with_plausibility
-from rig.campaigns.evaluation.point import Point, Quality, RowRange
+from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
 from rig.campaigns.evaluation.skipped import what_was_skipped
-from rig.campaigns.evaluation.stored_point import stored
+from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.device_remarks import flag_names, with_device_remarks
+from rig.campaigns.running.attempts import RefusedRecords, after_attempts
+from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.campaigns.running.evaluation_thread import EvaluationThread
+from rig.campaigns.running.measured_before import MeasuredBefore, before_another
 from rig.campaigns.running.row_buffer import RowBuffer
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
+from rig.daq import flag_names
 from rig.errors import RecordingError
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.system.stop_signals import asking, held
@@ -30,7 +34,7 @@ from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 
-__all__ = ["Execution", "Journal", "MeasuredBefore", "nothing_left"]
+__all__ = ["Execution", "Journal", "nothing_left"]
 
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
@@ -44,18 +48,6 @@ OVER = {
     Outcome.OUTSIDE_WINDOW,
     Outcome.NOT_LOCKED,
 }
-
-
-@dataclass(frozen=True)
-class MeasuredBefore:
-    """Results of earlier parts of the recording that concern the plan."""
-
-    done: frozenset[int] = frozenset()
-    """Numbers in the plan of the points that were accepted."""
-    numbers: Sequence[int] | None = None
-    """Number in the recording of every point of the plan; None if it equals the number in the plan."""
-    points: tuple[Point[Any], ...] = ()
-    """All points of the recording so far."""
 
 
 class Journal(Protocol):
@@ -96,13 +88,17 @@ class Execution:
         self.in_one_go = KINDS[plan.kind].in_one_go
         self.watch = KINDS[plan.kind].watch
         self.targets = plan.targets()
-        self.measured_before = before.done
+        self.measured_before = before.done | before.given_up
         self.numbers = range(len(self.targets)) if before.numbers is None else before.numbers
         self.known = list(before.points)
         self.done = len(before.done)
-        self.finished = self.done
+        self.finished = len(self.measured_before)
         self.accepted = self.done
-        self.reported: dict[int, Point[Any]] = {}
+        given_up = {self.numbers[number] for number in before.given_up}
+        self.reported = {point.number: point for point in before.points if point.number in given_up}
+        self.attempts: dict[int, tuple[Attempt, ...]] = dict(before.attempts)
+        self.refused = RefusedRecords()
+        self.passing: set[int] = set()
         self.next_segment = 0
         self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
@@ -117,7 +113,7 @@ class Execution:
 
         ``information`` is written to the journal before the first row of the part. A run that ends early raises no error.
         """
-        flags = {"points_done": self.finished, "device_flags": flag_names(self.loop.counters)}
+        flags = {"points_done": self.done, "device_flags": flag_names(self.loop.counters)}
         self._write(self.journal.part, {**information, **flags})
         for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
@@ -193,6 +189,7 @@ class Execution:
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the current point, and request the evaluation of points that are over."""
         self.kept.add(self.tick.sample - rows.size, rows)
+        self._note_refused()
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
             if self.in_one_go and int(segments[self.next_segment]["point"]) >= 0:
@@ -211,21 +208,50 @@ class Execution:
                 elif kind in EVALUATED:
                     settling = outcomes[self.next_segment - 1].copy()
                     rows = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
-                    self.evaluations.ask(self._measured, first, rows, target, settling)
+                    steady = kind == SegmentKind.RECORD
+                    faults = self._faults(self.next_segment, self.next_segment + 1, settled=steady)
+                    self.evaluations.ask(self._measured, first, rows, faults, steady, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
         while self.evaluations if self.loop.waits else self.evaluations.ready():
             for point in self.evaluations.take():
                 self._report(point)
 
-    def _measured(self, first: int, rows: np.ndarray, target: Any, *told: Any) -> list[Point[Any]]:
-        """Evaluate the points in rows that begin with sample ``first``."""
+    def _note_refused(self) -> None:
+        """Keep what the sequencer has refused and measures again."""
+        for number, sample, attempt in self.refused.take(self.tick, self.stored):
+            self.attempts[number] = (*self.attempts.get(number, ()), attempt)
+            name, tried = point_name(self.numbers[number]), len(self.attempts[number])
+            text = f"{name}, attempt {tried}: {attempt.reason}; measured again"
+            self._write(self.journal.event, {"sample": sample, "what": "attempt", "state": "refused", "text": text})
+            self.progress.remark(text)
+
+    def _faults(self, first: int, end: int, *, settled: bool) -> int:
+        """Return the samples with passing faults of the device from where the point of segment ``first`` begins to ``end``.
+
+        Unless the vibration has ``settled``, those of the point before count too: they may still be felt.
+        """
+        first = self._point_begins(first)
+        if first > 0 and not settled:
+            first = self._point_begins(first - 1)
+        return int(self.tick.outcomes["faults"][first:end].sum())
+
+    def _measured(
+        self, first: int, rows: np.ndarray, faults: int, steady: bool, target: Any, *told: Any
+    ) -> list[Point[Any]]:
+        """Evaluate the points in rows that begin with sample ``first``.
+
+        ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
+        """
         found = self.measure(self.bench, self.plan, target, rows, *told)
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
+        for point in points:
+            if was_refused_in_passing(point, self.bench, rows, faults, steady):
+                self.passing.add(point.number)
         return [replace(point, rows=where) for point in points]
 
     def _report_rest(self) -> None:
@@ -236,11 +262,16 @@ class Execution:
 
     def _begin(self, segment: int) -> int:
         """Return the first sample of the rows with which a segment is evaluated."""
-        points = self.tick.arrays.segments["point"]
         if self.plan.evaluates_approach:
-            while segment > 0 and points[segment - 1] == points[segment]:
-                segment -= 1
+            segment = self._point_begins(segment)
         return int(self.tick.outcomes[segment]["first_sample"])
+
+    def _point_begins(self, segment: int) -> int:
+        """Return the first segment of the point that a segment belongs to."""
+        points = self.tick.arrays.segments["point"]
+        while segment > 0 and points[segment - 1] == points[segment]:
+            segment -= 1
+        return segment
 
     def _first_needed(self) -> int:
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
@@ -267,7 +298,8 @@ class Execution:
         rows = self.kept.take(first, first + passages[-1].end)
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
-        self.evaluations.ask(self._measured, first, rows, targets, passages, ended)
+        faults = self._faults(self.next_segment, found.end_segment, settled=False)
+        self.evaluations.ask(self._measured, first, rows, faults, False, targets, passages, ended)
         self.next_segment = found.end_segment
         return True
 
@@ -280,13 +312,29 @@ class Execution:
                 self.loop.request_stop(stop)
         if point.quality is Quality.GOOD and point.warnings:
             point = replace(point, quality=Quality.WARNED)
-        point = replace(point, number=self.numbers[point.number])
+        number = point.number
+        point = after_attempts(point, self.attempts.get(number, ()))
+        if point.quality is not Quality.REJECTED or point.attempts > self.plan.retries:
+            self.passing.discard(number)
+        point = replace(point, number=self.numbers[number])
         self.known.append(point)
         self._write(self.journal.point, stored(point))
         self.reported[point.number] = point
         self.finished += 1
         self.accepted += 1 if point.accepted else 0
         self.progress.point(point, self.finished, len(self.targets))
+
+    @property
+    def worth_another(self) -> frozenset[int]:
+        """Numbers in the plan of points refused for something that passes, once the whole plan was carried out."""
+        completed = EndReason(int(self.tick.guard["reason"][0])) is EndReason.COMPLETED and self.loop.failure is None
+        return frozenset(self.passing) if completed else frozenset()
+
+    def before_another(self, points: Iterable[Mapping[str, Any]]) -> MeasuredBefore:
+        """Return what was measured before the next attempts at `worth_another`; ``points``: all of the recording."""
+        result: type[Any] = KINDS[self.plan.kind].result
+        known = tuple(point_from(table, result) for table in points)
+        return before_another(self.numbers, known, self.worth_another, self.attempts)
 
     def _mark_unlocked(self) -> None:
         """If no lock was found at the start voltage, mark all remaining points of the plan as failed for that reason."""

@@ -1,9 +1,10 @@
 """The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.continuation import what_is_left
-from rig.campaigns.running.execution import Execution, MeasuredBefore, nothing_left
+from rig.campaigns.running.execution import Execution, nothing_left
+from rig.campaigns.running.measured_before import MeasuredBefore
 from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
 from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.errors import RigError
@@ -37,7 +39,7 @@ from rig.tick.safety.limits import describe_end
 from rig.tick.sequencer.segments import Segment
 from rig.tick.tick import TickSettings
 
-__all__ = ["carry_out", "take_up"]
+__all__ = ["carry_out", "take_up", "tick_settings"]
 
 
 @ended_in_order()
@@ -67,7 +69,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
             started=datetime.now(UTC).isoformat(timespec="seconds"),
             seed=seed,
         )
-        settings = _settings(plan, bench, plan.segments(bench.sample_rate_hz))
+        settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz))
         with (
             set_aside(output),
             _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
@@ -75,7 +77,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
         ):
             execution = Execution(plan, bench, loop, journal, options.progress)
             execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
-    return _whole(output, options.progress)
+    return _with_further_attempts(_whole(output, options.progress), execution, options, facts)
 
 
 @ended_in_order()
@@ -119,21 +121,16 @@ def take_up(
             refuse_tripped(recording, left.plan, left.to_measure)
         options = _still_rehearsed(recording, options)
     plan, bench = left.plan, left.bench
-    segments = plan.segments(bench.sample_rate_hz, left.done)
-    if segments and not trust_code:
-        refuse_code(bench, output.name)
-    if segments:
+    if segments := plan.segments(bench.sample_rate_hz, left.done):
+        if not trust_code:
+            refuse_code(bench, output.name)
         with open_session(bench, drawn, realtime=options.realtime) as session:
             facts = _facts(plan, bench, session, options)
-            columns = [Column(**column) for column in ROW_COLUMNS]
-            rows = recorded_row(len(bench.channels))
-            with (
-                _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
-                _started(session, _settings(plan, bench, segments), output) as loop,
-            ):
-                execution = Execution(plan, bench, loop, journal, progress, before)
-                execution.go({**information, "about": {**facts, "lead_samples": _lead(loop)}})
-    elif not finished:
+            settings = tick_settings(plan, bench, segments)
+            begin = partial(_execution, plan, bench, progress, before)
+            execution = _further_part(output, session, settings, begin, {**information, "about": facts})
+        return _with_further_attempts(_whole(output, progress), execution, options, facts)
+    if not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
             journal.end(nothing_left(bench))
@@ -147,6 +144,62 @@ def _still_rehearsed(recording: Recording, options: RunOptions) -> RunOptions:
         return options
     known = {one.name: before[one.name] for one in fields(Rehearsed) if one.name in before}
     return replace(options, rehearsal=Rehearsed(**known))
+
+
+def _further_part(
+    output: Path,
+    session: Session,
+    settings: TickSettings,
+    begin: Callable[[RunningLoop, JournalWriter], Execution],
+    information: Mapping[str, Any],
+) -> Execution:
+    """Measure in a new part of a recording; ``begin`` makes its execution, ``information`` is what the part says of itself."""
+    columns = [Column(**column) for column in ROW_COLUMNS]
+    rows = recorded_row(len(settings.bench.channels))
+    with (
+        _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
+        _started(session, settings, output) as loop,
+    ):
+        execution = begin(loop, journal)
+        execution.go({**information, "about": {**information["about"], "lead_samples": _lead(loop)}})
+    return execution
+
+
+def _with_further_attempts(
+    recording: Recording, execution: Execution, options: RunOptions, facts: Mapping[str, Any]
+) -> Recording:
+    """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
+
+    They are approached as the plan says, as in a resumed run. The run stays armed. It ends when no such point is left, or none
+    with attempts left, and where the device has latched meanwhile: only a person clears that.
+    """
+    plan, bench, output, progress = execution.plan, execution.bench, recording.path, options.progress
+    while again := execution.worth_another:
+        with recording:
+            before = execution.before_another(recording.points)
+            seed = (recording.seed or 0) + len(recording.parts)  # other noise than in the parts before
+            first_sample = recording.n_rows
+        with open_session(bench, seed, realtime=options.realtime) as session:
+            if session.latched:
+                progress.remark(
+                    f"nothing is measured again: {session.latched}; `rig resume {output}` goes on once armed"
+                )
+                return Recording(output)
+            names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
+            progress.remark(f"measured again, for what was in the way may have passed: point {names}")
+            about = {**facts, "device": session.identity}
+            information = {"first_sample": first_sample, "seed": seed, "about": about}
+            settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz, before.done | before.given_up))
+            begin = partial(_execution, plan, bench, progress, before)
+            execution = _further_part(output, session, settings, begin, information)
+        recording = _whole(output, progress)
+    return recording
+
+
+def _execution(
+    plan: Plan, bench: Bench, progress: Progress, before: MeasuredBefore, loop: RunningLoop, journal: JournalWriter
+) -> Execution:
+    return Execution(plan, bench, loop, journal, progress, before)
 
 
 def _put_back(output: Path, progress: Progress) -> None:
@@ -235,7 +288,8 @@ def _remember_end(bench: Bench, loop: RunningLoop, output: Path) -> None:
         remember(bench, trip=None)
 
 
-def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:
+def tick_settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:
+    """Return what a tick is built from to measure some segments of a plan."""
     return TickSettings(
         bench,
         plan.law,
@@ -244,4 +298,5 @@ def _settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSe
         segments,
         plan.waveforms(bench.sample_rate_hz),
         plan.known_plant,
+        plan.retries,
     )

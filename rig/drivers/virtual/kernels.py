@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.daq import LOST, Channel
 from rig.drivers.virtual.faults import OUTPUT_HELD, FaultArrays, is_hit
-from rig.tick.kernels import tick
+from rig.tick.kernels import note_faults, tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from rig.tick.safety.kernels import is_over
 from simulators.kernels import sample
@@ -146,6 +146,7 @@ def fused(
         if looped:
             read_output(loopback, t.loop[0].sample, voltage, volts)
         flags = told(sample(rig, state, voltage, sensed) | raised, converters.counts)
+        note_faults(t, flags)
         queue[slot] = tick(t, volts, (flags & LOST) != 0, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
         if is_over(t.guard[0], t.loop[0].lead_whole):

@@ -34,6 +34,7 @@ from rig.tick.sequencer.layout import (
     OnFailure,
     Outcome,
 )
+from rig.tick.sequencer.repetition import measure_again, passing_fault
 from vibrolock.compiled import Record, kernel
 
 COMPLETED = int(EndReason.COMPLETED)
@@ -59,6 +60,7 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
     entry.periods = progress.cycle - progress.start_cycle
     entry.mean_error_rad = settling.mean_error_rad
     entry.drift = settling.drift
+    entry.faults = progress.held + progress.lost
     progress.segment += 1
     progress.entered = 0
 
@@ -161,6 +163,11 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     progress.start_lag = progress.lag
     progress.last_cycle = progress.cycle
     progress.frozen_cycles = 0.0
+    progress.held = 0
+    progress.lost = 0
+    if segment.point != progress.point:
+        progress.point = segment.point
+        progress.tries_left = progress.retries
     entry.outcome = RUNNING
     entry.first_sample = progress.sample
     if is_ramp(segment.kind) and lock.state == LOST:
@@ -233,6 +240,8 @@ def advance(
         return
     if segment.kind == SETTLE or segment.kind == RECORD:
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
+        if failure == DISTURBED and measure_again(progress, segments, outcomes, settling, DISTURBED):
+            return
         if failure != RUNNING:
             give_up(progress, segments, outcomes, settling, lock, guard, failure)
             return
@@ -244,6 +253,12 @@ def advance(
             give_up(progress, segments, outcomes, settling, lock, guard, verdict)
         return
     over = samples >= segment.samples if segment.samples > 0 else elapsed >= segment.periods
+    if segment.kind == RECORD and progress.held + progress.lost > 0:
+        fault = passing_fault(progress, samples, over)
+        if fault != DONE and measure_again(progress, segments, outcomes, settling, fault):
+            return
     if segment.kind != SETTLE and over and not (segment.kind == RECORD and is_slipping(lock)):
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
+        if spoilt and measure_again(progress, segments, outcomes, settling, DISTURBED):
+            return
         close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE)

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-__all__ = ["OUTCOME", "PROGRESS", "SEGMENT", "Drive", "OnFailure", "Outcome", "SegmentKind"]
+__all__ = ["OUTCOME", "PROGRESS", "REFUSED", "RING", "SEGMENT", "Drive", "OnFailure", "Outcome", "SegmentKind"]
 
 
 class SegmentKind(IntEnum):
@@ -59,6 +59,10 @@ class Outcome(IntEnum):
     """The loop's frequency was at an end of its window."""
     NOT_LOCKED = 10
     """The phase error was that of a lost lock during the whole time at the start voltage."""
+    OUTPUT_HELD = 11
+    """The device held outputs that came too late; only of records that are measured again."""
+    SAMPLES_LOST = 12
+    """Too many samples were lost on their way; only of records that are measured again."""
 
 
 class OnFailure(IntEnum):
@@ -88,13 +92,15 @@ SEGMENT = np.dtype(
         ("rate", "f8"),
         ("logarithmic", "i8"),
         ("waveform", "i8"),
+        ("again", "i8"),
     ]
 )
 """One segment of a plan, ``periods`` long, or ``samples`` where these are not 0.
 
 ``level``: in the unit of the amplitude law (V, N, m); ``geometric``: ramped by the logarithm. ``lag_rad``: wanted phase lag.
 ``omega``: final frequency of a tone (rad/s). ``rate``: of a sweep, in rad/s per sample, or in 1 per sample if ``logarithmic``.
-``waveform``: number of the waveform that is played."""
+``waveform``: number of the waveform that is played. ``again``: of a record, the number of the segment with which its
+repetition begins; else -1."""
 
 OUTCOME = np.dtype(
     [
@@ -104,9 +110,31 @@ OUTCOME = np.dtype(
         ("periods", "f8"),
         ("mean_error_rad", "f8"),
         ("drift", "f8"),
+        ("faults", "i8"),
     ]
 )
-"""Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift."""
+"""Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift, samples
+with a held output or lost."""
+
+REFUSED = np.dtype(
+    [
+        ("segment", "i8"),
+        ("outcome", "i8"),
+        ("first_sample", "i8"),
+        ("end_sample", "i8"),
+        ("periods", "f8"),
+        ("mean_error_rad", "f8"),
+        ("drift", "f8"),
+        ("held", "i8"),
+        ("lost", "i8"),
+        ("force_n", "f8"),
+    ]
+)
+"""A record that was refused and is measured again: what `OUTCOME` says of it, the number of samples with a held output and of
+lost ones, and the force's fundamental, N."""
+
+RING = 64
+"""Refused records that are kept for the campaign, which reads them every few hundredths of a second."""
 
 PROGRESS = np.dtype(
     [
@@ -128,8 +156,20 @@ PROGRESS = np.dtype(
         ("finished", "i8"),
         ("entered", "i8"),
         ("unlocked", "i8"),
+        ("point", "i8"),
+        ("tries_left", "i8"),
+        ("retries", "i8"),
+        ("held", "i8"),
+        ("lost", "i8"),
+        ("disturbed", "i8"),
+        ("n_refused", "i8"),
+        ("refused", REFUSED, (RING,)),
     ]
 )
 """Position of the run in the plan (one record). ``cycle``: oscillator periods at the inputs so far, with the fraction;
 ``unreached``: the output is at its limit and the present level is not reached; ``frozen_cycles``: periods for which a ramp
-waited because its level was not reached; ``unlocked``: no lock was ever gained."""
+waited because its level was not reached; ``unlocked``: no lock was ever gained.
+
+``retries``: how often a record is measured again at most; ``point``, ``tries_left``: how often the record of the present point
+still may be. ``held``, ``lost``: samples of the present segment with a held output, and lost ones; ``disturbed``: whether this
+sample is one of them. ``refused``: a ring of the records that were refused so far, ``n_refused`` in all."""

@@ -103,13 +103,14 @@ def segment_table(
     ``amplitude_law`` and ``lag_rad`` apply to segments that do not give their own.
     """
     table = np.zeros(len(segments), SEGMENT)
-    for row, segment in zip(table, segments, strict=True):
+    for index, (row, segment) in enumerate(zip(table, segments, strict=True)):
         row["kind"], row["point"], row["level"] = segment.kind, segment.point, segment.level
         row["periods"] = segment.periods
         row["samples"] = 0 if segment.duration_s is None else max(1, round(segment.duration_s * sample_rate_hz))
         row["amplitude_law"] = amplitude_law if segment.amplitude_law is None else segment.amplitude_law
         row["lag_rad"] = lag_rad if segment.lag_deg is None else math.radians(segment.lag_deg)
         row["geometric"] = segment.geometric
+        row["again"] = _again(segments, index) if segment.kind is SegmentKind.RECORD else -1
         row["on_failure"], row["on_lost_lock"] = segment.on_failure, segment.on_lost_lock
         if segment.excitation is not None:
             _fill_in(row, segment.excitation, sample_rate_hz)
@@ -117,6 +118,17 @@ def segment_table(
     outcomes["mean_error_rad"] = np.nan
     outcomes["drift"] = np.nan
     return table, outcomes
+
+
+def _again(segments: Sequence[Segment], index: int) -> int:
+    """Return the segment from which a record is measured again: the first one behind the ramp that leads to its level."""
+    record = segments[index]
+    while index > 0:
+        before = segments[index - 1]
+        if before.point != record.point or before.kind not in (SegmentKind.SETTLE, SegmentKind.HOLD):
+            break
+        index -= 1
+    return index
 
 
 def _fill_in(row: np.void, excitation: Excitation, sample_rate_hz: float) -> None:

@@ -8,7 +8,7 @@ import pytest
 from rig.campaigns.backbone.points import ShortPointResult
 from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult
 from rig.campaigns.dwell.points import DwellResult
-from rig.campaigns.evaluation.point import Quality, point_name
+from rig.campaigns.evaluation.point import Attempt, Quality, RowRange, point_name
 from rig.campaigns.evaluation.stored_point import as_complex, as_pairs, names_of, point_from, stored, value_of
 from rig.campaigns.kinds import KINDS
 from tests.docs.test_file_format import PLANS
@@ -95,3 +95,27 @@ def test_the_names_of_a_part_do_not_hide_those_of_all_points():
 
 def test_people_count_points_from_one():
     assert point_name(0) == "point 1"
+
+
+def test_refused_attempts_are_stored_with_their_point_and_read_again():
+    first = Attempt(
+        reason="outputs came too late: held in 14 samples",
+        quality=Quality.REJECTED,
+        rows=RowRange(first_sample=10, end_sample=30),
+        part=0,
+        frequency_hz=24.4,
+        force_n=0.1,
+    )
+    second = Attempt(reason="the settle rule was broken while recording", quality=Quality.DISTURBED)
+    table = stored(made_point(refused_before=(first, second)))
+    assert table["refused_before"][0]["end_sample"] == 30
+    assert table["refused_before"][1] == {"reason": second.reason, "quality": "disturbed"}
+    point = point_from(json.loads(json.dumps(table)))
+    assert point.refused_before == (first, second)
+    assert point.attempts == 3
+    assert isinstance(point.refused_before[0].quality, Quality)
+
+
+def test_a_point_without_refused_attempts_is_stored_as_in_earlier_versions():
+    assert "refused_before" not in stored(made_point())
+    assert point_from({**FAILED, "quality": "not-settled"}).attempts == 1

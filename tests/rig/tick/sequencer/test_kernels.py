@@ -15,7 +15,7 @@ from rig.tick.safety.limits import guard_record
 from rig.tick.sequencer.judgement import SETTLING, judge_period
 from rig.tick.sequencer.kernels import advance
 from rig.tick.sequencer.layout import PROGRESS, OnFailure, Outcome, SegmentKind
-from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
+from rig.tick.sequencer.segments import Excitation, Segment, SettleRule, segment_table
 
 RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)
 
@@ -234,3 +234,111 @@ def test_a_stop_interrupts_the_segment_under_way():
     walk.go(1)
     assert walk.codes() == ["DONE", "INTERRUPTED", "PENDING"]
     assert GuardMode(int(walk.guard["mode"][0])) is GuardMode.RAMPING
+
+
+def _recording(retries, *segments):
+    """A walk that is recording its first point, with so many repetitions left."""
+    walk = Walk(*segments)
+    walk.progress["retries"], walk.progress["point"] = retries, -1
+    walk.go(12)
+    walk.settling["good_periods"] = RULE.settled_periods
+    return walk.go(1)
+
+
+def _refused(walk):
+    count = int(walk.progress["n_refused"][0])
+    return [Outcome(int(entry["outcome"])).name for entry in walk.progress["refused"][0][:count]]
+
+
+def test_a_disturbed_record_goes_back_to_settling_at_its_level_as_often_as_it_may():
+    walk = _recording(2, *_point(0, 1.0), *_point(1, 2.0))
+    for tried in (1, 2):
+        walk.settling["bad_periods"] = RULE.average_periods
+        walk.go(1)
+        assert walk.codes()[:3] == ["DONE", "RUNNING", "PENDING"]
+        assert _refused(walk) == ["DISTURBED"] * tried
+        assert walk.levels[-1] == 1.0
+        walk.settling["good_periods"] = RULE.settled_periods
+        walk.go(1)
+    walk.settling["bad_periods"] = RULE.average_periods
+    walk.go(1)
+    assert walk.codes()[:4] == ["DONE", "DONE", "DISTURBED", "RUNNING"]
+    assert len(_refused(walk)) == 2
+
+
+def test_the_next_point_may_be_repeated_as_often_again():
+    walk = _recording(1, *_point(0, 1.0), *_point(1, 2.0))
+    for _ in range(2):
+        walk.settling["bad_periods"] = RULE.average_periods
+        walk.go(1)
+        walk.settling["good_periods"] = RULE.settled_periods
+        walk.go(1)
+    walk.settling["bad_periods"] = 0
+    walk.go(10)
+    walk.settling["good_periods"] = RULE.settled_periods
+    walk.go(1)
+    walk.settling["bad_periods"] = RULE.average_periods
+    walk.go(1)
+    assert _refused(walk) == ["DISTURBED", "DISTURBED"]
+    assert walk.codes() == ["DONE", "DONE", "DISTURBED", "DONE", "RUNNING", "PENDING"]
+
+
+def test_a_held_output_ends_a_record_once_the_device_follows_again():
+    walk = _recording(1, *_point(0, 1.0))
+    walk.progress["held"], walk.progress["disturbed"] = 3, 1
+    walk.go(1)
+    assert walk.codes()[2] == "RUNNING"
+    walk.progress["disturbed"] = 0
+    walk.go(1)
+    assert walk.codes()[1:] == ["RUNNING", "PENDING"]
+    entry = walk.progress["refused"][0][0]
+    assert _refused(walk) == ["OUTPUT_HELD"]
+    assert entry["held"] == 3
+    assert (
+        entry["end_sample"] - entry["first_sample"] == 99
+    )  # begun one sample after the settling, ended at a period's first
+    assert entry["periods"] == pytest.approx(99 / 50)
+
+
+@pytest.mark.parametrize(("lost", "again"), [(50, False), (52, True)])
+def test_a_record_is_repeated_at_its_end_if_more_than_a_twentieth_was_lost(lost, again):
+    walk = _recording(1, *_point(0, 1.0))
+    walk.go(18)
+    walk.progress["lost"] = lost  # of 20 periods of 50 samples
+    walk.go(2)
+    assert _refused(walk) == ["SAMPLES_LOST"] * again
+    assert walk.codes()[2] == ("PENDING" if again else "DONE")
+
+
+@pytest.mark.parametrize("outcome", ["NOT_SETTLED", "LOST_LOCK", "UNREACHABLE", "OUTSIDE_WINDOW"])
+def test_what_does_not_pass_is_not_repeated(outcome):
+    skips = OnFailure.SKIP, OnFailure.SKIP
+    walk = _recording(3, *_point(0, 1.0, *skips), *_point(1, 2.0))
+    walk.progress["held"] = 3
+    walk.progress["disturbed"] = 1
+    if outcome == "NOT_SETTLED":
+        walk = Walk(*_point(0, 1.0), *_point(1, 2.0))
+        walk.progress["retries"] = 3
+        walk.go(42)
+    elif outcome == "LOST_LOCK":
+        walk.lock["state"] = LockState.LOST
+    elif outcome == "UNREACHABLE":
+        walk.settling["saturated_periods"] = 20
+    else:
+        walk.settling["clamped_periods"] = 20
+    walk.go(1)
+    assert outcome in walk.codes()
+    assert _refused(walk) == []
+
+
+def test_a_waveform_is_played_again_from_its_transient_on():
+    played = Excitation(1.0, waveform=0)
+    segments = [
+        Segment(SegmentKind.RAMP, 0, 1.0, 10.0, excitation=played),
+        Segment(SegmentKind.HOLD, 0, 1.0, 3.0, excitation=played),
+        Segment(SegmentKind.RECORD, 0, 1.0, 5.0, excitation=played),
+        Segment(SegmentKind.RAMP, 1, 2.0, 10.0, excitation=played),
+        Segment(SegmentKind.RECORD, 1, 2.0, 5.0, excitation=played),
+    ]
+    table, _ = segment_table(segments, 5000.0)
+    assert table["again"].tolist() == [-1, -1, 1, -1, 4]

@@ -1,0 +1,46 @@
+"""Tell whether a recorded point was refused for something that passes: a fault of the device for a while, or a disturbance."""
+
+from typing import Any
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.campaigns.evaluation.lost_samples import bridged
+from rig.campaigns.evaluation.point import Point, Quality
+
+__all__ = ["came_and_went", "was_refused_in_passing"]
+
+STANDS_OUT = (
+    4.0  # times the usual change from period to period; noise in a whole period, or a lasting beat, stays below 2
+)
+FEWEST_PERIODS = 4
+
+
+def was_refused_in_passing(point: Point[Any], bench: Bench, rows: np.ndarray, faults: int, steady: bool) -> bool:
+    """Return whether a point was refused, but for something that passes, so that it is worth another attempt.
+
+    That is a passing fault of the device (``faults``: samples with a held output, and lost ones, while the point was approached
+    and recorded), or, in the ``rows`` of a ``steady`` vibration, a disturbance that came and went.
+    """
+    return point.quality is Quality.REJECTED and (faults > 0 or (steady and came_and_went(bench, rows)))
+
+
+def came_and_went(bench: Bench, rows: np.ndarray) -> bool:
+    """Return whether force or drive changed from one period to the next far more somewhere than it usually did.
+
+    The RMS of the difference between neighbouring periods, taken at equal phases, is that of the noise in a steady vibration,
+    whatever its harmonics. Another mode or a loop that swings adds to it everywhere, a knock in a few periods only.
+    """
+    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * np.pi) if rows.size else np.zeros(1)
+    periods = int(turns[-1] - turns[0])
+    if not np.isfinite(turns).all() or periods < FEWEST_PERIODS + 1:
+        return False
+    per_period = rows.size // (periods + 1)
+    at = turns[0] + np.arange(periods * per_period) / per_period
+    inputs = bridged(rows)
+    for role in ("force", "drive"):
+        signal = np.interp(at, turns, inputs[:, bench.index_of(role)]).reshape(periods, per_period)
+        changes = np.sqrt(np.mean(np.diff(signal, axis=0) ** 2, axis=1))
+        if changes.max() > STANDS_OUT * np.median(changes):
+            return True
+    return False

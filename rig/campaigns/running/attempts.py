@@ -1,0 +1,95 @@
+"""Attempts at a point: records that the sequencer has refused, and the points that are worth another attempt."""
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange
+from rig.campaigns.running.stored_rows import StoredRows
+from rig.tick.sequencer.layout import RING, Drive, Outcome
+from rig.tick.tick import Tick
+
+__all__ = ["RefusedRecord", "RefusedRecords", "after_attempts", "attempt_at"]
+
+
+class RefusedRecord(NamedTuple):
+    """A record that was refused by the sequencer and is measured again."""
+
+    number: int
+    """Number of its point in the plan."""
+    sample: int
+    """Sample at which it was refused."""
+    attempt: Attempt
+    """What is kept of it."""
+
+
+class RefusedRecords:
+    """Reads the ring in which the sequencer keeps the records that it has refused."""
+
+    def __init__(self) -> None:
+        self._seen = 0
+
+    def take(self, tick: Tick, stored: StoredRows) -> list[RefusedRecord]:
+        """Return the records that were refused since the last call."""
+        progress, segments = tick.arrays.progress[0], tick.arrays.segments
+        count = int(progress["n_refused"])
+        fresh = range(max(self._seen, count - RING), count)
+        self._seen = count
+        out = []
+        for index in fresh:
+            entry = progress["refused"][index % RING]
+            segment = segments[int(entry["segment"])]
+            attempt = _attempt(entry, stored, tick.bench.sample_rate_hz, int(segment["drive"]) == Drive.WAVEFORM)
+            out.append(RefusedRecord(int(segment["point"]), int(entry["end_sample"]), attempt))
+        return out
+
+
+def _attempt(entry: np.void, stored: StoredRows, sample_rate_hz: float, plays: bool) -> Attempt:
+    """Return what is kept of a refused record; ``plays``: a waveform, which has no single frequency and force."""
+    first, end = int(entry["first_sample"]), int(entry["end_sample"])
+    kept = stored.row_range(first, end)
+    disturbed = int(entry["outcome"]) == Outcome.DISTURBED
+    force_n = float(entry["force_n"])
+    return Attempt(
+        reason=_reason(entry, plays),
+        quality=Quality.DISTURBED if disturbed else Quality.REJECTED,
+        rows=None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1]),
+        frequency_hz=None if plays or end == first else float(entry["periods"]) / (end - first) * sample_rate_hz,
+        force_n=None if plays or not math.isfinite(force_n) else force_n,
+    )
+
+
+def _reason(entry: np.void, plays: bool) -> str:
+    """Return why a record was refused."""
+    samples = int(entry["end_sample"]) - int(entry["first_sample"])
+    held, lost = int(entry["held"]), int(entry["lost"])
+    told = [f"outputs came too late: held in {held} samples"] if held else []
+    told += [f"{lost} of {samples} samples were lost on their way"] if lost else []
+    if int(entry["outcome"]) != Outcome.DISTURBED:
+        return ", ".join(told)
+    error_deg, drift = math.degrees(float(entry["mean_error_rad"])), 100.0 * float(entry["drift"])
+    course = f" (averaged phase error {error_deg:.2f} deg, amplitude drift {drift:.2g} %)" if not plays else ""
+    return "; ".join([f"the settle rule was broken while recording{course}", *told])
+
+
+def attempt_at(point: Point[Any]) -> Attempt:
+    """Return what is kept of a refused point if it is measured again."""
+    vibration = point.vibration
+    return Attempt(
+        reason=point.reason,
+        quality=point.quality,
+        rows=point.rows,
+        part=point.part,
+        frequency_hz=None if vibration is None else vibration.frequency_hz,
+        force_n=None if vibration is None else vibration.force_n,
+    )
+
+
+def after_attempts(point: Point[Any], before: tuple[Attempt, ...]) -> Point[Any]:
+    """Return a point with the attempts before it. A point that is refused says how often it was measured."""
+    if not before:
+        return point
+    reason = point.reason if point.accepted else f"{point.reason}; refused in {1 + len(before)} attempts"
+    return replace(point, refused_before=before, reason=reason)
