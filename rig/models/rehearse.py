@@ -117,7 +117,7 @@ def rehearse_into(
     journal = draws_path(output)
     if overwrite and output.exists():
         journal.unlink(missing_ok=True)
-    found = rehearse(request, journal, progress=listener.draw, jobs=jobs)
+    found = rehearse(request, journal, begin_anew=overwrite, progress=listener.draw, jobs=jobs)
     save(found, output)
     journal.unlink(missing_ok=True)
     return found

@@ -30,13 +30,6 @@ Real = NDArray[np.float64]
 
 BAND = (0.5, 2.2)  # of the linear frequency: band in which the linear rig is fitted
 LEAST_HALF_POWER = 0.5  # share of a sample of hold in the latency
-START = {
-    "coil_time_constant_s": 1e-4,
-    "exciter_damping_n_s_m": 20.0,
-    "suspension_stiffness_n_m": 6000.0,
-    "stinger_stiffness_n_m": 5e6,
-}
-"""Values of a shaker for modal tests (PHYSICS of the shipped benches), for what is not measured; a factor of two either way."""
 LINES = 400  # lines at which a rig is fitted
 SMOOTHED = 15  # lines over which variances are averaged: those of a few realisations scatter by themselves
 
@@ -98,9 +91,6 @@ def gathered(bench: Bench, plan: Plan, sources: Mapping[str, Any]) -> Knowledge:
     start = {
         "frequency_hz": facts.linear_frequency_hz,
         "drive_shape": abs(facts.drive_mode_shape) if facts.drive_mode_shape is not None else 1.0,
-        "force_per_volt_n_v": 1.0,
-        "moving_mass_kg": 0.2,
-        **START,
         **found.start,
     }
     return Knowledge(
@@ -207,7 +197,8 @@ def _plant_start(found: _Found, plant: PlantModel) -> None:
     start = {"frequency_hz": plant.frequency_rad_s / (2.0 * np.pi), "damping_ratio": plant.damping_ratio}
     start |= {"drive_shape": plant.drive_shape, "force_per_volt_n_v": per_volt}
     coil_s = alpha[1] * per_volt / w
-    start["coil_time_constant_s"] = coil_s if 1e-6 < coil_s < 1e-2 else START["coil_time_constant_s"]
+    if 1e-6 < coil_s < 1e-2:
+        start["coil_time_constant_s"] = coil_s
     start["moving_mass_kg"] = float(np.clip(beta[2] * per_volt, 0.02 / plant.drive_shape**2, 1e3))
     start["suspension_stiffness_n_m"] = float(np.clip(beta[0] * w**2 * per_volt, 10.0, 1e7))
     start["exciter_damping_n_s_m"] = float(np.clip(beta[1] * w * per_volt, 0.1, 1e5))

@@ -14,7 +14,7 @@ Jacobian J of the residuals over their standard deviations, prior included, the 
 Inverse Problem Theory, SIAM 2005, section 3.2), where s^2 is the misfit over its expectation if that is above 1.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rig.errors import ConfigurationError
 
-__all__ = ["LinearKnowledge", "LinearRig", "Prior", "Responses", "known_rig"]
+__all__ = ["LinearKnowledge", "LinearRig", "Prior", "Responses", "known_rig", "suitable_shaker"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -221,6 +221,15 @@ class _Parameters:
         self.centre.append(centre)
         self.std.append(std)
 
+    def vector(self, values: Mapping[str, float]) -> Real:
+        """Return the vector of named values; what they do not name is at its centre."""
+        return np.array(
+            [
+                centre if name not in values else float(np.log(values[name])) if positive else values[name]
+                for name, positive, centre in zip(self.names, self.positive, self.centre, strict=True)
+            ]
+        )
+
     def mode(self, mode: str, frequency_hz: float, shape: float, *, log_std: tuple[float, float, float]) -> None:
         """Add a mode; ``log_std``: of frequency, damping ratio and drive shape."""
         end = f" {mode}" if mode else ""
@@ -236,18 +245,49 @@ def known_rig(
 ) -> LinearKnowledge:
     """Return what responses and priors together say of a rig.
 
-    ``channels`` are the names of the response channels. ``start`` has the start values of `EXCITER` and `MODE`; ``priors`` what
-    is known beforehand, by name. Raises `ConfigurationError` if the responses are not those of such a rig.
+    ``channels`` are the names of the response channels. ``start`` has start values of `MODE`, and of `EXCITER` as far as they
+    are known; ``priors`` what is known beforehand, by name. What has no prior is that of a shaker that suits the specimen. The
+    fit is begun from several shakers, for more than one may be near. Raises `ConfigurationError` if the responses are not those
+    of such a rig.
     """
     beside: list[float] = []
-    while True:
-        found, worst_hz = _fitted(_parameters(channels, start, priors, responses, beside), responses)
-        if responses is None or found.inflation <= UNEXPLAINED or len(beside) == MOST_BESIDE:
-            return found
+    found, worst_hz = _fitted(_parameters(channels, start, priors, responses, beside), responses, _starts(start))
+    while responses is not None and found.inflation > UNEXPLAINED and len(beside) < MOST_BESIDE:
         beside.append(worst_hz)
-        better, _ = _fitted(_parameters(channels, start, priors, responses, beside), responses)
+        further = _parameters(channels, start, priors, responses, beside)
+        better, worst_hz = _fitted(further, responses, [found.rig().values])
         if better.inflation > EXPLAINED * found.inflation:
-            return found
+            break
+        found = better
+    return found
+
+
+def suitable_shaker(mode: Mapping[str, float]) -> dict[str, Prior]:
+    """Return what is assumed of a shaker that nobody has measured, by the mode (`MODE`) that it drives.
+
+    Its moving mass is half the modal mass, its suspension resonates at 25 Hz, or at the mode if that is lower, with half of
+    critical damping; each within a factor of four or so.
+    """
+    mass = 0.5 / mode["drive_shape"] ** 2
+    omega = 2.0 * np.pi * min(25.0, mode["frequency_hz"])
+    return {
+        "force_per_volt_n_v": Prior(mode.get("force_per_volt_n_v", 3.0), 2.0),
+        "coil_time_constant_s": Prior(1e-4, WIDE),
+        "moving_mass_kg": Prior(mass, 1.4),
+        "exciter_damping_n_s_m": Prior(mass * omega, 1.4),
+        "suspension_stiffness_n_m": Prior(mass * omega**2, 1.4),
+        "stinger_stiffness_n_m": Prior(5e6, 1.4),
+    }
+
+
+def _starts(start: Mapping[str, float]) -> list[Mapping[str, float]]:
+    """Return the shakers from which a fit is begun: as a first fit has it, and suitable ones of several masses."""
+    suitable = {name: prior.value for name, prior in suitable_shaker(start).items()}
+    out: list[Mapping[str, float]] = [start]
+    for times in (0.3, 1.0, 3.0):
+        scaled = {name: times * suitable[name] for name in EXCITER[2:5]}
+        out.append({**suitable, **scaled, **{name: start[name] for name in MODE if name in start}})
+    return out
 
 
 def _parameters(
@@ -260,11 +300,8 @@ def _parameters(
     out = _Parameters(channels, priors)
     shape, hertz = start["drive_shape"], start["frequency_hz"]
     out.mode("", hertz, shape, log_std=(0.1, 1.5, WIDE))
-    out.centre[1] = (
-        np.log(start.get("damping_ratio", FLOOR_DAMPING)) if "damping_ratio" not in priors else out.centre[1]
-    )
-    for name in EXCITER:
-        out.log(name, start[name])
+    for name, shaker in suitable_shaker(start).items():
+        out.log(name, shaker.value, shaker.log_std)
     rate = 5000.0 if responses is None else responses.sample_rate_hz
     out.plain("delay_s", 0.0, 2.0 / rate)
     out.log("coupling_hz", COUPLING_HZ)
@@ -277,8 +314,10 @@ def _parameters(
     return out
 
 
-def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[LinearKnowledge, float]:
-    """Return the fit, and the line (Hz) that fits worst."""
+def _fitted(
+    parameters: _Parameters, responses: Responses | None, starts: Sequence[Mapping[str, float]]
+) -> tuple[LinearKnowledge, float]:
+    """Return the best of the fits from several starts, and the line (Hz) that fits worst."""
     from scipy.optimize import least_squares
 
     centre, std = np.array(parameters.centre), np.array(parameters.std)
@@ -303,10 +342,14 @@ def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[Linea
         return np.concatenate([error.real, error.imag, (x - centre) / std])
 
     lowest = [parameters.lowest.get(name, -np.inf) for name in names]
+    fits = []
     with np.errstate(over="ignore", invalid="ignore"):
-        found = least_squares(
-            residuals, centre, bounds=(lowest, np.inf), x_scale=std, method="trf", max_nfev=100, ftol=1e-7, xtol=1e-7
-        )
+        for start in starts:
+            x = _as_strong(parameters.vector(start), names, knowledge, responses)
+            fits.append(
+                least_squares(residuals, x, bounds=(lowest, np.inf), x_scale=std, max_nfev=100, ftol=1e-7, xtol=1e-7)
+            )
+    found = min(fits, key=lambda fit: float(fit.cost))
     if not np.all(np.isfinite(found.fun)):
         raise ConfigurationError("the responses are not those of a shaker, a stinger and a structure near one mode")
     error = misses(found.x)
@@ -321,3 +364,12 @@ def _fitted(parameters: _Parameters, responses: Responses | None) -> tuple[Linea
     misfit = float(np.sqrt(np.mean(relative**2)))
     near = _Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), data)
     return replace(knowledge(found.x, covariance, misfit, inflation, determined), near=near), float(worst)
+
+
+def _as_strong(x: Real, names: Sequence[str], knowledge: Callable[..., LinearKnowledge], responses: Responses) -> Real:
+    """Return a start vector with the force per volt at which its force is as large as the measured one, in the median."""
+    model = knowledge(x, np.empty(0), 0.0, 1.0, 0.0).rig().responses(responses.frequency_hz, responses.sample_rate_hz)
+    ratio = float(np.median(np.abs(responses.value[:, 0]) / np.abs(model[:, 0])))
+    out = x.copy()
+    out[names.index("force_per_volt_n_v")] += np.log(ratio)
+    return out

@@ -137,17 +137,18 @@ def rehearse(
     request: RehearsalRequest,
     journal: Path | None = None,
     *,
+    begin_anew: bool = False,
     progress: Callable[[Draw, int], None] = lambda _draw, _done: None,
     jobs: int | None = None,
 ) -> Rehearsal:
     """Run the plan on all twins and return what came of it.
 
     With a ``journal`` every draw is written to it as it is done; a journal of the same rehearsal is taken up again, and it
-    stays until the caller removes it. ``progress`` is told of each draw and of the number done. ``jobs`` is as in joblib: None
-    follows `joblib.parallel_config`, so that a cluster is one line of the caller. Raises `RecordingError` for a journal of
-    another rehearsal, or one that cannot be written.
+    stays until the caller removes it. That of another rehearsal is refused, or replaced to ``begin_anew``. ``progress`` is told
+    of each draw and of the number done. ``jobs`` is as in joblib: None follows `joblib.parallel_config`, so that a cluster is
+    one line of the caller. Raises `RecordingError` for a journal of another rehearsal, or one that cannot be written.
     """
-    done = {} if journal is None else _begun(journal, request)
+    done = {} if journal is None else _begun(journal, request, begin_anew)
     for count, draw in enumerate(done.values(), 1):
         progress(draw, count)
     missing = [number for number in range(request.draws) if number not in done]
@@ -165,7 +166,7 @@ def _run(request: RehearsalRequest, numbers: Sequence[int], jobs: int | None) ->
         yield draw
 
 
-def _begun(journal: Path, request: RehearsalRequest) -> dict[int, Draw]:
+def _begun(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[int, Draw]:
     """Return the draws that a journal holds; begin it if it does not exist. A last line that was cut off is dropped."""
     head = {"rehearsal": _digest(request.facts)}
     if not journal.exists():
@@ -176,6 +177,9 @@ def _begun(journal: Path, request: RehearsalRequest) -> dict[int, Draw]:
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"{journal}: cannot be read ({error})") from None
     tables = list(_whole_lines(lines))
+    if begin_anew and tables[:1] != [head]:
+        _write(journal, [head])
+        return {}
     if not tables or tables[0] != head:
         raise RecordingError(
             f"{journal}: holds the draws of another rehearsal (another plan, bench, knowledge, seed or version); "
