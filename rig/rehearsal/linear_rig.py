@@ -32,7 +32,7 @@ ABOVE = 1.1  # of the end of the band: least frequency of the mode above it
 UNEXPLAINED = 4.0  # misfit over its expectation above which a further mode is looked for
 EXPLAINED = 0.5  # of that misfit must be left, or less, for the mode to be kept
 MOST_BESIDE = 3
-MOST_CORRECTIONS = 12
+MOST_CORRECTIONS = 20
 MODEL_FLOOR = 2e-3  # of a response: smallest standard deviation that is believed
 EXCITER = (
     "force_per_volt_n_v",
@@ -127,6 +127,8 @@ class _Linearisation:
     """Standard deviations of the residuals, misfit included [n, outputs]."""
     jacobian: Real
     """Slope of the weighted residuals, real parts above imaginary ones [2 n outputs, p]."""
+    prior_std: Real
+    """Standard deviations of the priors [p]."""
 
     def weighted(self, rig: LinearRig) -> Real:
         """Weighted model of a rig [2 n outputs]."""
@@ -172,9 +174,8 @@ class LinearKnowledge:
         """Draw a rig from the joint distribution.
 
         Along directions that the data leave wide the responses are no longer linear in the parameters. So a drawn vector is
-        moved until its responses are those that the linearisation gives it, by Gauss-Newton steps with the slope at the most
-        likely rig, as in randomised maximum likelihood (Oliver, Reynolds and Liu, Inverse Theory for Petroleum Reservoir
-        Characterization, 2008, section 10.7).
+        moved, as little as its prior allows, until its responses are those that the linearisation gives it: randomised maximum
+        likelihood (Oliver, Reynolds and Liu, Inverse Theory for Petroleum Reservoir Characterization, 2008, section 10.7).
         """
         values, vectors = np.linalg.eigh(self.covariance)
         spread = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -182,16 +183,18 @@ class LinearKnowledge:
         return self.rig(drawn if self.near is None else self._corrected(drawn, self.near))
 
     def _corrected(self, drawn: Real, near: _Linearisation) -> Real:
+        from scipy.optimize import least_squares
+
         wanted = near.weighted(self.rig()) + near.jacobian @ (drawn - self.mean)
-        x, best, least = drawn, drawn, np.inf
-        for _ in range(MOST_CORRECTIONS):
-            miss = near.weighted(self.rig(x)) - wanted
-            size = float(miss @ miss)
-            if not size < least:
-                break
-            best, least = x, size
-            x = x - self.covariance @ (near.jacobian.T @ miss)
-        return best
+
+        def misses(x: Real) -> Real:
+            return np.concatenate([near.weighted(self.rig(x)) - wanted, (x - drawn) / near.prior_std])
+
+        if float(np.sum(misses(drawn) ** 2)) < self.mean.size:  # less than the noise does
+            return drawn
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = least_squares(misses, drawn, x_scale=near.prior_std, max_nfev=MOST_CORRECTIONS)
+        return np.asarray(found.x)
 
 
 class _Parameters:
@@ -362,7 +365,7 @@ def _fitted(
     relative = np.abs(error) / scale
     worst = responses.frequency_hz[int(np.argmax(relative[:, 1]))]
     misfit = float(np.sqrt(np.mean(relative**2)))
-    near = _Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), data)
+    near = _Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), data, std)
     return replace(knowledge(found.x, covariance, misfit, inflation, determined), near=near), float(worst)
 
 

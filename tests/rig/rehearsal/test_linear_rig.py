@@ -80,7 +80,7 @@ def test_parameters_are_recovered_within_their_standard_errors():
     for name, value in TRUE.items():
         assert abs(np.log(rig.values[name] / value)) < 4.0 * found.std(name) + 2e-3, name
     assert rig.values["ratio tip"] == pytest.approx(1.5, rel=5e-3)
-    assert found.std("frequency_hz") < 1e-4 < found.std("moving_mass_kg") < 0.3
+    assert found.std("frequency_hz") < 1e-4 < found.std("moving_mass_kg") < 0.5
 
 
 def test_stated_intervals_cover_the_truth_over_many_noises():
@@ -106,13 +106,13 @@ def test_what_a_narrow_band_does_not_determine_stays_as_wide_as_before():
     assert np.corrcoef(masses, stiffnesses)[0, 1] > 0.5  # k - m w^2 is determined, m and k are not
 
 
-def test_draws_fit_the_responses_within_twice_their_noise():
+def test_draws_fit_the_responses_within_their_noise():
     responses = responses_of(rig_of(TRUE), LINES, 0.01)
     found = known_rig(("tip",), START, {}, responses)
     best = np.abs((found.rig().responses(LINES, RATE_HZ) - responses.value) / responses.std)
     for seed in range(10):
         drawn = found.draw(np.random.default_rng(seed)).responses(LINES, RATE_HZ)
-        assert np.mean(np.abs((drawn - responses.value) / responses.std) ** 2) < 4.0 * np.mean(best**2)
+        assert np.mean(np.abs((drawn - responses.value) / responses.std) ** 2) < 2.0 * np.mean(best**2)
 
 
 def test_a_mode_beside_is_found():
