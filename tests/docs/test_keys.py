@@ -26,6 +26,7 @@ from rig.drivers.can import CanOptions
 from rig.drivers.serial import SerialOptions
 from rig.drivers.virtual.driver import Queue
 from rig.drivers.virtual.faults import PassingFaults
+from rig.rehearsal.hypotheses import Hypotheses
 from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.sequencer.segments import SettleRule
 from rig.wire.can.link import CanLink
@@ -50,6 +51,7 @@ MODELS = {
     "Keys of `[controller.lock]`": LockRule,
     "Keys of `[settle]`": SettleRule,
     "Keys of `[plant]`": PlantFacts,
+    "Keys of a table of hypotheses": Hypotheses,
     "Keys of a bench": Bench,
     "Keys of `[driver]`": DriverChoice,
     "Keys of `[specimen]`": SpecimenFacts,
@@ -73,6 +75,7 @@ def keys_under(heading: str) -> dict[str, tuple[str, str]]:
             "campaigns.md",
             "dwell.md",
             "tuning.md",
+            "rehearsal.md",
             "wire-protocol.md",
             "wire-protocol-can.md",
         )
