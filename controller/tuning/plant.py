@@ -68,8 +68,13 @@ class PlantModel:
         """Return Y: acceleration of the drive point per force on the structure alone (1/kg), at complex s (rad/s)."""
         s = np.asarray(s, dtype=np.complex128)
         constant, rising = self.residual_per_kg
+        return np.asarray(self.mode_accelerance(s) + constant + rising * (s / self.centre_rad_s) ** 2)
+
+    def mode_accelerance(self, s: ArrayLike) -> Complex:
+        """Return the part of Y that is due to the mode alone (1/kg), at complex s (rad/s)."""
+        s = np.asarray(s, dtype=np.complex128)
         pole = s**2 + 2.0 * self.damping_ratio * self.frequency_rad_s * s + self.frequency_rad_s**2
-        return np.asarray(self.drive_shape**2 * s**2 / pole + constant + rising * (s / self.centre_rad_s) ** 2)
+        return np.asarray(self.drive_shape**2 * s**2 / pole)
 
     def exciter(self, s: ArrayLike) -> tuple[Complex, Complex]:
         """Return alpha (V/N) and beta (V s^2/m) of the exciter, ``u = alpha F + beta A``, at complex s."""

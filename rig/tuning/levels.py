@@ -10,6 +10,7 @@ from controller.tuning import LowPassChoice, PlantModel, low_pass_from_densities
 from rig.bench import Bench
 from rig.campaigns.planning.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
+from rig.tuning.converter_bits import input_bits_n
 
 __all__ = ["LevelChoice", "choose_levels", "low_pass", "lowest_force_n", "needed_v", "reach_m"]
 
@@ -49,7 +50,9 @@ def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float)
 
 PART = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
 SPAN = 30.0  # highest level over lowest, where noise allows
+LEAST_SPAN = 3.0  # highest level over lowest that rounding may reduce it to; the lowest points may then be refused
 BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
+ALIEN = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
 
 
 @dataclass(frozen=True)
@@ -95,11 +98,22 @@ def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tup
     return ends[end], end
 
 
-def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
-    """Lowest useful force: a part of the highest force, but at least a few bits of the converter."""
-    force = next(channel for channel in bench.channels if channel.role == "force")
-    bit = force.resolution_v / abs(force.sensitivity_v_per_unit)
-    return max(needed_n(plant, highest_m) / SPAN, BITS * bit)
+def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n: float) -> tuple[float, str]:
+    """Lowest useful force, N peak, and what bounds it.
+
+    It is a part of the highest force, but at least a few bits of the input converter, and so large that rounding in both
+    converters adds no more than `ALIEN` to it; ``bits_force_n`` is what rounding of the output causes, N RMS.
+    """
+    force = bench.channels[bench.index_of("force")]
+    read_n, sent_n = input_bits_n(bench), bits_force_n
+    bounds = {
+        "": needed_n(plant, highest_m) / SPAN,
+        "two bits of the force's converter": BITS * force.resolution_v / abs(force.sensitivity_v_per_unit),
+        f"the last bits of the {'output' if sent_n > read_n else 'force'} converter, which add "
+        f"{math.hypot(read_n, sent_n):.2g} N RMS at other frequencies": math.sqrt(2.0) * math.hypot(read_n, sent_n) / ALIEN,
+    }
+    bound = max(bounds, key=lambda key: bounds[key])
+    return min(bounds[bound], needed_n(plant, highest_m) / LEAST_SPAN), bound
 
 
 def choose_levels(

@@ -11,12 +11,11 @@ from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.tuning.design import Chosen, gains_of
 from rig.tuning.levels import LevelChoice, significant
+from rig.tuning.shifts import Window, ramp_periods
 
 __all__ = ["plan_text"]
 
-WINDOW = 0.1  # of the frequency, on either side
 HARMONICS = 5
-RAMP_PERIODS = 10
 SHORTEST_TIME_OUT = 600
 
 
@@ -27,6 +26,7 @@ def plan_text(
     ratios: Mapping[str, float],
     chosen: Chosen,
     levels: LevelChoice,
+    window: Window,
     recording: Path,
 ) -> str:
     """Return a backbone plan as TOML; ``ratios`` are the measured ratios of response channels to the drive point."""
@@ -51,9 +51,12 @@ def plan_text(
             "# Voltage of the lowest level on the linear plant.",
             _line("start_v", significant(levels.needed_v[0], 4)),
         ]
-    head += [_line("ramp_periods", RAMP_PERIODS)]
-    window = [round((1.0 - WINDOW) * hertz, 4), round((1.0 + WINDOW) * hertz, 4)]
-    lowest, highest = bench.limits.frequency_hz
+    head += [
+        "# Slow enough that force and frequency follow with the damping as measured.",
+        _line("ramp_periods", ramp_periods(plant)),
+        "# A level without a lock is left out; the next one seeks it again.",
+        _line("on_lost_lock", "skip"),
+    ]
     controller = [
         "",
         "[controller]",
@@ -63,9 +66,9 @@ def plan_text(
         _line("low_pass_rad_s", significant(chosen.low_pass_rad_s)),
         _line("frequency_law", chosen.law),
         *_gains(chosen),
-        "# Resonance of the structure alone as measured, and 10 % either way.",
+        *_comment(f"Resonance of the structure alone as measured; {window.why}."),
         _line("centre_frequency_hz", significant(hertz, 6)),
-        _line("frequency_window_hz", [max(window[0], lowest), min(window[1], highest)]),
+        _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),
     ]
     settle = [
         "",
@@ -107,7 +110,7 @@ def _summary(plant: PlantModel, chosen: Chosen) -> list[str]:
 COMMENTS = {
     "k1": "Proportional and integral gain of the phase error.",
     "frequency_integral_per_s": "Part of the low-pass, see above.",
-    "response_integral_per_s": "A quarter of the low-pass.",
+    "response_integral_per_s": "Part of the low-pass, see above.",
     "plant_pole_rad_s": "Coupled pole less i times the resonance, as measured: the response loop cancels it.",
     "reference_integral_per_s": "For levels in newtons: as quick as the measured damping lets a force be held.",
     "drive_mode_shape": "As measured here, not the bench's.",
