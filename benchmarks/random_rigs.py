@@ -225,7 +225,9 @@ def _bench(draws: Draws, table: dict[str, Any], rig: Any, mode: int, found: Any,
     shapes = {at: float(rig.linear_modes.at(rig.shape(at))[mode]) for at in ("drive", "far")}
     ratio = abs(shapes["far"] / shapes["drive"])
     highest_hz = hertz * max(1.0 + shift, 1.0)
-    rate = next(rate for rate in (1000.0, 2000.0, 5000.0, 10000.0, 20000.0) if rate >= highest_hz * draws.flat(30.0, 60.0))
+    rate = next(
+        rate for rate in (1000.0, 2000.0, 5000.0, 10000.0, 20000.0) if rate >= highest_hz * draws.flat(30.0, 60.0)
+    )
     block = int(min(draws.log(1.0, 40.99), max(0.5 * rate / hertz, 1.0)))
     top_m, top_n, top_v = float(found.amplitude_m[-1]), float(np.max(found.force_n)), float(np.max(found.voltage_v))
     top_m_s2 = top_m * (2.0 * math.pi * highest_hz) ** 2
@@ -331,7 +333,12 @@ def carried_out(bench_path: Path, folder: Path) -> dict[str, Any]:
     plan = folder / f"{name}-plan.toml"
     plan.write_text(tuned.plan_toml, encoding="utf-8")
     found = summary(tuned)
-    out |= {"tune_s": time.perf_counter() - began, "plant": found["plant"], "test": found["test"], "notes": found["notes"]}
+    out |= {
+        "tune_s": time.perf_counter() - began,
+        "plant": found["plant"],
+        "test": found["test"],
+        "notes": found["notes"],
+    }
     began = time.perf_counter()
     try:
         run = rig.run(plan, output=folder / f"{name}.h5", seed=seed + 1, overwrite=True)

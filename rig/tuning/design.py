@@ -34,12 +34,18 @@ __all__ = ["Chosen", "LawName", "choose", "gains_of"]
 LawName = Literal["frequency-error", "phase"]
 DAMPINGS = (1.0, 2.0, 4.0)  # damping at higher levels, as multiples of the damping in the linear test
 LOW_PASSES = (5.0, 10.0, 20.0)  # candidates: resonance frequency divided by these
-SHARES = (1.0 / 8.0, 1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0, 1.0 / 40.0)  # of the low-pass: integral gain of the frequency error
+SHARES = (
+    1.0 / 8.0,
+    1.0 / 12.0,
+    1.0 / 16.0,
+    1.0 / 24.0,
+    1.0 / 40.0,
+)  # of the low-pass: integral gain of the frequency error
 PROPORTIONALS = (0.0, 0.3, 0.7)  # proportional gain of the frequency error
 RESPONSE_SHARES = (3.0 / 8.0, 1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0)  # of the low-pass: integral gain of the response loop
 SOFTENS, HARDENS = 0.06, 0.15  # wanted: d ln(frequency)/d ln(amplitude) up to which the loops stay stable
 SHIFTED = 0.05  # of the frequency: shift at which a softening or hardening structure must stay stable as well
-WORSE = 0.05  # of the wanted range of slopes that is given away for quicker gains
+WORSE = 0.2  # of the wanted range of slopes (2: all of it) that is given away for quicker gains
 PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| allowed for chosen gains, at the measured damping and at other dampings
 OUTSIDE = 0.5  # largest gain of the response loop at other modes
 FORCE_SHARES = (1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0, 1.0 / 36.0, 1.0 / 50.0, 1.0 / 100.0)  # of the low-pass
@@ -70,6 +76,14 @@ class Chosen:
     """Largest gain of the response loop at the measured lines beyond the model's band, and its frequency (Hz)."""
     why: str
     """How the low-pass and the gains were chosen."""
+
+    @property
+    def tracking_periods(self) -> float:
+        """Periods in which the frequency comes nearer to the resonance by a factor e, on the plant as measured."""
+        law, loop = self.design.loop.frequency_law, self.design.loop
+        half_bandwidth = loop.plant.damping_ratio * loop.plant.frequency_rad_s
+        rate = law.integral_per_s if isinstance(law, FrequencyErrorLaw) else law.integral_per_s2 / half_bandwidth
+        return loop.omega_rad_s / (2.0 * math.pi * rate)
 
     @property
     def sensitivity_peak(self) -> float:
@@ -166,7 +180,9 @@ def _suits(loop: ControlLoop, plant: PlantModel, responses: FrequencyResponseMat
     if _beyond(loop, responses)[0] > OUTSIDE or max(gains_at_half(loop).values()) > LARGEST_AT_HALF:
         return False
     bounds = (PEAK, *(OTHER_PEAK for _ in DAMPINGS[1:]))
-    if any(_quick_peak(replace(loop, plant=other)) > bound for other, bound in zip(_damped(plant), bounds, strict=True)):
+    if any(
+        _quick_peak(replace(loop, plant=other)) > bound for other, bound in zip(_damped(plant), bounds, strict=True)
+    ):
         return False
     return assess(loop).suited
 

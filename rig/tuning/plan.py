@@ -16,7 +16,9 @@ from rig.tuning.shifts import Window, ramp_periods
 __all__ = ["plan_text"]
 
 HARMONICS = 5
-SHORTEST_TIME_OUT = 600
+AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
+SHORTEST_TIME_OUT = 1000
+LOST_PERIODS = 20  # at least
 
 
 def plan_text(
@@ -53,10 +55,15 @@ def plan_text(
         ]
     head += [
         "# Slow enough that force and frequency follow with the damping as measured.",
-        _line("ramp_periods", ramp_periods(plant)),
+        _line("ramp_periods", ramp_periods(plant, chosen.tracking_periods)),
         "# A level without a lock is left out; the next one seeks it again.",
         _line("on_lost_lock", "skip"),
     ]
+    if levels.accepted_alien is not None:
+        head += [
+            "# Rounding of the output: lines away from the harmonics, which leave frequency and damping as they are.",
+            _line("accepted_alien_force", significant(levels.accepted_alien, 2)),
+        ]
     controller = [
         "",
         "[controller]",
@@ -69,12 +76,15 @@ def plan_text(
         *_comment(f"Resonance of the structure alone as measured; {window.why}."),
         _line("centre_frequency_hz", significant(hertz, 6)),
         _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),
+        "# A lock counts as lost where twice the time in which the frequency follows has not brought it back.",
+        f"lock = {{ lost_periods = {max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))} }}",
     ]
     settle = [
         "",
         "[settle]",
         f"# Predicted for a step of 30 % in level or of half a bandwidth in frequency: {settling:.0f} periods.",
         _line("longest_periods", time_out),
+        *([] if levels.accepted_alien is None else [_line("average_periods", AVERAGED_BITS)]),
     ]
     facts = [
         "",

@@ -16,7 +16,8 @@ Real = NDArray[np.float64]
 SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a test allows for
 STANDS_OUT = 3.0  # of a mode's peak over the lowest response between it and the tested mode
 TIMES = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
-SHORTEST, LONGEST = 20.0, 300.0
+SHORTEST, LONGEST = 20.0, 300.0  # ramps, periods
+PLAUSIBLE = 0.005  # change of the frequency from level to level
 
 
 @dataclass(frozen=True)
@@ -80,11 +81,13 @@ def _first_peak(frequency: Real, size: Real) -> float | None:
     return float(frequency[rising[0] + int(np.argmax(later[:end]))])
 
 
-def ramp_periods(plant: PlantModel) -> float:
+def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
     """Return the length of the ramps between levels, periods.
 
-    The force that lets a vibration grow comes on top of the one that holds it, and a frequency that changes with the level is
-    followed with a delay: both fall with the length of a ramp over ``1/(D w_0)``.
+    The force that lets a vibration grow comes on top of the one that holds it: it falls with the length of a ramp over ``1/(D
+    w_0)``. A frequency that changes with the level is followed late, by its change within ``tracking_periods``: a change of `PLAUSIBLE`
+    per level shall leave less than half of the half bandwidth ``D w_0``.
     """
-    periods = TIMES / (2.0 * math.pi * plant.damping_ratio)
-    return float(min(max(5.0 * math.ceil(periods / 5.0), SHORTEST), LONGEST))
+    grows = TIMES / (2.0 * math.pi * plant.damping_ratio)
+    follows = 0.5 * math.pi * PLAUSIBLE * tracking_periods / (0.5 * plant.damping_ratio)
+    return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), SHORTEST), LONGEST))

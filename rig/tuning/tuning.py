@@ -1,6 +1,6 @@
 """Tune a rig: from a bench alone to gains, margins, levels and a plan."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import get_args
 
@@ -12,7 +12,7 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.level_search import MultisineSeries
 from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
-from rig.tuning.levels import PART, SPAN, LevelChoice, choose_levels, low_pass, lowest_force_n, reach_m
+from rig.tuning.levels import PART, SPAN, LevelChoice, choose_levels, low_pass, lowest_force, reach_m
 from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.plan import plan_text
 from rig.tuning.shifts import frequency_window
@@ -128,19 +128,25 @@ def tune(
     measured = measured_ratios(test.responses, plant)
     ratios = bench.response_ratios | measured
     highest_m = PART * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
-    lowest_n, bound = lowest_force_n(bench, plant, highest_m, test.bits_force_n)
+    lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
     densities = (test.force_density, test.acceleration_density)
-    largest, lowest_n, noise = low_pass(plant, densities, lowest_n)
+    largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n)
     chosen = choose(plant, test.responses, request.law, largest, noise)
     levels = choose_levels(
-        bench, plant, ratios, lowest_n=lowest_n, from_m=request.from_m, to_m=request.to_m, points=request.points
+        bench,
+        plant,
+        ratios,
+        lowest=replace(lowest, force_n=lowest_n),
+        from_m=request.from_m,
+        to_m=request.to_m,
+        points=request.points,
     )
     window = frequency_window(bench, test.responses, plant)
     notes += _cautions(bench, test, levels)
-    if bound and request.from_m is None:
+    if lowest.bound and request.from_m is None:
         span, bits = levels.levels_m[-1] / levels.levels_m[0], levels.needed_v[-1] / bench.output_bit_v
         notes += (
-            f"the levels span a factor of {span:.3g}, not {SPAN:g}: the lowest is bounded by {bound}; the highest has an output of "
+            f"the levels span a factor of {span:.3g}, not {SPAN:g}: the lowest is bounded by {lowest.bound}; the highest has an output of "
             f"{bits:.0f} bits: less gain behind the converter would leave room for lower levels",
         )
     return Tuning(
@@ -152,9 +158,7 @@ def tune(
         chosen=chosen,
         levels=levels,
         notes=notes,
-        plan_toml=plan_text(
-            named or name, bench, plant, measured, chosen, levels, window, Path(recording)
-        ),
+        plan_toml=plan_text(named or name, bench, plant, measured, chosen, levels, window, Path(recording)),
     )
 
 

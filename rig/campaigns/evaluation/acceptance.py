@@ -140,7 +140,9 @@ def settled_point(
         (
             phase_objection(vibration.phase_error_deg, plan.accepted_phase_error_deg),
             level,
-            alien_objection(alien, plan.accepted_alien_force, float(np.abs(rows["command_v"]).mean()) / bench.output_bit_v),
+            alien_objection(
+                alien, plan.accepted_alien_force, float(np.abs(rows["command_v"]).mean()) / bench.output_bit_v
+            ),
             hunting_objection(scatter, plan.accepted_frequency_scatter),
             drift_objection(bench, vibration, plan.accepted_drift),
         )
