@@ -198,11 +198,14 @@ class PlantModel:
         latency_samples: float,
         force_std: ArrayLike | None = None,
         acceleration_std: ArrayLike | None = None,
+        exciter_prior: float | None = None,
     ) -> Self:
         """Fit the plant to measured FRFs from voltage; see `controller.tuning.plant_fit.fitted`."""
         from controller.tuning.plant_fit import fitted
 
-        found = fitted(frequency_hz, force_per_v, acceleration_per_v, force_std, acceleration_std)
+        found = fitted(
+            frequency_hz, force_per_v, acceleration_per_v, force_std, acceleration_std, exciter_prior=exciter_prior
+        )
         return cls(**found, sample_rate_hz=sample_rate_hz, latency_samples=latency_samples)
 
 

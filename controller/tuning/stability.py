@@ -67,7 +67,7 @@ def hardening_margins(loop: ControlLoop) -> tuple[float, float]:
     closes the loop ``1 - kappa t(s)`` around t, the transfer function from a shift of the mode to its amplitude. It becomes
     unstable at the first kappa for which ``kappa t(i w)`` is 1. Infinite if there is none.
     """
-    omega = np.geomspace(1e-4, REACH, 2000) * loop.omega_rad_s
+    omega = np.geomspace(1e-4, REACH, 600) * loop.omega_rad_s
     transfer = loop.response_after_shift(1j * omega) * loop.plant.frequency_rad_s
     across = np.flatnonzero(np.diff(np.sign(transfer.imag)) != 0)
     share = transfer.imag[across] / (transfer.imag[across] - transfer.imag[across + 1])

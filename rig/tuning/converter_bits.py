@@ -47,12 +47,13 @@ def bits_force_n(bench: Bench, responses: FrequencyResponseMatrix, beyond_n: flo
     return math.hypot(inside, min(outside, beyond_n))
 
 
-def periodic_beyond(values: Real, periods: int, highest_line: float) -> float:
-    """Return the RMS of the periodic part of a record of whole periods above a line, without what noise has there.
+def periodic_beyond(values: Real, period_samples: int, highest_line: float) -> float:
+    """Return the RMS of the periodic part of a record of two or more periods above a line, without what noise has there.
 
     ``highest_line`` is in multiples of the resolution. Lines of the record between those of one period show noise alone.
     """
-    values = np.asarray(values, float)
+    periods = values.size // period_samples
+    values = np.asarray(values[: periods * period_samples], float)
     values = np.where(np.isfinite(values), values, np.nanmean(values))
     power = 2.0 * np.abs(np.fft.rfft(values - values.mean())) ** 2 / values.size**2
     order = np.arange(power.size)

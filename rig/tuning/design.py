@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 
 from controller.tuning import (
+    LARGEST_AT_HALF,
     ComplexResponseLaw,
     ControlLoop,
     Design,
     FrequencyErrorLaw,
     HippoldGains,
-    LARGEST_AT_HALF,
     PhaseLaw,
     PlantModel,
     assess,
@@ -34,17 +34,15 @@ __all__ = ["Chosen", "LawName", "choose", "gains_of"]
 LawName = Literal["frequency-error", "phase"]
 DAMPINGS = (1.0, 2.0, 4.0)  # damping at higher levels, as multiples of the damping in the linear test
 LOW_PASSES = (5.0, 10.0, 20.0)  # candidates: resonance frequency divided by these
-SHARES = (
-    1.0 / 8.0,
-    1.0 / 12.0,
-    1.0 / 16.0,
-    1.0 / 24.0,
-    1.0 / 40.0,
-)  # of the low-pass: integral gain of the frequency error
+SHARES = (1.0 / 8.0, 1.0 / 16.0, 1.0 / 40.0)  # of the low-pass: integral gain of the frequency error
 PROPORTIONALS = (0.0, 0.3, 0.7)  # proportional gain of the frequency error
 RESPONSE_SHARES = (3.0 / 8.0, 1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0)  # of the low-pass: integral gain of the response loop
-SOFTENS, HARDENS = 0.06, 0.15  # wanted: d ln(frequency)/d ln(amplitude) up to which the loops stay stable
-SHIFTED = 0.05  # of the frequency: shift at which a softening or hardening structure must stay stable as well
+CANCELS = (1.0, 0.25)  # part of the proportional gain that cancels the coupled pole
+SOFTENS, HARDENS = 0.06, 0.25  # wanted: d ln(frequency)/d ln(amplitude) up to which the loops stay stable
+SOFTENED, HARDENED = (
+    -0.05,
+    0.1,
+)  # of the frequency: shifts at which a softening or hardening structure stays stable as well
 WORSE = 0.2  # of the wanted range of slopes (2: all of it) that is given away for quicker gains
 PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| allowed for chosen gains, at the measured damping and at other dampings
 OUTSIDE = 0.5  # largest gain of the response loop at other modes
@@ -60,6 +58,8 @@ class Chosen:
     """Frequency law: ``frequency-error`` (with complex response control) or ``phase`` (levels in volts)."""
     low_pass_rad_s: float
     """Low-pass w_LP, rad/s."""
+    cancels: float
+    """Part of the proportional gain of the response loop that would cancel the coupled pole; 0 for the phase law."""
     share: float
     """Integral gain of the frequency-error loop over w_LP; 0 for the phase law."""
     force_share: float
@@ -119,6 +119,7 @@ def choose(
     return Chosen(
         law="frequency-error",
         low_pass_rad_s=w,
+        cancels=best.cancels,
         share=share,
         force_share=_force_share(best.loop),
         design=designs[0],
@@ -138,6 +139,7 @@ class _Candidate:
 
     loop: ControlLoop
     response_share: float
+    cancels: float
     slopes: tuple[float, float]
 
     @property
@@ -154,20 +156,18 @@ class _Candidate:
 
 def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candidate]:
     out = []
-    for w, share, proportional, response in product(low_passes_rad_s, SHARES, PROPORTIONALS, RESPONSE_SHARES):
-        loop = ControlLoop(
-            plant,
-            w,
-            FrequencyErrorLaw(share * w, proportional),
-            complex_response_law(plant, w, share=response, smoothing_rad_s=w),
-        )
+    gains = product(low_passes_rad_s, SHARES, PROPORTIONALS, RESPONSE_SHARES, CANCELS)
+    for w, share, proportional, response, cancels in gains:
+        law = complex_response_law(plant, w, share=response, smoothing_rad_s=w)
+        law = replace(law, proportional=cancels * law.proportional)
+        loop = ControlLoop(plant, w, FrequencyErrorLaw(share * w, proportional), law)
         softer, harder = (
-            replace(loop, plant=plant.at(frequency_rad_s=part * plant.frequency_rad_s))
-            for part in (1.0 - SHIFTED, 1.0 + SHIFTED)
+            replace(loop, plant=plant.at(frequency_rad_s=(1.0 + shift) * plant.frequency_rad_s))
+            for shift in (SOFTENED, HARDENED)
         )
-        (softening, hardening) = hardening_margins(loop)
+        softening, hardening = hardening_margins(loop)
         slopes = min(softening, hardening_margins(softer)[0]), min(hardening, hardening_margins(harder)[1])
-        out.append(_Candidate(loop, response, slopes))
+        out.append(_Candidate(loop, response, cancels, slopes))
     return out
 
 
@@ -213,6 +213,7 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
     return Chosen(
         law="phase",
         low_pass_rad_s=w,
+        cancels=0.0,
         share=0.0,
         force_share=0.0,
         design=measured,
@@ -282,7 +283,7 @@ def gains_of(chosen: Chosen) -> dict[str, float | tuple[float, float]]:
         "frequency_integral_per_s": law.integral_per_s,
         **proportional,
         "response_integral_per_s": response.integral_per_s,
-        "plant_pole_rad_s": (pole.real, pole.imag),
+        "plant_pole_rad_s": (pole.real / chosen.cancels, pole.imag / chosen.cancels),
         "reference_integral_per_s": chosen.force_share * loop.low_pass_rad_s,
         "drive_mode_shape": loop.plant.drive_shape,
     }

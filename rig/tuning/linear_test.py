@@ -138,7 +138,9 @@ class _Runs:
             number = next(point.number for point in points_of(recording) if point.accepted)
             self.rows = point_rows(recording, number)
             self.force_beyond_n = periodic_beyond(
-                self.rows["inputs"][:, self.bench.index_of("force")], plan.periods, plan.highest_hz / resolution_hz
+                self.rows["inputs"][:, self.bench.index_of("force")],
+                round(self.bench.sample_rate_hz / resolution_hz),
+                plan.highest_hz / resolution_hz,
             )
         return self.measured
 

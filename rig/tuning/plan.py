@@ -11,7 +11,7 @@ from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.tuning.design import Chosen, gains_of
 from rig.tuning.levels import LevelChoice, significant
-from rig.tuning.shifts import Window, ramp_periods
+from rig.tuning.shifts import Window, ramp_periods, start_periods
 
 __all__ = ["plan_text"]
 
@@ -52,6 +52,8 @@ def plan_text(
         head += [
             "# Voltage of the lowest level on the linear plant.",
             _line("start_v", significant(levels.needed_v[0], 4)),
+            "# Until vibration and frequency have come to rest there.",
+            _line("start_periods", start_periods(plant, chosen.tracking_periods)),
         ]
     head += [
         "# Slow enough that force and frequency follow with the damping as measured.",
@@ -134,6 +136,10 @@ def _gains(chosen: Chosen) -> list[str]:
     for key, value in gains_of(chosen).items():
         if key in COMMENTS:
             out.append(f"# {COMMENTS[key]}")
+        if key == "plant_pole_rad_s" and chosen.cancels != 1.0:
+            out.append(
+                f"# Times {1.0 / chosen.cancels:g}: with less proportional gain than cancels it the loop bears more hardening."
+            )
         out.append(_line(key, [significant(v) for v in value] if isinstance(value, tuple) else significant(value)))
     return out
 

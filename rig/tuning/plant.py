@@ -34,6 +34,10 @@ class TuningError(RigError):
 Real = NDArray[np.float64]
 
 FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
+MODEL_ERROR = (
+    0.02  # of a response: error of the model that weighs in the fit beside the noise, so that small responses count
+)
+EXCITER_PRIOR = 0.3  # an exciter's spring in the band, relative to its moving mass, where one mode does not show it
 
 
 def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
@@ -89,13 +93,19 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: flo
     linear = bench.specimen.linear_frequency_hz
     frequency = responses.frequency_hz
     around = near(bench, frequency)
+    value = responses.value[around, :2, 0]
+    noise = np.nan_to_num(responses.total_std[around, :2, 0], nan=0.0, posinf=0.0)
+    std = np.hypot(noise, MODEL_ERROR * np.abs(value))
     try:
         plant = PlantModel.from_frequency_responses(
             frequency[around],
-            responses.value[around, 0, 0],
-            responses.value[around, 1, 0],
+            value[:, 0],
+            value[:, 1],
             sample_rate_hz=bench.sample_rate_hz,
             latency_samples=lead_samples,
+            force_std=std[:, 0],
+            acceleration_std=std[:, 1],
+            exciter_prior=EXCITER_PRIOR,
         )
         plant.lock_frequency_rad_s()
     except ValueError as error:

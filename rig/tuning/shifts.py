@@ -10,13 +10,14 @@ from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
 
-__all__ = ["Window", "frequency_window", "ramp_periods"]
+__all__ = ["Window", "frequency_window", "ramp_periods", "start_periods"]
 
 Real = NDArray[np.float64]
 SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a test allows for
 STANDS_OUT = 3.0  # of a mode's peak over the lowest response between it and the tested mode
 TIMES = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
 SHORTEST, LONGEST = 20.0, 300.0  # ramps, periods
+SHORTEST_START, LONGEST_START = 40.0, 600.0  # periods
 PLAUSIBLE = 0.005  # change of the frequency from level to level
 
 
@@ -91,3 +92,10 @@ def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
     grows = TIMES / (2.0 * math.pi * plant.damping_ratio)
     follows = 0.5 * math.pi * PLAUSIBLE * tracking_periods / (0.5 * plant.damping_ratio)
     return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), SHORTEST), LONGEST))
+
+
+def start_periods(plant: PlantModel, tracking_periods: float) -> float:
+    """Return the time at the first voltage, periods: three decays of the coupled pole, four times what the frequency takes to follow."""
+    decays = 3.0 * plant.frequency_rad_s / (-2.0 * math.pi * plant.coupled_pole_rad_s.real)
+    periods = 5.0 * math.ceil(max(decays, 4.0 * tracking_periods) / 5.0)
+    return float(min(max(periods, SHORTEST_START), LONGEST_START))
