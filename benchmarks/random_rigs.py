@@ -62,7 +62,7 @@ def drawn(seed: int) -> dict[str, Any]:
     for _ in range(50):
         try:
             bench = _drawn(draws)
-        except (ValidationError, NotConvergedError, ValueError, ArithmeticError):
+        except (ValidationError, NotConvergedError, ValueError, ArithmeticError, StopIteration):
             continue
         if bench is not None:
             bench["name"] = f"rig-{seed}"
@@ -498,7 +498,8 @@ def show(folder: Path, verbose: bool) -> None:
         print(
             f"    tune {plant['frequency_hz'] / one['true_hz'] - 1.0:+.2%}, damping {100.0 * plant['damping_ratio']:.3g} of "
             f"{100.0 * one['true_damping']:.3g} %, phi {plant['drive_mode_shape'] / one['true_shape'] - 1.0:+.1%}, fit "
-            f"{plant['fit_error']:.2%}, distortion {one['test']['distortion']:.2%}; {one['tune_s']:.0f} s + {one['run_s']:.0f} s; levels shift "
+            f"{plant['fit_error']:.2%}, distortion {one['test']['distortion']:.2%}; {one['tune_s']:.0f} s + {one['run_s']:.0f} s; "
+            f"levels shift "
             f"{shifts[-1] / shifts[0] - 1.0:+.2%}, within {sum(one['within'])} of {one['levels']}"
         )
         end = one["end"]
@@ -536,7 +537,7 @@ def main() -> None:
     running = commands.add_parser("run", help="tune and test every bench without a result")
     running.add_argument("-j", "--jobs", type=int, default=1, choices=(1, 2))
     running.add_argument("--timeout-s", type=float, default=900.0)
-    running.add_argument("--only", nargs="*", default=[])
+    running.add_argument("--only", action="append", default=[])
     showing = commands.add_parser("table", help="show the results")
     showing.add_argument("--json", action="store_true")
     showing.add_argument("-v", "--verbose", action="store_true")

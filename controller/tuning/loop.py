@@ -10,7 +10,7 @@ so that ``ln|Y| <- P a - R (b + delta)`` and ``arg Y <- R a + P (b + delta) - de
 lag is therefore ``T(s) = [P_F(s) - P_A(s)]/s``. The demodulators add their low-pass ``w_LP/(s + w_LP)``, the rig its delay.
 
 A nonlinear structure answers a change of its amplitude with a change of its frequency, ``delta w_0 = kappa ln|A|``, kappa
-positive where it hardens. That acts like a force on its mode, ``-2 w_0 delta w_0 q``, and closes one more loop inside the plant,
+positive where it hardens. That acts like a force on its mode, ``-2 w_0 delta w_0 q``, and closes one more loop in the plant,
 around the transfer function from delta w_0 to ln|A| (`ControlLoop.response_after_shift`).
 """
 
@@ -81,7 +81,7 @@ class ControlLoop:
         return np.stack(rows, axis=1) * self._smoothing(s)[:, None, None]
 
     def _after_shift(self, s: Complex) -> Complex:
-        """Return W(s) [n, 4]: from a shift of the mode's frequency (rad/s) to (ln|F|, arg F, ln|A|, arg A), before the low-pass.
+        """Return W(s) [n, 4]: from a shift of the mode (rad/s) to (ln|F|, arg F, ln|A|, arg A), before the low-pass.
 
         The shift acts like the force ``G = 2 w_0 shift A/(phi_d^2 W^2)`` on the mode alone: ``F <- -H_F beta Y_m G`` and ``A <-
         H_F alpha Y_m G``, with the mode's part Y_m of the accelerance.

@@ -68,7 +68,7 @@ def hardening_margins(loop: ControlLoop) -> tuple[float, float]:
     unstable at the first kappa for which ``kappa t(i w)`` is 1. Infinite if there is none.
     """
     omega = np.geomspace(1e-4, REACH, 600) * loop.omega_rad_s
-    transfer = loop.response_after_shift(1j * omega) * loop.plant.frequency_rad_s
+    transfer = loop.response_after_shift(np.asarray(1j * omega, np.complex128)) * loop.plant.frequency_rad_s
     across = np.flatnonzero(np.diff(np.sign(transfer.imag)) != 0)
     share = transfer.imag[across] / (transfer.imag[across] - transfer.imag[across + 1])
     real = transfer.real[across] + share * (transfer.real[across + 1] - transfer.real[across])

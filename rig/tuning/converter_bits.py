@@ -1,8 +1,8 @@
 """What the last bits of the converters do to the force, away from the frequency of the output.
 
-A converter rounds: its error has the RMS q/sqrt(12) for a bit of q, and spreads over all frequencies up to half the sample rate.
-At phase resonance the force per volt is a small part of what it is elsewhere, so that the error of the output is amplified
-against the force that is controlled.
+A converter rounds: its error has the RMS q/sqrt(12) for a bit of q, and spreads over all frequencies up to half the sample
+rate. At phase resonance the force per volt is a small part of what it is elsewhere, so that the error of the output is
+amplified against the force that is controlled.
 """
 
 import math

@@ -114,7 +114,7 @@ def choose(
             best = candidate
     if best is None:
         raise _unsuited(plant, responses, allowed[-1], tried)
-    w, share = best.loop.low_pass_rad_s, best.loop.frequency_law.integral_per_s / best.loop.low_pass_rad_s
+    w, share = best.loop.low_pass_rad_s, best.share
     designs = [assess(replace(best.loop, plant=other)) for other in _damped(plant)]
     return Chosen(
         law="frequency-error",
@@ -127,9 +127,9 @@ def choose(
         closed_form=hippold_gains(plant, w),
         slopes=best.slopes,
         outside=_beyond(best.loop, responses),
-        why=f"w_LP = w0/{omega / w:.3g} ({noise}), k = w_LP/{1 / share:.0f}, K = w_LP/{1 / best.response_share:.3g}: of those tried "
-        f"whose max |S| is at most {PEAK:g} with the damping measured, {OTHER_PEAK:g} with up to {DAMPINGS[-1]:g} times that, the "
-        "quickest of those that bear the steepest softening and hardening",
+        why=f"w_LP = w0/{omega / w:.3g} ({noise}), k = w_LP/{1 / share:.0f}, K = w_LP/{1 / best.response_share:.3g}: of those "
+        f"tried whose max |S| is at most {PEAK:g} with the damping measured, {OTHER_PEAK:g} with up to {DAMPINGS[-1]:g} times "
+        "that, the quickest of those that bear the steepest softening and hardening",
     )
 
 
@@ -138,6 +138,8 @@ class _Candidate:
     """Gains that may be chosen."""
 
     loop: ControlLoop
+    share: float
+    proportional: float
     response_share: float
     cancels: float
     slopes: tuple[float, float]
@@ -150,8 +152,7 @@ class _Candidate:
     @property
     def quickness(self) -> float:
         """Rate of the slower of the two loops, 1/s."""
-        law = self.loop.frequency_law
-        return min(law.integral_per_s / (1.0 + law.proportional), 0.5 * self.response_share * self.loop.low_pass_rad_s)
+        return self.loop.low_pass_rad_s * min(self.share / (1.0 + self.proportional), 0.5 * self.response_share)
 
 
 def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candidate]:
@@ -167,7 +168,7 @@ def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candi
         )
         softening, hardening = hardening_margins(loop)
         slopes = min(softening, hardening_margins(softer)[0]), min(hardening, hardening_margins(harder)[1])
-        out.append(_Candidate(loop, response, cancels, slopes))
+        out.append(_Candidate(loop, share, proportional, response, cancels, slopes))
     return out
 
 
@@ -198,9 +199,9 @@ def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, t
     slowest, beyond = assess(loop), _beyond(loop, responses)
     reasons = "; ".join(slowest.reasons) or f"max |S| above {PEAK:g}"
     return TuningError(
-        f"this rig is unsuited to complex response control with a frequency-error loop: {reasons} ({tried} sets of gains tried; "
-        f"the slowest, w_LP = w0/{loop.omega_rad_s / w:.3g}, has max |S| {_quick_peak(loop):.2f} and a gain of {beyond[0]:.2f} at "
-        f"{beyond[1]:.4g} Hz)"
+        f"this rig is unsuited to complex response control with a frequency-error loop: {reasons} ({tried} sets of gains "
+        f"tried; the slowest, w_LP = w0/{loop.omega_rad_s / w:.3g}, has max |S| {_quick_peak(loop):.2f} and a gain of "
+        f"{beyond[0]:.2f} at {beyond[1]:.4g} Hz)"
     )
 
 

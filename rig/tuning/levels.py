@@ -118,8 +118,8 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
     """Return the lowest useful force for a highest level.
 
     It is a part of the highest force, but at least a few bits of the input converter, and so large that rounding in both
-    converters adds no more than `ALIEN` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where that leaves less
-    than a span of `NARROW`, rounding may add `MORE_ALIEN`.
+    converters adds no more than `ALIEN` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where that
+    leaves less than a span of `NARROW`, rounding may add `MORE_ALIEN`.
     """
     force, highest_n = bench.channels[bench.index_of("force")], needed_n(plant, highest_m)
     read_n, sent_n = input_bits_n(bench), bits_force_n

@@ -113,8 +113,8 @@ def lines(found: dict[str, Any]) -> list[str]:
     )
     softening, hardening = found["slopes"]
     out.append(
-        f"slopes         d ln(frequency)/d ln(amplitude) from {-softening:.3g} to {hardening:+.3g} leave the loops stable; a cubic "
-        f"spring that has shifted the frequency by {100.0 * SHIFT_SHOWN:g} % has {2.0 * SHIFT_SHOWN:g}"
+        f"slopes         d ln(frequency)/d ln(amplitude) from {-softening:.3g} to {hardening:+.3g} leave the loops stable; a "
+        f"cubic spring that has shifted the frequency by {100.0 * SHIFT_SHOWN:g} % has {2.0 * SHIFT_SHOWN:g}"
     )
     out += [line for design in found["designs"] for line in _design_lines(design)]
     out.append(

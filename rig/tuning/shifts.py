@@ -85,9 +85,9 @@ def _first_peak(frequency: Real, size: Real) -> float | None:
 def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
     """Return the length of the ramps between levels, periods.
 
-    The force that lets a vibration grow comes on top of the one that holds it: it falls with the length of a ramp over ``1/(D
-    w_0)``. A frequency that changes with the level is followed late, by its change within ``tracking_periods``: a change of `PLAUSIBLE`
-    per level shall leave less than half of the half bandwidth ``D w_0``.
+    The force that lets a vibration grow comes on top of the one that holds it: it falls with the length of a ramp over
+    ``1/(D w_0)``. A frequency that changes with the level is followed late, by its change within ``tracking_periods``: a change
+    of `PLAUSIBLE` per level shall leave less than half of the half bandwidth ``D w_0``.
     """
     grows = TIMES / (2.0 * math.pi * plant.damping_ratio)
     follows = 0.5 * math.pi * PLAUSIBLE * tracking_periods / (0.5 * plant.damping_ratio)
@@ -95,7 +95,10 @@ def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
 
 
 def start_periods(plant: PlantModel, tracking_periods: float) -> float:
-    """Return the time at the first voltage, periods: three decays of the coupled pole, four times what the frequency takes to follow."""
+    """Return the time at the first voltage, periods.
+
+    It is three decays of the coupled pole, but at least four times what the frequency takes to follow.
+    """
     decays = 3.0 * plant.frequency_rad_s / (-2.0 * math.pi * plant.coupled_pole_rad_s.real)
     periods = 5.0 * math.ceil(max(decays, 4.0 * tracking_periods) / 5.0)
     return float(min(max(periods, SHORTEST_START), LONGEST_START))

@@ -12,11 +12,21 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.level_search import MultisineSeries
 from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
-from rig.tuning.levels import PART, SPAN, LevelChoice, choose_levels, low_pass, lowest_force, reach_m
+from rig.tuning.levels import (
+    NARROW,
+    PART,
+    SPAN,
+    LevelChoice,
+    LowestForce,
+    choose_levels,
+    low_pass,
+    lowest_force,
+    reach_m,
+)
 from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.plan import plan_text
-from rig.tuning.shifts import frequency_window
 from rig.tuning.plant import compared_with_bench, measured_ratios, plant_of
+from rig.tuning.shifts import frequency_window
 
 __all__ = ["Tuning", "TuningRequest", "tune"]
 
@@ -143,12 +153,8 @@ def tune(
     )
     window = frequency_window(bench, test.responses, plant)
     notes += _cautions(bench, test, levels)
-    if lowest.bound and request.from_m is None:
-        span, bits = levels.levels_m[-1] / levels.levels_m[0], levels.needed_v[-1] / bench.output_bit_v
-        notes += (
-            f"the levels span a factor of {span:.3g}, not {SPAN:g}: the lowest is bounded by {lowest.bound}; the highest has an output of "
-            f"{bits:.0f} bits: less gain behind the converter would leave room for lower levels",
-        )
+    if request.from_m is None:
+        notes += _narrow(bench, levels, lowest)
     return Tuning(
         bench=bench,
         test=test,
@@ -160,6 +166,17 @@ def tune(
         notes=notes,
         plan_toml=plan_text(named or name, bench, plant, measured, chosen, levels, window, Path(recording)),
     )
+
+
+def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> tuple[str, ...]:
+    """Return a note on levels that span little because of a converter's last bits."""
+    span, bits = levels.levels_m[-1] / levels.levels_m[0], levels.needed_v[-1] / bench.output_bit_v
+    if not lowest.bound or span > NARROW:
+        return ()
+    text = f"the levels span a factor of {span:.3g}, not {SPAN:g}: the lowest is bounded by {lowest.bound}"
+    if "output" in lowest.bound:
+        text += f"; the highest has an output of {bits:.0f} bits, less gain behind the converter leaves room for lower levels"
+    return (text,)
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:

@@ -78,8 +78,8 @@ def alien_objection(alien: float, accepted: float, output_bits: float = math.inf
     cause = "another mode, or a loop that swings"
     if output_bits < FEW_OUTPUT_BITS:
         cause = (
-            f"the output has an amplitude of {output_bits:.3g} bits of its converter, whose rounding is amplified off resonance "
-            f"(less gain behind the converter, or a higher level, helps); else {cause}"
+            f"the output has an amplitude of {output_bits:.3g} bits of its converter, whose rounding is amplified off "
+            f"resonance (less gain behind the converter, or a higher level, helps); else {cause}"
         )
     return f"{100.0 * alien:.1f} % of the force's RMS are no harmonics, accepted up to {100.0 * accepted:g} %: {cause}"
 
