@@ -498,8 +498,8 @@ def show(folder: Path, verbose: bool) -> None:
         print(
             f"    tune {plant['frequency_hz'] / one['true_hz'] - 1.0:+.2%}, damping {100.0 * plant['damping_ratio']:.3g} of "
             f"{100.0 * one['true_damping']:.3g} %, phi {plant['drive_mode_shape'] / one['true_shape'] - 1.0:+.1%}, fit "
-            f"{plant['fit_error']:.2%}, distortion {one['test']['distortion']:.2%}; {one['tune_s']:.0f} s + {one['run_s']:.0f} s; "
-            f"levels shift "
+            f"{plant['fit_error']:.2%}, distortion {one['test']['distortion']:.2%}; "
+            f"{one['tune_s']:.0f} s + {one['run_s']:.0f} s; levels shift "
             f"{shifts[-1] / shifts[0] - 1.0:+.2%}, within {sum(one['within'])} of {one['levels']}"
         )
         end = one["end"]

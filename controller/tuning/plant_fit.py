@@ -61,7 +61,9 @@ def fitted(
         if exciter_prior is None:
             return np.zeros(0)
         spring, mass, jerk = x[9], x[11], x[12]
-        return np.array([spring, jerk]) / (exciter_prior * max(abs(mass), 1e-3 * float(np.max(np.abs(start[9:])))))
+        return np.asarray(
+            np.array([spring, jerk]) / (exciter_prior * max(abs(mass), 1e-3 * float(np.max(np.abs(start[9:])))))
+        )
 
     x = least_squares(
         residuals,
