@@ -1,5 +1,6 @@
 """Design gains for a measured plant: of a few candidates, the quickest that keep a bound on the sensitivity."""
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 from itertools import product
@@ -37,7 +38,7 @@ LOW_PASSES = (5.0, 10.0, 20.0)  # candidates: resonance frequency divided by the
 SHARES = (1.0 / 8.0, 1.0 / 16.0, 1.0 / 40.0)  # of the low-pass: integral gain of the frequency error
 PROPORTIONALS = (0.0, 0.3, 0.7)  # proportional gain of the frequency error
 RESPONSE_SHARES = (3.0 / 8.0, 1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0)  # of the low-pass: integral gain of the response loop
-CANCELS = (1.0, 0.25)  # part of the proportional gain that cancels the coupled pole
+CANCELS = (1.0, 0.25, 1.6, 1.5 * cmath.exp(-0.34j))  # times the proportional gain that cancels the coupled pole
 SOFTENS, HARDENS = 0.06, 0.25  # wanted: d ln(frequency)/d ln(amplitude) up to which the loops stay stable
 SOFTENED, HARDENED = (
     -0.05,
@@ -58,8 +59,8 @@ class Chosen:
     """Frequency law: ``frequency-error`` (with complex response control) or ``phase`` (levels in volts)."""
     low_pass_rad_s: float
     """Low-pass w_LP, rad/s."""
-    cancels: float
-    """Part of the proportional gain of the response loop that would cancel the coupled pole; 0 for the phase law."""
+    cancels: complex
+    """Proportional gain of the response loop over the one that would cancel the coupled pole; 0 for the phase law."""
     share: float
     """Integral gain of the frequency-error loop over w_LP; 0 for the phase law."""
     force_share: float
@@ -141,7 +142,7 @@ class _Candidate:
     share: float
     proportional: float
     response_share: float
-    cancels: float
+    cancels: complex
     slopes: tuple[float, float]
 
     @property
@@ -158,7 +159,10 @@ class _Candidate:
 def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candidate]:
     out = []
     gains = product(low_passes_rad_s, SHARES, PROPORTIONALS, RESPONSE_SHARES, CANCELS)
+    pole = plant.pole_offset_rad_s()
     for w, share, proportional, response, cancels in gains:
+        if (pole / cancels).real >= 0.0:
+            continue  # a plan allows stable poles alone
         law = complex_response_law(plant, w, share=response, smoothing_rad_s=w)
         law = replace(law, proportional=cancels * law.proportional)
         loop = ControlLoop(plant, w, FrequencyErrorLaw(share * w, proportional), law)
@@ -278,13 +282,13 @@ def gains_of(chosen: Chosen) -> dict[str, float | tuple[float, float]]:
     response = loop.amplitude_law
     if not isinstance(response, ComplexResponseLaw):
         raise TypeError("amplitude_law: allowed is complex response control")
-    pole = loop.plant.pole_offset_rad_s()
+    pole = loop.plant.pole_offset_rad_s() / chosen.cancels
     proportional = {"frequency_proportional": law.proportional} if law.proportional else {}
     return {
         "frequency_integral_per_s": law.integral_per_s,
         **proportional,
         "response_integral_per_s": response.integral_per_s,
-        "plant_pole_rad_s": (pole.real / chosen.cancels, pole.imag / chosen.cancels),
+        "plant_pole_rad_s": (pole.real, pole.imag),
         "reference_integral_per_s": chosen.force_share * loop.low_pass_rad_s,
         "drive_mode_shape": loop.plant.drive_shape,
     }

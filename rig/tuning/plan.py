@@ -137,9 +137,7 @@ def _gains(chosen: Chosen) -> list[str]:
         if key in COMMENTS:
             out.append(f"# {COMMENTS[key]}")
         if key == "plant_pole_rad_s" and chosen.cancels != 1.0:
-            out.append(
-                f"# Times {1.0 / chosen.cancels:g}: with less proportional gain than cancels it the loop bears more hardening."
-            )
+            out.append("# Not quite: another proportional gain than the one that cancels it bears more hardening.")
         out.append(_line(key, [significant(v) for v in value] if isinstance(value, tuple) else significant(value)))
     return out
 
