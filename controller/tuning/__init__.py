@@ -24,6 +24,7 @@ from controller.tuning.stability import (
     Margins,
     closed_loop_poles,
     gains_at_half,
+    hardening_margins,
     margins,
     unstable_poles,
 )
@@ -54,6 +55,7 @@ __all__ = [
     "exact_scheduled_law",
     "frequency_error_law",
     "gains_at_half",
+    "hardening_margins",
     "hippold_gains",
     "lag_per_frequency",
     "low_pass_from_densities",

@@ -8,6 +8,10 @@ output, ``delta = Omega/s``, becomes ``h c`` behind a linear plant, with the env
 
 so that ``ln|Y| <- P a - R (b + delta)`` and ``arg Y <- R a + P (b + delta) - delta``. The transfer function from frequency to
 lag is therefore ``T(s) = [P_F(s) - P_A(s)]/s``. The demodulators add their low-pass ``w_LP/(s + w_LP)``, the rig its delay.
+
+A nonlinear structure answers a change of its amplitude with a change of its frequency, ``delta w_0 = kappa ln|A|``, kappa
+positive where it hardens. That acts like a force on its mode, ``-2 w_0 delta w_0 q``, and closes one more loop in the plant,
+around the transfer function from delta w_0 to ln|A| (`ControlLoop.response_after_shift`).
 """
 
 from collections.abc import Callable
@@ -76,6 +80,23 @@ class ControlLoop:
             rows += [np.stack([p, -r, -r / s], axis=-1), np.stack([r, p, (p - 1.0) / s], axis=-1)]
         return np.stack(rows, axis=1) * self._smoothing(s)[:, None, None]
 
+    def _after_shift(self, s: Complex) -> Complex:
+        """Return W(s) [n, 4]: from a shift of the mode (rad/s) to (ln|F|, arg F, ln|A|, arg A), before the low-pass.
+
+        The shift acts like the force ``G = 2 w_0 shift A/(phi_d^2 W^2)`` on the mode alone: ``F <- -H_F beta Y_m G`` and ``A <-
+        H_F alpha Y_m G``, with the mode's part Y_m of the accelerance.
+        """
+        out = np.zeros((s.size, 4), np.complex128)
+        for sign in (1.0, -1.0):
+            carrier = 1j * sign * self.omega_rad_s
+            alpha, beta = self.plant.exciter(s + carrier)
+            driven = self.plant.force_per_v(s + carrier) * self.plant.mode_accelerance(s + carrier)
+            driven *= 2.0 * self.plant.frequency_rad_s / (self.plant.drive_shape * self.omega_rad_s) ** 2
+            for row, relative in ((0, -beta * driven * self.plant.accelerance(carrier)), (2, alpha * driven)):
+                out[:, row] += 0.5 * relative
+                out[:, row + 1] += -0.5j * sign * relative
+        return out
+
     def _smoothing(self, s: Complex) -> Complex:
         return np.asarray(self.low_pass_rad_s / (s + self.low_pass_rad_s) * np.exp(-s * self.plant.delay_s))
 
@@ -140,6 +161,17 @@ class ControlLoop:
             inputs[:, :2] = self.amplitude_law.level(s, self.plant, self.lag_deg)
         outputs = self._closed(s, inputs)
         return outputs[:, 2], self._lag(outputs)
+
+    def response_after_shift(self, s: Complex) -> Complex:
+        """Return the transfer function from a shift of the mode's frequency (rad/s) to ln|A| of the vibration itself.
+
+        The mode alone is shifted; the exciter stays as it is, unlike in `lag_after_frequency`.
+        """
+        shifted, smoothing = self._after_shift(s), self._smoothing(s)
+        demanded = self.feedback(s) @ (shifted * smoothing[:, None])[:, :, None]
+        actuators = -np.linalg.solve(self.return_difference(s), demanded)[:, :, 0]
+        moved = self.measured(s)[:, 2] / smoothing[:, None]
+        return np.asarray(shifted[:, 2] + np.sum(moved * actuators, axis=1))
 
     def _outputs(self, s: Complex, actuator: int, drive: Complex) -> Complex:
         inputs = np.zeros((s.size, 3), np.complex128)

@@ -79,8 +79,13 @@ class PlantModel:
         """Return Y: acceleration of the drive point per force on the structure alone (1/kg), at complex s (rad/s)."""
         s = np.asarray(s, dtype=np.complex128)
         constant, rising = self.residual_per_kg
+        return np.asarray(self.mode_accelerance(s) + constant + rising * (s / self.centre_rad_s) ** 2)
+
+    def mode_accelerance(self, s: ArrayLike) -> Complex:
+        """Return the part of Y that is due to the mode alone (1/kg), at complex s (rad/s)."""
+        s = np.asarray(s, dtype=np.complex128)
         pole = s**2 + 2.0 * self.damping_ratio * self.frequency_rad_s * s + self.frequency_rad_s**2
-        return np.asarray(self.drive_shape**2 * s**2 / pole + constant + rising * (s / self.centre_rad_s) ** 2)
+        return np.asarray(self.drive_shape**2 * s**2 / pole)
 
     def exciter(self, s: ArrayLike) -> tuple[Complex, Complex]:
         """Return alpha (V/N) and beta (V s^2/m) of the exciter, ``u = alpha F + beta A``, at complex s."""
@@ -206,11 +211,20 @@ class PlantModel:
         force_std: ArrayLike | None = None,
         acceleration_std: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
+        exciter_prior: float | None = None,
     ) -> Self:
         """Fit the plant to measured FRFs from voltage; see `controller.tuning.plant_fit.fitted`."""
         from controller.tuning.plant_fit import fitted
 
-        found = fitted(frequency_hz, force_per_v, acceleration_per_v, force_std, acceleration_std, covariance)
+        found = fitted(
+            frequency_hz,
+            force_per_v,
+            acceleration_per_v,
+            force_std,
+            acceleration_std,
+            covariance,
+            exciter_prior=exciter_prior,
+        )
         return cls(**found, sample_rate_hz=sample_rate_hz, latency_samples=latency_samples)
 
 

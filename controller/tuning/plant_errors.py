@@ -21,14 +21,15 @@ Complex = NDArray[np.complex128]
 def parameter_std(jacobian: Real, residuals: Real, weights: Real, covariance: Complex | None) -> Real:
     """Return the standard errors of the parameters, float[p].
 
-    ``residuals`` float[4 n] are the weighted errors of n lines: real parts of both responses, then imaginary parts;
-    ``jacobian`` float[4 n, p] is their derivative, ``weights`` float[2, n] their weights. ``covariance`` complex[n, 2, 2] is
-    ``E[e e^H]`` of both responses line by line, circular and independent between lines. If it is None, the noise is taken from
-    the residuals, equal on all lines of a response.
+    ``residuals`` float[4 n + m] are the weighted errors of n lines, real parts of both responses, then imaginary parts, and
+    those of m priors, which are no measurement. ``jacobian`` float[4 n + m, p] is their derivative, ``weights`` float[2, n] the
+    weights of the lines. ``covariance`` complex[n, 2, 2] is ``E[e e^H]`` of both responses line by line, circular and
+    independent between lines. If it is None, the noise is taken from the residuals, equal on all lines of a response.
     """
     lines = weights.shape[1]
     left, size, right = np.linalg.svd(jacobian / (scale := np.linalg.norm(jacobian, axis=0)), full_matrices=False)
-    inverse = (right.T / size) @ left.T / scale[:, None]
+    inverse = ((right.T / size) @ left.T / scale[:, None])[:, : 4 * lines]
+    left, residuals = left[: 4 * lines], residuals[: 4 * lines]
     if covariance is None:
         parts = residuals.reshape(2, 2, lines)
         share = (4 * lines - size.size) / (4 * lines)  # of the noise that the fit leaves in the residuals

@@ -27,12 +27,19 @@ def fitted(
     force_std: ArrayLike | None = None,
     acceleration_std: ArrayLike | None = None,
     covariance: ArrayLike | None = None,
+    *,
+    exciter_prior: float | None = None,
 ) -> dict[str, Any]:
     """Fit the FRFs [n] in a band around one mode; return the identified fields of a `PlantModel`.
 
     The mode is taken at the peak of the accelerance. Linear least squares give the start values: for the accelerance by the
     iteration of Sanathanan and Koerner (1963), for the exciter from ``1 = alpha H_F + beta H_A``. Nonlinear least squares then
     fit both FRFs, weighted by their standard deviations ([n] or one number each; by default the root mean square of each FRF).
+    Near one mode, with small residuals, force and motion of the exciter cannot be separated: ``beta + x (z^2 + 2 D w z +
+    w^2)/z^2`` with ``alpha - x phi_d^2`` has the same FRFs for any x, for an attached mass whose spring tunes it to the mode is
+    not seen. ``exciter_prior`` then decides: it is the standard deviation of the exciter's spring, and of its jerk term,
+    relative to its moving mass. It counts little where the data decide. None: no prior.
+
     Coefficients are real, so that ``H(-i w)`` is the conjugate of ``H(i w)`` by construction.
 
     ``covariance`` complex[n, 2, 2] is that of the errors of both FRFs, ``E[e e^H]`` line by line: it gives the standard errors
@@ -57,7 +64,15 @@ def fitted(
     def residuals(x: Real) -> Real:
         model_f, model_a = _model(x, s, centre)
         error = np.concatenate([(model_f - h_f) * weight_f, (model_a - h_a) * weight_a])
-        return np.concatenate([error.real, error.imag])
+        return np.concatenate([error.real, error.imag, prior(x)])
+
+    def prior(x: Real) -> Real:
+        if exciter_prior is None:
+            return np.zeros(0)
+        spring, mass, jerk = x[9], x[11], x[12]
+        return np.asarray(
+            np.array([spring, jerk]) / (exciter_prior * max(abs(mass), 1e-3 * float(np.max(np.abs(start[9:])))))
+        )
 
     found = least_squares(
         residuals,

@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from controller.tuning.laws import ComplexResponseLaw
 from controller.tuning.loop import ControlLoop
 
-__all__ = ["LARGEST_AT_HALF", "Margins", "closed_loop_poles", "gains_at_half", "margins", "unstable_poles"]
+__all__ = [
+    "LARGEST_AT_HALF",
+    "Margins",
+    "closed_loop_poles",
+    "gains_at_half",
+    "hardening_margins",
+    "margins",
+    "unstable_poles",
+]
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -50,6 +58,23 @@ def unstable_poles(loop: ControlLoop) -> int:
     offsets = loop.plant.poles_rad_s - 1j * omega
     known = 2 * int(np.sum((offsets.real > INSET * omega) & (np.abs(offsets) < radius)))
     return _windings(loop.determinant, INSET * omega, radius) + known
+
+
+def hardening_margins(loop: ControlLoop) -> tuple[float, float]:
+    """Return the softening and the hardening (both from 0) up to which a loop that is stable on the linear plant stays stable.
+
+    Both are changes of the mode's frequency for a relative change of its amplitude, ``d ln w_0 / d ln a``: a hardening kappa
+    closes the loop ``1 - kappa t(s)`` around t, the transfer function from a shift of the mode to its amplitude. It becomes
+    unstable at the first kappa for which ``kappa t(i w)`` is 1. Infinite if there is none.
+    """
+    omega = np.geomspace(1e-4, REACH, 600) * loop.omega_rad_s
+    transfer = loop.response_after_shift(np.asarray(1j * omega, np.complex128)) * loop.plant.frequency_rad_s
+    across = np.flatnonzero(np.diff(np.sign(transfer.imag)) != 0)
+    share = transfer.imag[across] / (transfer.imag[across] - transfer.imag[across + 1])
+    real = transfer.real[across] + share * (transfer.real[across + 1] - transfer.real[across])
+    real = np.append(real, transfer.real[0])  # standing still
+    softening, hardening = (float(np.max(sign * real, initial=0.0)) for sign in (-1.0, 1.0))
+    return tuple(1.0 / most if most > 0.0 else math.inf for most in (softening, hardening))  # type: ignore[return-value]
 
 
 def gains_at_half(loop: ControlLoop) -> dict[str, float]:

@@ -138,6 +138,8 @@ class Bench(Configured):
     """Samples swapped a call."""
     output_range_v: float = Field(10.0, gt=0, le=100)
     """Range of the output converter, V."""
+    output_resolution_v: float | None = Field(None, gt=0, le=1)
+    """Voltage of the output converter's least bit, V; if None, that of 16 bit over its range."""
     channels: tuple[Channel, ...] = Field(min_length=2)
     """The input channels, in the device's order."""
     limits: Limits
@@ -148,6 +150,11 @@ class Bench(Configured):
     """Who may arm it; a virtual rig arms itself."""
     emergency_stop: EmergencyStop | None = None
     """A switch that stops, where there is one."""
+
+    @property
+    def output_bit_v(self) -> float:
+        """Voltage of the output converter's least bit, V."""
+        return self.output_resolution_v or 2.0 * self.output_range_v / 65536.0
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -1,22 +1,27 @@
 """Design gains for a measured plant: of a few candidates, the quickest that keep a bound on the sensitivity."""
 
+import cmath
 import math
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Literal
 
 import numpy as np
 
 from controller.tuning import (
+    LARGEST_AT_HALF,
     ComplexResponseLaw,
     ControlLoop,
     Design,
+    FrequencyErrorLaw,
     HippoldGains,
     PhaseLaw,
     PlantModel,
     assess,
     complex_response_law,
     design_phase_law,
-    frequency_error_law,
+    gains_at_half,
+    hardening_margins,
     hippold_gains,
     margins,
     unstable_poles,
@@ -29,8 +34,17 @@ __all__ = ["Chosen", "LawName", "choose", "gains_of"]
 
 LawName = Literal["frequency-error", "phase"]
 DAMPINGS = (1.0, 2.0, 4.0)  # damping at higher levels, as multiples of the damping in the linear test
-LOW_PASSES = (5.0, 7.0, 10.0, 14.0, 20.0)  # candidates: resonance frequency divided by these
-SHARES = (1.0 / 8.0, 1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0)  # of the low-pass: gain of the frequency-error loop
+LOW_PASSES = (5.0, 10.0, 20.0)  # candidates: resonance frequency divided by these
+SHARES = (1.0 / 8.0, 1.0 / 16.0, 1.0 / 40.0)  # of the low-pass: integral gain of the frequency error
+PROPORTIONALS = (0.0, 0.3, 0.7)  # proportional gain of the frequency error
+RESPONSE_SHARES = (3.0 / 8.0, 1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0)  # of the low-pass: integral gain of the response loop
+CANCELS = (1.0, 0.25, 1.6, 1.5 * cmath.exp(-0.34j))  # times the proportional gain that cancels the coupled pole
+SOFTENS, HARDENS = 0.06, 0.25  # wanted: d ln(frequency)/d ln(amplitude) up to which the loops stay stable
+SOFTENED, HARDENED = (
+    -0.05,
+    0.1,
+)  # of the frequency: shifts at which a softening or hardening structure stays stable as well
+WORSE = 0.2  # of the wanted range of slopes (2: all of it) that is given away for quicker gains
 PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| allowed for chosen gains, at the measured damping and at other dampings
 OUTSIDE = 0.5  # largest gain of the response loop at other modes
 FORCE_SHARES = (1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0, 1.0 / 36.0, 1.0 / 50.0, 1.0 / 100.0)  # of the low-pass
@@ -45,8 +59,10 @@ class Chosen:
     """Frequency law: ``frequency-error`` (with complex response control) or ``phase`` (levels in volts)."""
     low_pass_rad_s: float
     """Low-pass w_LP, rad/s."""
+    cancels: complex
+    """Proportional gain of the response loop over the one that would cancel the coupled pole; 0 for the phase law."""
     share: float
-    """Gain of the frequency-error loop over w_LP; 0 for the phase law."""
+    """Integral gain of the frequency-error loop over w_LP; 0 for the phase law."""
     force_share: float
     """Gain over w_LP with which the loop may hold a force through the response; 0 for the phase law."""
     design: Design
@@ -55,10 +71,20 @@ class Chosen:
     """Loops for two and four times the plant's damping."""
     closed_form: HippoldGains
     """Gains by the closed form of Hippold et al. for the same low-pass, for comparison."""
+    slopes: tuple[float, float]
+    """Softening and hardening, both from 0, as d ln(frequency)/d ln(amplitude), up to which the loops stay stable."""
     outside: tuple[float, float]
     """Largest gain of the response loop at the measured lines beyond the model's band, and its frequency (Hz)."""
     why: str
     """How the low-pass and the gains were chosen."""
+
+    @property
+    def tracking_periods(self) -> float:
+        """Periods in which the frequency comes nearer to the resonance by a factor e, on the plant as measured."""
+        law, loop = self.design.loop.frequency_law, self.design.loop
+        half_bandwidth = loop.plant.damping_ratio * loop.plant.frequency_rad_s
+        rate = law.integral_per_s if isinstance(law, FrequencyErrorLaw) else law.integral_per_s2 / half_bandwidth
+        return loop.omega_rad_s / (2.0 * math.pi * rate)
 
     @property
     def sensitivity_peak(self) -> float:
@@ -79,35 +105,107 @@ def choose(
         allowed.insert(0, largest_low_pass_rad_s)
     if law == "phase":
         return _phase(plant, allowed[0], noise)
-    tried: list[str] = []
-    for w in allowed:
-        for share in SHARES:
-            loops = [_loop(plant.at(damping_ratio=plant.damping_ratio * part), plant, w, share) for part in DAMPINGS]
-            peak, *others = (_quick_peak(loop) for loop in loops)
-            beyond = _beyond(loops[0], responses)
-            tried.append(f"w_LP = w0/{omega / w:.3g}, k = w_LP/{1 / share:.0f}: max |S| {peak:.2f}")
-            if peak > PEAK or max(others) > OTHER_PEAK or beyond[0] > OUTSIDE:
-                continue
-            designs = [assess(loop) for loop in loops]
-            if not designs[0].suited:
-                continue
-            return Chosen(
-                law="frequency-error",
-                low_pass_rad_s=w,
-                share=share,
-                force_share=_force_share(plant, w, share),
-                design=designs[0],
-                others=tuple(designs[1:]),
-                closed_form=hippold_gains(plant, w),
-                outside=beyond,
-                why=f"w_LP = w0/{omega / w:.3g} ({noise}), k = w_LP/{1 / share:.0f}: the quickest of those tried whose "
-                f"max |S| is at most {PEAK:g} with the damping measured, {OTHER_PEAK:g} with up to {DAMPINGS[-1]:g} times that",
-            )
-    best = assess(_loop(plant, plant, allowed[-1], SHARES[-1]))
-    reasons = "; ".join(best.reasons) or f"max |S| above {PEAK:g}"
-    raise TuningError(
-        f"this rig is unsuited to complex response control with a frequency-error loop: {reasons} (tried: "
-        f"{tried[0]}; ... {tried[-1]}; gain of {beyond[0]:.2f} at {beyond[1]:.4g} Hz)"
+    tried = 0
+    best = None
+    for candidate in sorted(_candidates(plant, allowed), key=lambda one: -one.worth):
+        if best is not None and candidate.worth < best.worth - WORSE:
+            break
+        tried += 1
+        if (best is None or candidate.quickness > best.quickness) and _suits(candidate.loop, plant, responses):
+            best = candidate
+    if best is None:
+        raise _unsuited(plant, responses, allowed[-1], tried)
+    w, share = best.loop.low_pass_rad_s, best.share
+    designs = [assess(replace(best.loop, plant=other)) for other in _damped(plant)]
+    return Chosen(
+        law="frequency-error",
+        low_pass_rad_s=w,
+        cancels=best.cancels,
+        share=share,
+        force_share=_force_share(best.loop),
+        design=designs[0],
+        others=tuple(designs[1:]),
+        closed_form=hippold_gains(plant, w),
+        slopes=best.slopes,
+        outside=_beyond(best.loop, responses),
+        why=f"w_LP = w0/{omega / w:.3g} ({noise}), k = w_LP/{1 / share:.0f}, K = w_LP/{1 / best.response_share:.3g}: of those "
+        f"tried whose max |S| is at most {PEAK:g} with the damping measured, {OTHER_PEAK:g} with up to {DAMPINGS[-1]:g} times "
+        "that, the quickest of those that bear the steepest softening and hardening",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """Gains that may be chosen."""
+
+    loop: ControlLoop
+    share: float
+    proportional: float
+    response_share: float
+    cancels: complex
+    slopes: tuple[float, float]
+
+    @property
+    def worth(self) -> float:
+        """Part of the wanted range of softening and hardening that the loop bears, from 0 to 2."""
+        return min(self.slopes[0] / SOFTENS, 1.0) + min(self.slopes[1] / HARDENS, 1.0)
+
+    @property
+    def quickness(self) -> float:
+        """Rate of the slower of the two loops, 1/s."""
+        return self.loop.low_pass_rad_s * min(self.share / (1.0 + self.proportional), 0.5 * self.response_share)
+
+
+def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candidate]:
+    out = []
+    gains = product(low_passes_rad_s, SHARES, PROPORTIONALS, RESPONSE_SHARES, CANCELS)
+    pole = plant.pole_offset_rad_s()
+    for w, share, proportional, response, cancels in gains:
+        if (pole / cancels).real >= 0.0:
+            continue  # a plan allows stable poles alone
+        law = complex_response_law(plant, w, share=response, smoothing_rad_s=w)
+        law = replace(law, proportional=cancels * law.proportional)
+        loop = ControlLoop(plant, w, FrequencyErrorLaw(share * w, proportional), law)
+        softer, harder = (
+            replace(loop, plant=plant.at(frequency_rad_s=(1.0 + shift) * plant.frequency_rad_s))
+            for shift in (SOFTENED, HARDENED)
+        )
+        softening, hardening = hardening_margins(loop)
+        slopes = min(softening, hardening_margins(softer)[0]), min(hardening, hardening_margins(harder)[1])
+        out.append(_Candidate(loop, share, proportional, response, cancels, slopes))
+    return out
+
+
+def _damped(plant: PlantModel) -> list[PlantModel]:
+    return [plant.at(damping_ratio=plant.damping_ratio * part) for part in DAMPINGS]
+
+
+def _suits(loop: ControlLoop, plant: PlantModel, responses: FrequencyResponseMatrix) -> bool:
+    """Whether a loop keeps all bounds: of the sensitivity, of its gain at other modes, and of its quickness."""
+    if _beyond(loop, responses)[0] > OUTSIDE or max(gains_at_half(loop).values()) > LARGEST_AT_HALF:
+        return False
+    bounds = (PEAK, *(OTHER_PEAK for _ in DAMPINGS[1:]))
+    if any(
+        _quick_peak(replace(loop, plant=other)) > bound for other, bound in zip(_damped(plant), bounds, strict=True)
+    ):
+        return False
+    return assess(loop).suited
+
+
+def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, tried: int) -> TuningError:
+    """Return the error for a plant that no gains suit, with the reasons for the slowest."""
+    loop = ControlLoop(
+        plant,
+        w,
+        FrequencyErrorLaw(SHARES[-1] * w),
+        complex_response_law(plant, w, share=RESPONSE_SHARES[-1], smoothing_rad_s=w),
+    )
+    slowest, beyond = assess(loop), _beyond(loop, responses)
+    reasons = "; ".join(slowest.reasons) or f"max |S| above {PEAK:g}"
+    return TuningError(
+        f"this rig is unsuited to complex response control with a frequency-error loop: {reasons} ({tried} sets of gains "
+        f"tried; the slowest, w_LP = w0/{loop.omega_rad_s / w:.3g}, has max |S| {_quick_peak(loop):.2f} and a gain of "
+        f"{beyond[0]:.2f} at {beyond[1]:.4g} Hz)"
     )
 
 
@@ -120,29 +218,28 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
     return Chosen(
         law="phase",
         low_pass_rad_s=w,
+        cancels=0.0,
         share=0.0,
         force_share=0.0,
         design=measured,
         others=tuple(assess(replace(design.loop, plant=other)) for other in plants[1:]),
         closed_form=hippold_gains(plant, w),
+        slopes=hardening_margins(measured.loop),
         outside=(0.0, 0.0),
         why=f"w_LP = w0/{plant.lock_frequency_rad_s() / w:.3g} ({noise}); {'; '.join(design.notes)}",
     )
 
 
-def _force_share(plant: PlantModel, w: float, share: float) -> float:
+def _force_share(loop: ControlLoop) -> float:
     """Return the largest trial gain of the outer force loop, around frequency and response law, with a gain margin of 1.5.
 
     If no trial gain has this margin, return the last one of `FORCE_SHARES`.
     """
-    loops = ((part, _loop(plant, plant, w, share, 1.5 * part)) for part in FORCE_SHARES)
-    return next((part for part, loop in loops if unstable_poles(loop) == 0), FORCE_SHARES[-1])
-
-
-def _loop(plant: PlantModel, measured: PlantModel, w: float, share: float, force_share: float = 0.0) -> ControlLoop:
-    """Return the loop of both laws around ``plant``, with gains designed for the ``measured`` plant."""
-    response = complex_response_law(measured, w, smoothing_rad_s=w, force_share=force_share)
-    return ControlLoop(plant, w, frequency_error_law(w, share=share), response)
+    law, w = loop.amplitude_law, loop.low_pass_rad_s
+    if not isinstance(law, ComplexResponseLaw):
+        return FORCE_SHARES[-1]
+    trials = ((part, replace(loop, amplitude_law=replace(law, force_per_s=1.5 * part * w))) for part in FORCE_SHARES)
+    return next((part for part, trial in trials if unstable_poles(trial) == 0), FORCE_SHARES[-1])
 
 
 def _quick_peak(loop: ControlLoop) -> float:
@@ -185,9 +282,11 @@ def gains_of(chosen: Chosen) -> dict[str, float | tuple[float, float]]:
     response = loop.amplitude_law
     if not isinstance(response, ComplexResponseLaw):
         raise TypeError("amplitude_law: allowed is complex response control")
-    pole = loop.plant.pole_offset_rad_s()
+    pole = loop.plant.pole_offset_rad_s() / chosen.cancels
+    proportional = {"frequency_proportional": law.proportional} if law.proportional else {}
     return {
         "frequency_integral_per_s": law.integral_per_s,
+        **proportional,
         "response_integral_per_s": response.integral_per_s,
         "plant_pole_rad_s": (pole.real, pole.imag),
         "reference_integral_per_s": chosen.force_share * loop.low_pass_rad_s,

@@ -10,8 +10,9 @@ from controller.tuning import LowPassChoice, PlantModel, low_pass_from_densities
 from rig.bench import Bench
 from rig.campaigns.planning.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
+from rig.tuning.converter_bits import input_bits_n
 
-__all__ = ["LevelChoice", "choose_levels", "low_pass", "lowest_force_n", "needed_v", "reach_m"]
+__all__ = ["LevelChoice", "LowestForce", "choose_levels", "low_pass", "lowest_force", "needed_v", "reach_m"]
 
 LAG_STD_DEG = 0.75  # standard deviation of the lag before the settle rule averages it over ten periods
 RAISED = 3.0  # factor by which the lowest force may be raised
@@ -49,7 +50,11 @@ def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float)
 
 PART = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
 SPAN = 30.0  # highest level over lowest, where noise allows
+LEAST_SPAN = 3.0  # highest level over lowest that rounding may reduce it to; the lowest points may then be refused
 BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
+ALIEN = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
+NARROW = 10.0  # span below which rounding may add more, and the plan accepts more
+MORE_ALIEN, ACCEPTED_ALIEN = 0.15, 0.25
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,8 @@ class LevelChoice:
     """Force of each level on the linear plant, N peak."""
     why: str
     """What bounds the levels."""
+    accepted_alien: float | None = None
+    """Part of the force away from its harmonics that the plan must accept, because rounding causes it; None: the usual one."""
 
 
 def needed_v(plant: PlantModel, level_m: float) -> float:
@@ -95,11 +102,40 @@ def reach_m(bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> tup
     return ends[end], end
 
 
-def lowest_force_n(bench: Bench, plant: PlantModel, highest_m: float) -> float:
-    """Lowest useful force: a part of the highest force, but at least a few bits of the converter."""
-    force = next(channel for channel in bench.channels if channel.role == "force")
-    bit = force.resolution_v / abs(force.sensitivity_v_per_unit)
-    return max(needed_n(plant, highest_m) / SPAN, BITS * bit)
+@dataclass(frozen=True)
+class LowestForce:
+    """Lowest useful force."""
+
+    force_n: float
+    """The force, N peak."""
+    bound: str = ""
+    """What keeps it from being lower; empty if it is a part of the highest force."""
+    accepted_alien: float | None = None
+    """As in `LevelChoice`."""
+
+
+def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n: float) -> LowestForce:
+    """Return the lowest useful force for a highest level.
+
+    It is a part of the highest force, but at least a few bits of the input converter, and so large that rounding in both
+    converters adds no more than `ALIEN` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where that
+    leaves less than a span of `NARROW`, rounding may add `MORE_ALIEN`.
+    """
+    force, highest_n = bench.channels[bench.index_of("force")], needed_n(plant, highest_m)
+    read_n, sent_n = input_bits_n(bench), bits_force_n
+    rounded_n = math.hypot(read_n, sent_n)
+    few_n = max(highest_n / SPAN, BITS * force.resolution_v / abs(force.sensitivity_v_per_unit))
+    quiet_n = math.sqrt(2.0) * rounded_n / ALIEN
+    if max(few_n, quiet_n) == highest_n / SPAN:
+        return LowestForce(few_n)
+    if quiet_n <= few_n:
+        return LowestForce(min(few_n, highest_n / LEAST_SPAN), "two bits of the force's converter")
+    which = "output" if sent_n > read_n else "force"
+    bound = f"the last bits of the {which} converter, which add {rounded_n:.2g} N RMS at other frequencies"
+    if quiet_n <= highest_n / NARROW:
+        return LowestForce(quiet_n, bound)
+    more_n = max(few_n, math.sqrt(2.0) * rounded_n / MORE_ALIEN)
+    return LowestForce(min(max(more_n, highest_n / NARROW), highest_n / LEAST_SPAN), bound, ACCEPTED_ALIEN)
 
 
 def choose_levels(
@@ -107,7 +143,7 @@ def choose_levels(
     plant: PlantModel,
     ratios: Mapping[str, float],
     *,
-    lowest_n: float,
+    lowest: LowestForce,
     from_m: float | None = None,
     to_m: float | None = None,
     points: int = 8,
@@ -117,20 +153,21 @@ def choose_levels(
     ``ratios`` are as for `reach_m`. Raises `ConfigurationError` for a level that the bench cannot reach.
     """
     reach, limit = reach_m(bench, plant, ratios)
+    told = lowest.force_n / needed_n(plant, 1.0)
+    first = told if from_m is None else from_m
     highest = PART * reach if to_m is None else to_m
-    lowest = lowest_n / needed_n(plant, 1.0) if from_m is None else from_m
     if highest > reach:
         raise ConfigurationError(
             f"`to_m` = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "
             f"linear plant (it would need {needed_v(plant, highest):.3g} V)"
         )
-    if not 0.0 < lowest < highest:
+    if not 0.0 < first < highest:
         raise ConfigurationError(
-            f"levels from {lowest:.3g} m to {highest:.3g} m: allowed is a lowest level above 0 and below the highest; the "
-            f"force can be told from {lowest_n / needed_n(plant, 1.0):.3g} m on"
+            f"levels from {first:.3g} m to {highest:.3g} m: allowed is a lowest level above 0 and below the highest; the "
+            f"force can be told from {told:.3g} m on"
         )
     levels = (
-        tuple(float(f"{level:.4g}") for level in np.geomspace(lowest, highest, points)) if points > 1 else (highest,)
+        tuple(float(f"{level:.4g}") for level in np.geomspace(first, highest, points)) if points > 1 else (highest,)
     )
     why = f"the highest is {highest / reach:.2f} of what {limit} allows on the linear plant"
     why += f", the lowest has {needed_n(plant, levels[0]):.3g} N of force"
@@ -139,6 +176,7 @@ def choose_levels(
         tuple(needed_v(plant, level) for level in levels),
         tuple(needed_n(plant, level) for level in levels),
         why,
+        lowest.accepted_alien,
     )
 
 

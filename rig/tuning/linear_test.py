@@ -17,6 +17,7 @@ from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, See
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
+from rig.tuning.converter_bits import bits_force_n, periodic_beyond
 from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
 __all__ = ["LinearTest", "measure"]
@@ -25,7 +26,7 @@ BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could exci
 LINES = 400.0  # number of lines up to the linear frequency while the level is searched for
 LINES_A_BANDWIDTH = 4.0
 ENOUGH = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
-AUDIBLE = 0.9  # coherence that a level chosen by the user must reach at least
+AUDIBLE = 0.9  # coherence that a level chosen by the user, or the highest that the limits allow, must reach at least
 CREST = 4.0  # largest expected ratio of peak to RMS of a multisine's response
 SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)
 
@@ -48,6 +49,8 @@ class LinearTest:
     """One-sided noise density of the force near the mode, N^2/Hz."""
     acceleration_density: float
     """One-sided noise density of the drive acceleration near the mode, (m/s^2)^2/Hz."""
+    bits_force_n: float
+    """RMS of the force that the last bits of the output converter cause, at frequencies other than the output's, N."""
     levels_tried_v: tuple[float, ...]
     """All levels that were played in the search, V RMS."""
 
@@ -71,12 +74,11 @@ def measure(
         levels = SEARCH.search(bench, runs.listen)
         tried = levels.tried_v
         if not levels.enough:
-            raise TuningError(_silent(bench, tried[-1], runs.coherence, "at half of the bench's limits"))
+            _audible(bench, tried[-1], runs.coherence, "at half of the bench's limits")
     else:
         runs.listen(level_rms_v)
         tried = (level_rms_v,)
-        if min(runs.coherence) < AUDIBLE:
-            raise TuningError(_silent(bench, level_rms_v, runs.coherence, "at the level asked for"))
+        _audible(bench, level_rms_v, runs.coherence, "at the level asked for")
     matrix = voltage_responses(bench, runs.measured)
     resolution = 2.0 * damping_of(matrix, runs.lead_samples) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
     found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), 3)
@@ -92,6 +94,7 @@ def measure(
         distortion=float(np.median(np.sqrt(nonlinear) / np.abs(matrix.value[around, 0, 0]))),
         force_density=noise[0],
         acceleration_density=noise[1],
+        bits_force_n=bits_force_n(bench, matrix, runs.force_beyond_n),
         levels_tried_v=tried,
     )
 
@@ -105,6 +108,8 @@ class _Runs:
     """Telemetry rows of the last multisine."""
     lead_samples: float
     """Lead of the device, samples."""
+    force_beyond_n: float
+    """RMS of the periodic force above the excited band, N: distortion, and what the output's last bits cause there."""
     coherence: tuple[float, float]
     """Coherence of force and drive at the last coarse level."""
 
@@ -132,6 +137,11 @@ class _Runs:
             self.measured = spectra(recording)[level_rms_v]
             number = next(point.number for point in points_of(recording) if point.accepted)
             self.rows = point_rows(recording, number)
+            self.force_beyond_n = periodic_beyond(
+                self.rows["inputs"][:, self.bench.index_of("force")],
+                round(self.bench.sample_rate_hz / resolution_hz),
+                plan.highest_hz / resolution_hz,
+            )
         return self.measured
 
     def listen(self, level_rms_v: float) -> Seen:
@@ -160,11 +170,14 @@ def _ended_well(recording: Recording, level: float) -> None:
         raise TuningError(f"multisine at {level:.4g} V RMS: {failed[0].reason}; recorded in {recording.path}")
 
 
-def _silent(bench: Bench, level: float, seen: tuple[float, float], when: str) -> str:
+def _audible(bench: Bench, level: float, seen: tuple[float, float], when: str) -> None:
+    """Raise `TuningError` if force or drive hardly follow the voltage."""
+    if min(seen) >= AUDIBLE:
+        return
     names = [next(c.name for c in bench.channels if c.role == role) for role in ("force", "drive")]
-    return (
+    raise TuningError(
         f"coherence with the voltage {when}, {level:.4g} V RMS: {seen[0]:.4f} of channel {names[0]!r}, {seen[1]:.4f} of "
-        f"channel {names[1]!r}, needed is {ENOUGH}: a sensor, its cable or the amplifier is dead, or the test is all noise"
+        f"channel {names[1]!r}, needed is {AUDIBLE}: a sensor, its cable or the amplifier is dead, or the test is all noise"
     )
 
 

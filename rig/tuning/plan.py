@@ -11,13 +11,14 @@ from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.tuning.design import Chosen, gains_of
 from rig.tuning.levels import LevelChoice, significant
+from rig.tuning.shifts import Window, ramp_periods, start_periods
 
 __all__ = ["plan_text"]
 
-WINDOW = 0.1  # of the frequency, on either side
 HARMONICS = 5
-RAMP_PERIODS = 10
-SHORTEST_TIME_OUT = 600
+AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
+SHORTEST_TIME_OUT = 1000
+LOST_PERIODS = 20  # at least
 
 
 def plan_text(
@@ -27,6 +28,7 @@ def plan_text(
     ratios: tuple[Mapping[str, float], Mapping[str, float]],
     chosen: Chosen,
     levels: LevelChoice,
+    window: Window,
     recording: Path,
 ) -> str:
     """Return a backbone plan as TOML.
@@ -53,10 +55,20 @@ def plan_text(
         head += [
             "# Voltage of the lowest level on the linear plant.",
             _line("start_v", significant(levels.needed_v[0], 4)),
+            "# Until vibration and frequency have come to rest there.",
+            _line("start_periods", start_periods(plant, chosen.tracking_periods)),
         ]
-    head += [_line("ramp_periods", RAMP_PERIODS)]
-    window = [round((1.0 - WINDOW) * hertz, 4), round((1.0 + WINDOW) * hertz, 4)]
-    lowest, highest = bench.limits.frequency_hz
+    head += [
+        "# Slow enough that force and frequency follow with the damping as measured.",
+        _line("ramp_periods", ramp_periods(plant, chosen.tracking_periods)),
+        "# A level without a lock is left out; the next one seeks it again.",
+        _line("on_lost_lock", "skip"),
+    ]
+    if levels.accepted_alien is not None:
+        head += [
+            "# Rounding of the output: lines away from the harmonics, which leave frequency and damping as they are.",
+            _line("accepted_alien_force", significant(levels.accepted_alien, 2)),
+        ]
     controller = [
         "",
         "[controller]",
@@ -66,15 +78,18 @@ def plan_text(
         _line("low_pass_rad_s", significant(chosen.low_pass_rad_s)),
         _line("frequency_law", chosen.law),
         *_gains(chosen),
-        "# Resonance of the structure alone as measured, and 10 % either way.",
+        *_comment(f"Resonance of the structure alone as measured; {window.why}."),
         _line("centre_frequency_hz", significant(hertz, 6)),
-        _line("frequency_window_hz", [max(window[0], lowest), min(window[1], highest)]),
+        _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),
+        "# A lock counts as lost where twice the time in which the frequency follows has not brought it back.",
+        f"lock = {{ lost_periods = {max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))} }}",
     ]
     settle = [
         "",
         "[settle]",
         f"# Predicted for a step of 30 % in level or of half a bandwidth in frequency: {settling:.0f} periods.",
         _line("longest_periods", time_out),
+        *([] if levels.accepted_alien is None else [_line("average_periods", AVERAGED_BITS)]),
     ]
     facts = [
         "",
@@ -112,7 +127,7 @@ def _summary(plant: PlantModel, chosen: Chosen) -> list[str]:
 COMMENTS = {
     "k1": "Proportional and integral gain of the phase error.",
     "frequency_integral_per_s": "Part of the low-pass, see above.",
-    "response_integral_per_s": "A quarter of the low-pass.",
+    "response_integral_per_s": "Part of the low-pass, see above.",
     "plant_pole_rad_s": "Coupled pole less i times the resonance, as measured: the response loop cancels it.",
     "reference_integral_per_s": "For levels in newtons: as quick as the measured damping lets a force be held.",
     "drive_mode_shape": "As measured here, not the bench's.",
@@ -126,6 +141,8 @@ def _gains(chosen: Chosen) -> list[str]:
     for key, value in gains_of(chosen).items():
         if key in COMMENTS:
             out.append(f"# {COMMENTS[key]}")
+        if key == "plant_pole_rad_s" and chosen.cancels != 1.0:
+            out.append("# Not quite: another proportional gain than the one that cancels it bears more hardening.")
         out.append(_line(key, [significant(v) for v in value] if isinstance(value, tuple) else significant(value)))
     return out
 

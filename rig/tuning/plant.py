@@ -38,6 +38,10 @@ Real = NDArray[np.float64]
 
 FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
 NARROWER = ((0.7, 1.4), (0.8, 1.25))  # bands of further fits, whose differences show what the model lacks
+MODEL_ERROR = (
+    0.02  # of a response: error of the model that weighs in the fit beside the noise, so that small responses count
+)
+EXCITER_PRIOR = 0.3  # an exciter's spring in the band, relative to its moving mass, where one mode does not show it
 
 
 def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
@@ -124,13 +128,19 @@ def _fitted(
     linear, frequency = bench.specimen.linear_frequency_hz, responses.frequency_hz
     around = (frequency > band[0] * linear) & (frequency < band[1] * linear)
     covariance = responses.total_covariance if responses.total_covariance is not None else responses.noise_covariance
+    value = responses.value[around, :2, 0]
+    noise = np.nan_to_num(responses.total_std[around, :2, 0], nan=0.0, posinf=0.0)
+    std = np.hypot(noise, MODEL_ERROR * np.abs(value))
     return PlantModel.from_frequency_responses(
         frequency[around],
-        responses.value[around, 0, 0],
-        responses.value[around, 1, 0],
+        value[:, 0],
+        value[:, 1],
         sample_rate_hz=bench.sample_rate_hz,
         latency_samples=lead_samples,
+        force_std=std[:, 0],
+        acceleration_std=std[:, 1],
         covariance=None if covariance is None else covariance[around, :2, :2],
+        exciter_prior=EXCITER_PRIOR,
     )
 
 

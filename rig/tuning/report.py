@@ -10,6 +10,8 @@ from rig.tuning.tuning import Tuning
 
 __all__ = ["lines", "summary"]
 
+SHIFT_SHOWN = 0.05
+
 
 def summary(tuning: Tuning) -> dict[str, Any]:
     """Return test, plant, gains, margins, levels and notes as a dictionary for JSON."""
@@ -59,6 +61,7 @@ def summary(tuning: Tuning) -> dict[str, Any]:
         },
         "designs": [_design(design) for design in (chosen.design, *chosen.others)],
         "gain_at_other_modes": {"gain": chosen.outside[0], "frequency_hz": chosen.outside[1]},
+        "slopes": list(chosen.slopes),
         "levels_m": list(tuning.levels.levels_m),
         "needed_v": list(tuning.levels.needed_v),
         "levels_why": tuning.levels.why,
@@ -114,6 +117,11 @@ def lines(found: dict[str, Any]) -> list[str]:
     out.append(
         f"closed form    K1 = {closed['k1']:.4g} 1/s, K2 = {closed['k2']:.4g} 1/s^2"
         + (f"; does not apply: {'; '.join(closed['failed'])}" if closed["failed"] else "; its assumptions hold")
+    )
+    softening, hardening = found["slopes"]
+    out.append(
+        f"slopes         d ln(frequency)/d ln(amplitude) from {-softening:.3g} to {hardening:+.3g} leave the loops stable; a "
+        f"cubic spring that has shifted the frequency by {100.0 * SHIFT_SHOWN:g} % has {2.0 * SHIFT_SHOWN:g}"
     )
     out += [line for design in found["designs"] for line in _design_lines(design)]
     out.append(

@@ -1,6 +1,6 @@
 """Tune a rig: from a bench alone to gains, margins, levels and a plan."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import get_args
 
@@ -12,10 +12,21 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.level_search import MultisineSeries
 from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
-from rig.tuning.levels import PART, LevelChoice, choose_levels, low_pass, lowest_force_n, reach_m
+from rig.tuning.levels import (
+    NARROW,
+    PART,
+    SPAN,
+    LevelChoice,
+    LowestForce,
+    choose_levels,
+    low_pass,
+    lowest_force,
+    reach_m,
+)
 from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.plan import plan_text
 from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_ratios, plant_of
+from rig.tuning.shifts import frequency_window
 
 __all__ = ["Tuning", "TuningRequest", "tune"]
 
@@ -129,14 +140,23 @@ def tune(
     measured, ratio_stds = measured_ratios(test.responses, plant), measured_ratio_stds(test.responses, plant)
     ratios = bench.response_ratios | measured
     highest_m = PART * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
-    lowest_n = lowest_force_n(bench, plant, highest_m)
+    lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
     densities = (test.force_density, test.acceleration_density)
-    largest, lowest_n, noise = low_pass(plant, densities, lowest_n)
+    largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n)
     chosen = choose(plant, test.responses, request.law, largest, noise)
     levels = choose_levels(
-        bench, plant, ratios, lowest_n=lowest_n, from_m=request.from_m, to_m=request.to_m, points=request.points
+        bench,
+        plant,
+        ratios,
+        lowest=replace(lowest, force_n=lowest_n),
+        from_m=request.from_m,
+        to_m=request.to_m,
+        points=request.points,
     )
+    window = frequency_window(bench, test.responses, plant)
     notes += _cautions(bench, test, levels)
+    if request.from_m is None:
+        notes += _narrow(bench, levels, lowest)
     return Tuning(
         bench=bench,
         test=test,
@@ -147,8 +167,21 @@ def tune(
         chosen=chosen,
         levels=levels,
         notes=notes,
-        plan_toml=plan_text(named or name, bench, plant, (measured, ratio_stds), chosen, levels, Path(recording)),
+        plan_toml=plan_text(
+            named or name, bench, plant, (measured, ratio_stds), chosen, levels, window, Path(recording)
+        ),
     )
+
+
+def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> tuple[str, ...]:
+    """Return a note on levels that span little because of a converter's last bits."""
+    span, bits = levels.levels_m[-1] / levels.levels_m[0], levels.needed_v[-1] / bench.output_bit_v
+    if not lowest.bound or span > NARROW:
+        return ()
+    text = f"the levels span a factor of {span:.3g}, not {SPAN:g}: the lowest is bounded by {lowest.bound}"
+    if "output" in lowest.bound:
+        text += f"; the highest has an output of {bits:.0f} bits, less gain behind the converter leaves room for lower levels"
+    return (text,)
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 An objection is a line that says why a point is not accepted. It is empty if there is no objection.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -33,6 +34,7 @@ __all__ = [
 ]
 
 MOTIONS = ("drive", "response")
+FEW_OUTPUT_BITS = 250.0  # amplitude: above, rounding amplified by 40 off resonance stays below 7 % of the force's RMS
 FAILING = 0.25  # of the largest motion: sensor noise drifts far less, a sensor that dies within a record more
 
 
@@ -66,14 +68,20 @@ def level_objection(law: AmplitudeLaw, error: float | None, accepted: float) -> 
     return f"the {held} is {100.0 * error:+.2f} % off its level, accepted up to {100.0 * accepted:g} %"
 
 
-def alien_objection(alien: float, accepted: float) -> str:
-    """Object if too much of the force is neither a harmonic nor noise. If that part is unknown (NaN), there is no objection."""
+def alien_objection(alien: float, accepted: float, output_bits: float = math.inf) -> str:
+    """Object if too much of the force is neither a harmonic nor noise. If that part is unknown (NaN), there is no objection.
+
+    ``output_bits`` is the amplitude of the output in bits of its converter.
+    """
     if not alien > accepted:
         return ""
-    return (
-        f"{100.0 * alien:.1f} % of the force's RMS are no harmonics, accepted up to {100.0 * accepted:g} %: "
-        "another mode, or a loop that swings"
-    )
+    cause = "another mode, or a loop that swings"
+    if output_bits < FEW_OUTPUT_BITS:
+        cause = (
+            f"the output has an amplitude of {output_bits:.3g} bits of its converter, whose rounding is amplified off "
+            f"resonance (less gain behind the converter, or a higher level, helps); else {cause}"
+        )
+    return f"{100.0 * alien:.1f} % of the force's RMS are no harmonics, accepted up to {100.0 * accepted:g} %: {cause}"
 
 
 def hunting_objection(scatter: float, accepted: float) -> str:
@@ -132,7 +140,9 @@ def settled_point(
         (
             phase_objection(vibration.phase_error_deg, plan.accepted_phase_error_deg),
             level,
-            alien_objection(alien, plan.accepted_alien_force),
+            alien_objection(
+                alien, plan.accepted_alien_force, float(np.abs(rows["command_v"]).mean()) / bench.output_bit_v
+            ),
             hunting_objection(scatter, plan.accepted_frequency_scatter),
             drift_objection(bench, vibration, plan.accepted_drift),
         )

@@ -1,0 +1,104 @@
+"""Room for hardening and softening: the frequency window, and how slowly levels change."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.tuning import PlantModel
+from identification import FrequencyResponseMatrix
+from rig.bench import Bench
+
+__all__ = ["Window", "frequency_window", "ramp_periods", "start_periods"]
+
+Real = NDArray[np.float64]
+SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a test allows for
+STANDS_OUT = 3.0  # of a mode's peak over the lowest response between it and the tested mode
+TIMES = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
+SHORTEST, LONGEST = 20.0, 300.0  # ramps, periods
+SHORTEST_START, LONGEST_START = 40.0, 600.0  # periods
+PLAUSIBLE = 0.005  # change of the frequency from level to level
+
+
+@dataclass(frozen=True)
+class Window:
+    """Frequencies that the loop may take."""
+
+    lowest_hz: float
+    """Lower end, Hz."""
+    highest_hz: float
+    """Upper end, Hz."""
+    why: str
+    """What sets the ends."""
+
+
+def frequency_window(bench: Bench, responses: FrequencyResponseMatrix, plant: PlantModel) -> Window:
+    """Return the window: room for `SHIFTS`, but no further than half way to other modes, and within the bench's limits."""
+    hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
+    below, above = other_modes(responses, plant)
+    ends = [part * hertz for part in SHIFTS]
+    why = [f"{100.0 * (part - 1.0):+.0f} %" for part in SHIFTS]
+    for end, (other, inner) in enumerate(((below, max), (above, min))):
+        if other is not None:
+            half_way = math.sqrt(hertz * other)
+            if inner(ends[end], half_way) == half_way:
+                ends[end], why[end] = half_way, f"half way to another mode at {other:.4g} Hz"
+        limit = bench.limits.frequency_hz[end]
+        if inner(ends[end], limit) == limit:
+            ends[end], why[end] = limit, "the bench's limit"
+    return Window(float(f"{ends[0]:.6g}"), float(f"{ends[1]:.6g}"), f"from {why[0]} to {why[1]}")
+
+
+def other_modes(responses: FrequencyResponseMatrix, plant: PlantModel) -> tuple[float | None, float | None]:
+    """Return the frequencies (Hz) of the nearest other modes below and above the tested one, None where none is seen.
+
+    A mode is a peak of the measured accelerance, the ratio of acceleration to force, that stands out of what lies between it
+    and the tested mode.
+    """
+    hertz = plant.frequency_rad_s / (2.0 * math.pi)
+    frequency = responses.frequency_hz
+    size = np.abs(responses.value[:, 1, 0] / responses.value[:, 0, 0])
+    apart = max(6.0 * plant.damping_ratio, 0.03) * hertz
+    out: list[float | None] = []
+    for side in (frequency < hertz - apart, frequency > hertz + apart):
+        outwards = np.flatnonzero(side)
+        outwards = outwards[np.argsort(np.abs(frequency[outwards] - hertz))]
+        out.append(_first_peak(frequency[outwards], size[outwards]))
+    return out[0], out[1]
+
+
+def _first_peak(frequency: Real, size: Real) -> float | None:
+    """Return the frequency of the first peak, seen outwards, that stands out of the lowest response before it and after it."""
+    if size.size < 5:
+        return None
+    size = np.convolve(np.pad(size, 2, mode="edge"), np.full(5, 0.2), mode="valid")  # noise is no mode
+    rising = np.flatnonzero(size > STANDS_OUT * np.minimum.accumulate(size))
+    if not rising.size:
+        return None
+    later = size[rising[0] :]
+    fallen = np.flatnonzero(later < np.maximum.accumulate(later) / 1.5)
+    end = int(fallen[0]) if fallen.size else later.size
+    return float(frequency[rising[0] + int(np.argmax(later[:end]))])
+
+
+def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
+    """Return the length of the ramps between levels, periods.
+
+    The force that lets a vibration grow comes on top of the one that holds it: it falls with the length of a ramp over
+    ``1/(D w_0)``. A frequency that changes with the level is followed late, by its change within ``tracking_periods``: a change
+    of `PLAUSIBLE` per level shall leave less than half of the half bandwidth ``D w_0``.
+    """
+    grows = TIMES / (2.0 * math.pi * plant.damping_ratio)
+    follows = 0.5 * math.pi * PLAUSIBLE * tracking_periods / (0.5 * plant.damping_ratio)
+    return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), SHORTEST), LONGEST))
+
+
+def start_periods(plant: PlantModel, tracking_periods: float) -> float:
+    """Return the time at the first voltage, periods.
+
+    It is three decays of the coupled pole, but at least four times what the frequency takes to follow.
+    """
+    decays = 3.0 * plant.frequency_rad_s / (-2.0 * math.pi * plant.coupled_pole_rad_s.real)
+    periods = 5.0 * math.ceil(max(decays, 4.0 * tracking_periods) / 5.0)
+    return float(min(max(periods, SHORTEST_START), LONGEST_START))

@@ -1,0 +1,89 @@
+"""A tuned plan on a rig that hardens by several per cent, with an exciter lighter than usual."""
+
+import numpy as np
+import pytest
+
+import rig
+from identification import nonlinear_mode
+from rig.bench import Bench
+from rig.campaigns.planning.plan import Plan
+from rig.tuning import tune
+from simulators.analysis import phase_resonance_backbone
+from simulators.virtual_rig import VirtualRig
+
+SENSORS = {"force": 0.1124, "drive": 0.0102, "tip": 0.0102}
+OPTIONS = {
+    "structure": {
+        "kind": "beam",
+        "boundary": "clamped-free",
+        "length_m": 0.3,
+        "width_m": 0.02,
+        "thickness_m": 0.002,
+        "youngs_modulus_pa": 210e9,
+        "density_kg_m3": 7850.0,
+        "damping_ratio": [0.003, 0.002, 0.002],
+        "points_m": {"drive": 0.12, "tip": 0.3},
+    },
+    "elements": [{"kind": "cubic", "at": "tip", "stiffness_n_m3": 4.6e6}],
+    "exciter": {
+        "armature_mass_kg": 0.02,
+        "suspension_stiffness_n_m": 300.0,
+        "suspension_damping_n_s_m": 0.3,
+        "force_factor_n_a": 2.0,
+        "resistance_ohm": 3.0,
+        "inductance_h": 2e-4,
+    },
+    "stinger": {"at": "drive", "stiffness_n_m": 1e6, "damping_n_s_m": 2.0},
+    "sensors": [
+        {"name": name, "kind": "force" if name == "force" else "acceleration", "sensitivity_v_per_unit": sensitivity}
+        | {"range_v": 5.0, "noise_rms": 0.0005 if name == "force" else 0.002}
+        | ({} if name == "force" else {"at": name})
+        for name, sensitivity in SENSORS.items()
+    ],
+    "converter": {"sample_rate_hz": 2000.0, "oversampling": 4, "substeps": 8, "anti_alias_hz": 800.0},
+}
+OWN = VirtualRig.model_validate(OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def bench():
+    modes = OWN.linear_modes
+    return Bench.model_validate(
+        {
+            "name": "tip-beam",
+            "sample_rate_hz": 2000.0,
+            "driver": {"name": "virtual", "options": OPTIONS},
+            "specimen": {
+                "name": "beam with a spring at its tip",
+                "linear_frequency_hz": 1.01 * float(modes.frequency_hz[0]),
+                "drive_mode_shape": float(modes.drive_shape[0]),
+            },
+            "limits": {
+                "voltage_v": 5.0,
+                "force_n": 5.0,
+                "acceleration_m_s2": 100.0,
+                "displacement_m": 0.006,
+                "frequency_hz": [8.0, 80.0],
+            },
+            "channels": [
+                {"name": name, "role": {"force": "force", "drive": "drive"}.get(name, "response")}
+                | {"unit": "N" if name == "force" else "m/s^2", "sensitivity_v_per_unit": sensitivity, "range_v": 5.0}
+                for name, sensitivity in SENSORS.items()
+            ],
+        }
+    )
+
+
+def test_every_point_of_a_hardening_beam_is_accepted_and_on_the_curve_of_harmonic_balance(bench, tmp_path):
+    tuned = tune(bench, tmp_path / "test.h5")
+    plan: Plan = tuned.plan
+    with rig.run(plan, bench=bench, seed=1) as run:
+        assert run.complete, run.recording.parts[-1].end
+        mode = nonlinear_mode(run.backbone())
+    truth = phase_resonance_backbone(
+        OWN, amplitudes_m=mode.amplitude_m if hasattr(mode, "amplitude_m") else plan.levels_m
+    )
+    assert truth.frequency_shift > 0.04  # or it would show nothing
+    assert mode.modal_frequency_hz == pytest.approx(truth.modal_frequency_hz, rel=5e-4)
+    assert mode.damping_ratio == pytest.approx(truth.damping_ratio, rel=0.02)
+    assert np.all(np.diff(mode.modal_frequency_hz) > 0.0)
