@@ -1,4 +1,4 @@
-"""A tuned plan on a rig that hardens by several per cent, with an exciter lighter than usual."""
+"""A tuned plan on a beam with a spring at its tip that hardens it by several per cent, driven by a light exciter."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 import rig
 from identification import nonlinear_mode
 from rig.bench import Bench
-from rig.campaigns.planning.plan import Plan
 from rig.tuning import tune
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
@@ -61,8 +60,8 @@ def bench():
             "limits": {
                 "voltage_v": 5.0,
                 "force_n": 5.0,
-                "acceleration_m_s2": 100.0,
-                "displacement_m": 0.006,
+                "acceleration_m_s2": 300.0,
+                "displacement_m": 0.012,
                 "frequency_hz": [8.0, 80.0],
             },
             "channels": [
@@ -76,14 +75,12 @@ def bench():
 
 def test_every_point_of_a_hardening_beam_is_accepted_and_on_the_curve_of_harmonic_balance(bench, tmp_path):
     tuned = tune(bench, tmp_path / "test.h5")
-    plan: Plan = tuned.plan
+    plan = tuned.plan
     with rig.run(plan, bench=bench, seed=1) as run:
         assert run.complete, run.recording.parts[-1].end
         mode = nonlinear_mode(run.backbone())
-    truth = phase_resonance_backbone(
-        OWN, amplitudes_m=mode.amplitude_m if hasattr(mode, "amplitude_m") else plan.levels_m
-    )
+    truth = phase_resonance_backbone(OWN, amplitudes_m=plan.levels_m)
     assert truth.frequency_shift > 0.04  # or it would show nothing
     assert mode.modal_frequency_hz == pytest.approx(truth.modal_frequency_hz, rel=5e-4)
-    assert mode.damping_ratio == pytest.approx(truth.damping_ratio, rel=0.02)
+    assert mode.damping_ratio == pytest.approx(truth.damping_ratio, rel=0.03)  # the lowest level has few bits
     assert np.all(np.diff(mode.modal_frequency_hz) > 0.0)
