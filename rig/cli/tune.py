@@ -2,7 +2,8 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from textwrap import wrap
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +12,7 @@ from rig.cli.run_options import of_a_recording, shown, with_run_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
+    from rig.tuning.tuning import Tuning
 
 __all__ = ["tune_"]
 
@@ -34,13 +36,17 @@ def tune_(
         Path | None, typer.Option(help="Recording of the multisine; beside the plan if left out.")
     ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    rehearse: Annotated[
+        int, typer.Option(metavar="N", help="Twins on which the plan is rehearsed; 0 for none.", min=0, max=100_000)
+    ] = 40,
     options: "RunOptions",
     json: Json = False,
 ) -> None:
-    """Measure a rig with a low-level multisine, design gains, and write a plan that uses them."""
+    """Measure a rig with a low-level multisine, design gains, write a plan that uses them, and rehearse it."""
     from rig.bench import load_bench
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
     from rig.errors import ConfigurationError
+    from rig.rehearsal.report import verdict_in_one_line
     from rig.system.whole_file import whole_file
     from rig.text.console import print_json
     from rig.text.printable import printable_strings
@@ -56,6 +62,9 @@ def tune_(
     recorded = output.with_suffix(".h5") if recording is None else recording
     if recorded.suffix != ".h5":
         raise ConfigurationError(f"--recording {recorded}: recordings are written as .h5")
+    rehearsed = output.with_name(f"{output.stem}-rehearsal.h5")
+    if rehearse:
+        keep_existing([], rehearsed, options.overwrite)
     if figure is not None:
         check_figure(figure, options.overwrite)
     with shown(options, MULTISINE_COLUMNS) as watched:
@@ -65,12 +74,32 @@ def tune_(
     if figure is not None:
         draw_tuning(found, figure)
     facts = {**summary(found), "plan": str(output), "figure": None if figure is None else str(figure)}
+    facts["rehearsal"] = _rehearsal(found, output, recorded, rehearsed, rehearse) if rehearse else None
     if json:
         print_json(facts)
         return
     for line in lines(printable_strings(facts)):
         print(line)
+    if facts["rehearsal"] is not None:
+        print(f"rehearsal      {verdict_in_one_line(facts['rehearsal'])}; `rig show {rehearsed}` has the page")
     print(f"plan written to {output}, multisine recorded in {recorded}" + (f", figure in {figure}" if figure else ""))
+
+
+def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> dict[str, Any]:
+    """Rehearse the plan on twins of what was measured, write its verdict above the plan, and return the summary."""
+    from rig.cli.rehearse import rehearsing
+    from rig.models.rehearse import Subject, rehearse_into, request_for
+    from rig.rehearsal.report import summary, verdict_in_one_line
+    from rig.system.whole_file import whole_file
+
+    subject = Subject(plan=found.plan, bench=found.bench, sources=[recording], draws=draws)
+    request = request_for(subject)
+    with rehearsing(draws) as listener:
+        facts = summary(rehearse_into(request, rehearsed, overwrite=True, listener=listener, jobs=-1))
+    head = wrap(f"Rehearsal: {verdict_in_one_line(facts)}.", 118, initial_indent="# ", subsequent_indent="# ")
+    with whole_file(plan) as part:
+        part.write_text("\n".join([*head, found.plan_toml]), encoding="utf-8")
+    return facts
 
 
 def _as_seen_from(bench: str, plan: Path) -> str:

@@ -69,7 +69,9 @@ class Listener:
 def request_for(subject: Subject) -> RehearsalRequest:
     """Read the sources and return what to rehearse. Raises `ConfigurationError` or `RecordingError`."""
     if subject.exact and subject.sources:
-        raise ConfigurationError("`exact`, `from`: allowed is one of them: an exact twin is not made from measurements")
+        raise ConfigurationError(
+            "`exact`, `sources`: allowed is one of them: an exact twin is not made from measurements"
+        )
     if subject.exact and subject.bench.driver.name != "virtual":
         name = subject.bench.driver.name
         raise ConfigurationError(

@@ -82,8 +82,8 @@ def gathered(bench: Bench, plan: Plan, sources: Mapping[str, Any]) -> Knowledge:
         _plant(found, bench, plant, _ratios(plan, bench))
     if found.responses is None and not (found.exciter and found.shape):
         raise ConfigurationError(
-            f"`from`: nothing tells of the exciter and the structure of the bench {bench.name}: give a recording of `rig tune` "
-            "or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a virtual bench may rehearse by "
+            f"`sources`: nothing tells of the exciter and the structure of the bench {bench.name}: give a recording of "
+            "`rig tune` or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a virtual bench may rehearse by "
             "itself with `exact`"
         )
     channels = [channel.name for channel in bench.channels if channel.role == "response"]
@@ -115,20 +115,20 @@ def _take(found: _Found, bench: Bench, name: str, source: Any) -> None:
         found.sources.append(f"{name}: frequency and damping over the amplitude, {source.amplitude_m.size} levels")
     else:
         raise ConfigurationError(
-            f"`from` = {name}: holds a {type(source).__name__}; allowed are a recording of a multisine, linear modes, an "
+            f"`sources` = {name}: holds a {type(source).__name__}; allowed are a recording of a multisine, linear modes, an "
             "exciter, a nonlinear mode"
         )
 
 
 def _recording(found: _Found, bench: Bench, name: str, recording: Recording) -> None:
     if recording.kind != "multisine":
-        raise ConfigurationError(f"`from` = {name}: is a recording of kind {recording.kind}; allowed is a multisine")
+        raise ConfigurationError(f"`sources` = {name}: is a recording of kind {recording.kind}; allowed is a multisine")
     by_level = spectra(recording)
     level = list(by_level)[-1]
     measured = by_level[level]
     names = _names(bench)
     if missing := [one for one in names if one not in [channel.name for channel in measured.channels]]:
-        raise ConfigurationError(f"`from` = {name}: has no channel {missing[0]!r} of the bench {bench.name}")
+        raise ConfigurationError(f"`sources` = {name}: has no channel {missing[0]!r} of the bench {bench.name}")
     matrix = best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
     inside = _inside(bench, matrix.frequency_hz)
     found.responses = _thinned(
@@ -184,7 +184,7 @@ def _start_from(found: _Found, bench: Bench, responses: Responses) -> None:
         )
     except ValueError as error:
         raise ConfigurationError(
-            f"`from`: the responses of the bench {bench.name} show no mode near {bench.specimen.linear_frequency_hz:g} Hz: "
+            f"`sources`: the responses of the bench {bench.name} show no mode near {bench.specimen.linear_frequency_hz:g} Hz: "
             f"{error}"
         ) from None
     _plant_start(found, plant)

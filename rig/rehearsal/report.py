@@ -6,11 +6,12 @@ from typing import Any
 from rig.rehearsal.rehearsal import Rehearsal
 from rig.rehearsal.verdict import verdict_of
 
-__all__ = ["lines", "summary"]
+__all__ = ["lines", "summary", "verdict_in_one_line"]
 
 CLOSE = 5  # limits that are shown
 MOST_REASONS = 3
 MOST_INFLUENCES = 6
+ENOUGH = 0.9  # share of twins on which a plan ends well without further advice
 
 
 def summary(rehearsal: Rehearsal) -> dict[str, Any]:
@@ -36,6 +37,19 @@ def summary(rehearsal: Rehearsal) -> dict[str, Any]:
         "tried": [dict(one) for one in rehearsal.tried],
         "notes": [],
     }
+
+
+def verdict_in_one_line(found: dict[str, Any]) -> str:
+    """Return how probably the plan ends well and trips, on how many twins, and what to do if that is not enough."""
+    verdict = found["verdict"]
+    well, trips = verdict["ends_well"], verdict["trips"]
+    out = (
+        f"on {found['draws']} twins of what was measured, by the default hypotheses, it ends well in {_share(well)} and "
+        f"trips in {_share(trips)}"
+    )
+    if well["value"] < ENOUGH or trips["count"]:
+        out += "; rig rehearse --improve tries what would help"
+    return out
 
 
 def _unit(plan: dict[str, Any]) -> str:

@@ -181,7 +181,7 @@ def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):
 def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     command = ["rig", "tune", "--bench", "magnet-beam", "-o", "tuned.toml", "--level", "0.02", "--figure", "tuned.png"]
-    command += ["--law", "phase"]
+    command += ["--law", "phase", "--rehearse", "2"]
     monkeypatch.setattr(sys, "argv", [*command, "--json"])
     with pytest.raises(SystemExit) as stop:
         main()
@@ -189,9 +189,11 @@ def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(tmp
     told = json.loads(capsys.readouterr().out)
     assert told["plan"] == "tuned.toml"
     assert told["plant"]["drive_mode_shape"] == pytest.approx(0.908466, rel=2e-3)
-    assert {path.name for path in tmp_path.iterdir()} == {"tuned.toml", "tuned.h5", "tuned.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {"tuned.toml", "tuned.h5", "tuned.png", "tuned-rehearsal.h5"}
+    assert told["rehearsal"]["draws"] == 2
     assert (tmp_path / "tuned.png").read_bytes()[:4] == b"\x89PNG"
     written = (tmp_path / "tuned.toml").read_text()
+    assert written.startswith("# Rehearsal: on 2 twins of what was measured")
     plan = load_plan("tuned.toml")
     assert plan.levels_v == pytest.approx(told["needed_v"], rel=1e-4)
     assert plan.controller.k1 == pytest.approx(told["closed_form"]["k1"], rel=1e-4)
