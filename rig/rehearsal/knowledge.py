@@ -83,8 +83,8 @@ def gathered(bench: Bench, plan: Plan, sources: Mapping[str, Any]) -> Knowledge:
     if found.responses is None and not (found.exciter and found.shape):
         raise ConfigurationError(
             f"`sources`: nothing tells of the exciter and the structure of the bench {bench.name}: give a recording of "
-            "`rig tune` or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a virtual bench may rehearse by "
-            "itself with `exact`"
+            "`rig tune` or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a virtual bench may "
+            "rehearse by itself with `exact`"
         )
     channels = [channel.name for channel in bench.channels if channel.role == "response"]
     facts = bench.specimen
