@@ -13,6 +13,8 @@ __all__ = ["fitted"]
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 NO_RESONANCE = "force_per_v, acceleration_per_v: their ratio shows no damped resonance inside the band"
+UNRESOLVED = 3.0  # lines: width of a resonance below which its damping cannot be told from noise
+NARROWEST = 0.2  # of the spacing of the lines: width from which the fit begins then
 NO_MODE = 0.15
 """Largest relative misfit of the residual terms alone at which the accelerance counts as showing no mode.
 
@@ -156,6 +158,9 @@ def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
         columns = np.stack([y, z * y, *(-(z**power) for power in range(5))], axis=1) * weight[:, None]
         k, c, *_ = _real_least_squares(columns, -(z**2) * y * weight)
         weight = np.abs(h_f) / np.abs(z**2 + c * z + k)
+    spacing = float(np.median(np.diff(np.abs(z))))
+    if abs(c) <= UNRESOLVED * spacing:  # narrower than the lines can tell: noise alone decides the sign
+        c = max(c, NARROWEST * spacing)
     if k <= 0.0 or c <= 0.0 or not np.min(np.abs(z)) < math.sqrt(k) < np.max(np.abs(z)):
         raise ValueError(NO_RESONANCE)
     columns = np.stack([z**2 / (z**2 + c * z + k), np.ones_like(z), z**2], axis=1) * np.abs(h_f)[:, None]
