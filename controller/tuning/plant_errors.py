@@ -27,7 +27,10 @@ def parameter_std(jacobian: Real, residuals: Real, weights: Real, covariance: Co
     independent between lines. If it is None, the noise is taken from the residuals, equal on all lines of a response.
     """
     lines = weights.shape[1]
-    left, size, right = np.linalg.svd(jacobian / (scale := np.linalg.norm(jacobian, axis=0)), full_matrices=False)
+    scale = np.linalg.norm(jacobian, axis=0)
+    if not np.all(scale > 0.0):  # the fit has left what the lines can tell
+        return np.full(jacobian.shape[1], np.inf)
+    left, size, right = np.linalg.svd(jacobian / scale, full_matrices=False)
     inverse = ((right.T / size) @ left.T / scale[:, None])[:, : 4 * lines]
     left, residuals = left[: 4 * lines], residuals[: 4 * lines]
     if covariance is None:

@@ -92,9 +92,9 @@ def fitted(
         "damping_ratio": math.exp(x[1]),
         "drive_shape": math.exp(0.5 * x[2]),
         # of the logarithms of frequency, damping and squared shape
-        "frequency_std_rad_s": centre * math.exp(x[0]) * float(frequency_std),
-        "damping_ratio_std": math.exp(x[1]) * float(damping_std),
-        "drive_shape_std": 0.5 * math.exp(0.5 * x[2]) * float(shape_std),
+        "frequency_std_rad_s": _finite(centre * math.exp(x[0]) * float(frequency_std)),
+        "damping_ratio_std": _finite(math.exp(x[1]) * float(damping_std)),
+        "drive_shape_std": _finite(0.5 * math.exp(0.5 * x[2]) * float(shape_std)),
         "residual_per_kg": (float(x[3]), float(x[4])),
         "force_v_n": tuple(map(float, x[5:9])),
         "acceleration_v_s2_m": tuple(map(float, x[9:13])),
@@ -102,6 +102,11 @@ def fitted(
         "band_hz": (float(frequency.min()), float(frequency.max())),
         "fit_error": max(_rms(model_f - h_f) / _rms(h_f), _rms(model_a - h_a) / _rms(h_a)),
     }
+
+
+def _finite(std: float) -> float | None:
+    """Return a standard error, or None if it is not known."""
+    return std if math.isfinite(std) else None
 
 
 def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike) -> tuple[Real, Complex, Complex]:

@@ -25,6 +25,7 @@ __all__ = ["LinearTest", "measure"]
 BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could excite lie inside
 LINES = 400.0  # number of lines up to the linear frequency while the level is searched for
 LINES_A_BANDWIDTH = 4.0
+FINEST = 32.0  # most by which the spacing of the lines is reduced after the search
 ENOUGH = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
 AUDIBLE = 0.9  # coherence that a level chosen by the user, or the highest that the limits allow, must reach at least
 CREST = 4.0  # largest expected ratio of peak to RMS of a multisine's response
@@ -81,6 +82,7 @@ def measure(
         _audible(bench, level_rms_v, runs.coherence, "at the level asked for")
     matrix = voltage_responses(bench, runs.measured)
     resolution = 2.0 * damping_of(matrix, runs.lead_samples) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
+    resolution = max(resolution, _coarse(bench) / FINEST)  # the damping of a resonance between two lines is a guess
     found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), 3)
     matrix = voltage_responses(bench, found)
     around = near(bench, matrix.frequency_hz)
