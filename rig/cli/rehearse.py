@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rig.models.rehearse import Listener, Subject
     from rig.rehearsal.foreseen import Comparison
 
-__all__ = ["rehearse_", "rehearsing"]
+__all__ = ["Rehearsing", "rehearse_"]
 
 
 def rehearse_(
@@ -120,11 +120,11 @@ def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Pa
     from rig.text.printable import printable_strings
 
     request = request_for(subject)
-    with rehearsing(subject.draws) as listener:
+    with Rehearsing(subject.draws) as listener:
         found = rehearse_into(request, output, overwrite=how["overwrite"], listener=listener, jobs=how["jobs"])
     second = None
     if improve is not None:
-        with rehearsing(subject.draws) as listener:
+        with Rehearsing(subject.draws) as listener:
             found, second = improve_into(request, found, output, improve, listener=listener, jobs=how["jobs"])
     if figure is not None:
         plot(output, figure)
@@ -147,7 +147,7 @@ def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Pa
         print(line)
 
 
-class rehearsing:  # noqa: N801 - a context manager
+class Rehearsing:
     """Shows how many draws are done: a bar on a terminal, a line now and then elsewhere."""
 
     def __init__(self, total: int) -> None:

@@ -87,14 +87,14 @@ def tune_(
 
 def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> dict[str, Any]:
     """Rehearse the plan on twins of what was measured, write its verdict above the plan, and return the summary."""
-    from rig.cli.rehearse import rehearsing
+    from rig.cli.rehearse import Rehearsing
     from rig.models.rehearse import Subject, rehearse_into, request_for
     from rig.rehearsal.report import summary, verdict_in_one_line
     from rig.system.whole_file import whole_file
 
     subject = Subject(plan=found.plan, bench=found.bench, sources=[recording], draws=draws)
     request = request_for(subject)
-    with rehearsing(draws) as listener:
+    with Rehearsing(draws) as listener:
         facts = summary(rehearse_into(request, rehearsed, overwrite=True, listener=listener, jobs=-1))
     head = wrap(f"Rehearsal: {verdict_in_one_line(facts)}.", 118, initial_indent="# ", subsequent_indent="# ")
     with whole_file(plan) as part:

@@ -38,6 +38,8 @@ def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
 
 
 def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) -> None:
+    from matplotlib.ticker import LogLocator
+
     drawn = False
     for draw in rehearsal.draws:
         points = [p for p in draw.trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
@@ -56,6 +58,7 @@ def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) ->
     for colour, label in ((MAIN, "ends well"), (REJECTED, "points missing"), (SECOND, "trips")):
         frequency.plot([], [], color=colour, label=label)
     for axis in (frequency, damping):
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.xaxis.set_major_formatter("{x:g}")
         axis.xaxis.set_minor_formatter("")
     frequency.legend(fontsize=8)
