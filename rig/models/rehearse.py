@@ -148,7 +148,7 @@ def improve_into(
         return first, None
     head = f"{request.plan.description or request.plan.kind}, improved by a rehearsal on {len(rehearsal.draws)} twins"
     write_plan(found, improved, [head])
-    again = replace(request, plan=found.plan, seed=request.seed + FURTHER_SEED)
+    again = replace(request, plan=found.plan, drawn_for=request.plan, seed=request.seed + FURTHER_SEED)
     second = rehearse(again, progress=listener.draw, jobs=jobs)
     save(second, improved.with_suffix(".h5"))
     return first, second

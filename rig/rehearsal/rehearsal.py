@@ -18,7 +18,7 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
 from rig.rehearsal.trial import Trial, TrialPoint, run_trial
-from rig.rehearsal.truth import TrueBackbone, true_backbone
+from rig.rehearsal.truth import NOT_BALANCED, TrueBackbone, true_backbone
 from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
 
@@ -60,6 +60,11 @@ class RehearsalRequest:
     """Number of twins."""
     seed: int = 0
     """Seed of the draws."""
+    drawn_for: Plan | None = None
+    """Plan whose highest level the sizes of hypotheses refer to; the plan itself if None. A changed plan keeps the rigs of the
+    one before."""
+    balanced: bool = True
+    """Whether harmonic balance of each twin is wanted."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.draws <= MOST_DRAWS:
@@ -72,13 +77,13 @@ class RehearsalRequest:
         """Return the twin of a number."""
         if self.knowledge is None:
             return exact_twin(self.bench, self.seed + number)
-        return draw_twin(self.bench, self.plan, self.knowledge, self.hypotheses, self.seed, number)
+        return draw_twin(self.bench, self.drawn_for or self.plan, self.knowledge, self.hypotheses, self.seed, number)
 
     def __call__(self, number: int) -> Draw:
         """Draw a twin and run the plan on it."""
         twin = self.twin(number)
         trial = run_trial(self.plan, twin.bench, twin.number)
-        truth = true_backbone(twin.bench, trial, twin.number)
+        truth = true_backbone(twin.bench, trial, twin.number) if self.balanced else NOT_BALANCED
         return Draw(number=number, unknowns=twin.unknowns, trial=trial, truth=truth)
 
     @property
@@ -93,6 +98,7 @@ class RehearsalRequest:
             "most_likely": {} if known is None else dict(known.linear.rig().values),
             "relative_std": {} if known is None else {name: known.linear.std(name) for name in known.linear.names},
             "determined": None if known is None else known.linear.determined,
+            "drawn_for": None if self.drawn_for is None else self.drawn_for.model_dump(mode="json"),
             "tests": subject_digest(self.plan, self.bench),
             "seed": self.seed,
             "software_version": vibrolock.__version__,

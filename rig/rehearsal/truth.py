@@ -9,7 +9,7 @@ from rig.drivers.virtual import VirtualDAQ
 from rig.rehearsal.trial import Trial
 from simulators.analysis import NotConvergedError, phase_resonance_backbone
 
-__all__ = ["TrueBackbone", "true_backbone"]
+__all__ = ["NOT_BALANCED", "TrueBackbone", "true_backbone"]
 
 MOST_POINTS = 4
 HARMONICS = 9
@@ -27,6 +27,10 @@ class TrueBackbone:
     """Damping ratios."""
 
 
+NOT_BALANCED = TrueBackbone(numbers=(), frequency_hz=(), damping_ratio=())
+"""Of a trial without points that could be balanced."""
+
+
 def true_backbone(bench: Bench, trial: Trial, seed: int = 0) -> TrueBackbone:
     """Balance the rig at the amplitudes of up to four accepted points, the lowest and the highest included.
 
@@ -37,7 +41,7 @@ def true_backbone(bench: Bench, trial: Trial, seed: int = 0) -> TrueBackbone:
     picked = sorted({round(i) for i in np.linspace(0, len(measured) - 1, min(MOST_POINTS, len(measured)))})
     points = [measured[i] for i in picked]
     if not points:
-        return TrueBackbone(numbers=(), frequency_hz=(), damping_ratio=())
+        return NOT_BALANCED
     rig = VirtualDAQ(bench, seed).rig.realised(seed)
     amplitudes = np.maximum.accumulate([p.amplitude_m for p in points]) * (1.0 + 1e-12 * np.arange(len(points)))
     try:
@@ -46,7 +50,7 @@ def true_backbone(bench: Bench, trial: Trial, seed: int = 0) -> TrueBackbone:
         )
     except NotConvergedError as error:
         if error.found is None:
-            return TrueBackbone(numbers=(), frequency_hz=(), damping_ratio=())
+            return NOT_BALANCED
         found = error.found
     n = found.frequency_hz.size
     return TrueBackbone(

@@ -100,3 +100,11 @@ def test_what_cannot_be_rehearsed_is_refused_at_once():
         request_of(0)
     with pytest.raises(ConfigurationError, match="levels_v"):
         request_of(plan=SHORT.model_copy(update={"levels_v": (20.0,)}))
+
+
+def test_a_changed_plan_meets_the_rigs_of_the_plan_before():
+    lower = SHORT.model_copy(update={"levels_v": (0.1, 0.2)})
+    kept, drawn_anew = request_of(plan=lower, drawn_for=SHORT), request_of(plan=lower)
+    for number in range(3):
+        assert kept.twin(number).bench == request_of().twin(number).bench
+        assert drawn_anew.twin(number).bench != request_of().twin(number).bench
