@@ -186,8 +186,8 @@ def improve(
             on_the_same = replace(request, plan=changed, drawn_for=request.plan, balanced=False)
             found = _again(on_the_same, sample, jobs)
             after = _rates(found, weights, max(asked, len(changed.targets())))
-            well, trips, points = ((before[i], after[i]) for i in range(3))
-            effect = Effect(remedy.name, remedy.changes, well, trips, points, len(sample))
+            both = [(before[i], after[i]) for i in range(3)]
+            effect = Effect(remedy.name, remedy.changes, both[0], both[1], both[2], len(sample))
             effects.append(effect)
             progress(effect)
             tried.append((_score(after) - _score(before), -_duration_s(found), remedy, changed, found))
