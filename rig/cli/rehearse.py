@@ -106,8 +106,12 @@ def _check_outputs(
     if improve is not None:
         if improve.suffix != ".toml":
             raise ConfigurationError(f"`improve` = {improve}: plans are written as .toml")
+        if improve.with_suffix(".h5").absolute() == output.absolute():
+            raise ConfigurationError(
+                f"`improve` = {improve}: its own rehearsal would be written to {output}; choose another name"
+            )
         keep_existing([], improve, overwrite)
-        keep_existing([output], improve.with_suffix(".h5"), overwrite)
+        keep_existing([], improve.with_suffix(".h5"), overwrite)
     if figure is not None:
         check_figure(figure, overwrite)
 
