@@ -73,8 +73,13 @@ def hardening_margins(loop: ControlLoop) -> tuple[float, float]:
     share = transfer.imag[across] / (transfer.imag[across] - transfer.imag[across + 1])
     real = transfer.real[across] + share * (transfer.real[across + 1] - transfer.real[across])
     real = np.append(real, transfer.real[0])  # standing still
-    softening, hardening = (float(np.max(sign * real, initial=0.0)) for sign in (-1.0, 1.0))
-    return tuple(1.0 / most if most > 0.0 else math.inf for most in (softening, hardening))  # type: ignore[return-value]
+    return _first_slope(-real), _first_slope(real)
+
+
+def _first_slope(real: Real) -> float:
+    """Return the smallest kappa above 0 for which kappa times one of the values is 1; infinite if there is none."""
+    most = float(np.max(real, initial=0.0))
+    return 1.0 / most if most > 0.0 else math.inf
 
 
 def gains_at_half(loop: ControlLoop) -> dict[str, float]:

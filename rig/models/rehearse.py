@@ -95,7 +95,7 @@ def _opened(paths: Sequence[Path]) -> Iterator[dict[str, Any]]:
     with ExitStack() as stack:
         found: dict[str, Any] = {}
         for path in paths:
-            found[path.name] = load(path) if kind_of(path) in KINDS else stack.enter_context(Recording(path))
+            found[str(path)] = load(path) if kind_of(path) in KINDS else stack.enter_context(Recording(path))
         yield found
 
 

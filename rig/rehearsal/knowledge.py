@@ -29,7 +29,6 @@ __all__ = ["Knowledge", "gathered"]
 Real = NDArray[np.float64]
 
 BAND = (0.5, 2.2)  # of the linear frequency: band in which the linear rig is fitted
-LEAST_HALF_POWER = 0.5  # share of a sample of hold in the latency
 LINES = 400  # lines at which a rig is fitted
 SMOOTHED = 15  # lines over which variances are averaged: those of a few realisations scatter by themselves
 

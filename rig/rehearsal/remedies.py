@@ -201,7 +201,7 @@ def improve(
         ]
         plan, now = changed, found
         changes = merged(changes, remedy.changes)
-        candidates = [one for one in remedies_for(plan, request.bench, found) if _same_kind(one, remedy) is False]
+        candidates = [one for one in remedies_for(plan, request.bench, found) if not _same_kind(one, remedy)]
     return Improvement(plan, changes, tuple(effects))
 
 

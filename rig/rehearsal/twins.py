@@ -1,7 +1,7 @@
 """Draw virtual twins of a bench: the linear rig from what is known, everything else from hypotheses."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,14 +17,12 @@ from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
 from rig.rehearsal.linear_rig import LinearRig
 
-__all__ = ["Twin", "Twins", "draw_twin", "exact_twin"]
+__all__ = ["Twin", "draw_twin", "exact_twin"]
 
 MOST_TRIES = 50
 SUBSTEPS_HZ = 20_000.0  # least internal rate of a twin
 INSIDE = "inside"  # deflection of the structure itself, without that on its suspension: where springs and joints act
-REACH_WITHOUT_LEVELS = (
-    0.3  # of the displacement limit: highest level of a plan whose levels say nothing of displacement
-)
+REACH_WITHOUT_LEVELS = 0.3  # of the displacement limit: highest level of a plan whose levels tell of no displacement
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +35,6 @@ class Twin:
     """The bench, with the twin behind its driver."""
     unknowns: Mapping[str, float]
     """What was drawn, by name; 0 for a property that it does not have."""
-
-
-Twins = Callable[[int], Twin]
-"""Returns the twin of a number."""
 
 
 def exact_twin(bench: Bench, number: int) -> Twin:

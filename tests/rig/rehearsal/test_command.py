@@ -9,26 +9,13 @@ import pytest
 from rig.campaigns.plans import load_plan
 from rig.cli import main
 from rig.models.rehearse import load_rehearsal
-
-PLAN = """
-kind = "backbone"
-bench = "magnet-beam"
-levels_v = [0.4, 0.8]
-record_periods = 8
-
-[controller]
-low_pass_rad_s = 6.283
-k1 = 2.0
-k2 = 6.283
-centre_frequency_hz = 24.0
-frequency_window_hz = [22.0, 27.0]
-"""
+from tests.rig.rehearsal.plans import SHORT_TEXT
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("plan.toml").write_text(PLAN)
+    Path("plan.toml").write_text(SHORT_TEXT)
     return tmp_path
 
 
@@ -61,7 +48,9 @@ def test_a_rehearsal_its_figure_its_page_and_its_comparison(command, folder):
 
 
 def test_a_twin_is_written_and_an_improved_plan_too(command):
-    Path("hasty.toml").write_text(PLAN.replace("record_periods = 8", "record_periods = 8\nsettle.longest_periods = 40"))
+    Path("hasty.toml").write_text(
+        SHORT_TEXT.replace("record_periods = 8", "record_periods = 8\nsettle.longest_periods = 40")
+    )
     command("rehearse", "hasty.toml", "--exact", "-n", "2", "-o", "r.h5", "--improve", "patient.toml", "--jobs", "1")
     assert load_plan("patient.toml").settle.longest_periods == 120.0
     assert "# taken: three times as long to settle, ends well 0 -> 100 %" in Path("patient.toml").read_text()
