@@ -17,6 +17,7 @@ from rig.bench import Bench
 from rig.emulator.emulated import emulated
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
+from tests.named_memory import named_memory
 from tests.reliability.kills.cases import Case
 from tests.reliability.kills.scene import plan
 from tests.rig.rigs import bench_with
@@ -45,7 +46,7 @@ class Outcome:
 def carried_out(case: Case, folder: Path) -> Outcome:
     """Kill a run, read what is left, resume it, look for leftovers."""
     output, witness = folder / "run.h5", folder / "witness"
-    shared = _shared_memory()
+    shared = named_memory()
     with _bench(case) as bench:
         before = _before(case, bench, output)
         ended = _killed(case, bench, output, witness)
@@ -58,15 +59,9 @@ def carried_out(case: Case, folder: Path) -> Outcome:
     left = sorted(path.name for path in folder.iterdir())
     if left != ["run.h5", "witness"]:
         found.wrong.append(f"left behind: {left}")
-    if more := _shared_memory() - shared:
+    if more := named_memory() - shared:
         found.wrong.append(f"left in memory: {sorted(more)}")
     return found
-
-
-def _shared_memory() -> set[str]:
-    """Names in memory, of which a run makes none."""
-    folder = Path("/dev/shm")
-    return {path.name for path in folder.iterdir()} if folder.is_dir() else set()
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from rig.loop.loop import Loop
 from rig.loop.session import LocalSession, open_session
 from rig.loop.worker.session import WorkerSession
 from rig.tick.safety.layout import EndReason, GuardMode
+from tests.named_memory import named_memory
 from tests.rig.loop.worker.rigs import RATE_HZ, VOLTS, slow_bench, tone
 from tests.waiting import wait_until
 
@@ -94,15 +95,9 @@ with WorkerSession(bench) as session:
 """
 
 
-def named_memory():
-    """Shared memory with a name that Python's own or ours would have; other programs come and go."""
-    names = ("psm_", "sem.mp-", "vibrolock")
-    return [path.name for path in Path("/dev/shm").glob("*") if path.name.startswith(names)]
-
-
 def test_when_the_campaign_is_killed_the_loop_ramps_down_and_leaves_nothing(tmp_path, noting):
     log = tmp_path / "outputs"
-    before = set(named_memory())
+    before = named_memory()
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(noting), str(ROOT), *filter(None, sys.path)])}
     with subprocess.Popen(
         [sys.executable, "-c", PARENT, str(log)], stdout=subprocess.PIPE, text=True, env=environment
@@ -111,7 +106,7 @@ def test_when_the_campaign_is_killed_the_loop_ramps_down_and_leaves_nothing(tmp_
         parent.kill()
     wait_until(lambda: not is_there(pid), "end of the loop's process")
     assert ramped(np.fromfile(log, "<f8"))
-    assert set(named_memory()) <= before
+    assert named_memory() <= before
 
 
 def test_when_the_loop_is_killed_the_campaign_says_so_and_keeps_its_rows(tmp_path, noting):
