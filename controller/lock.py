@@ -40,8 +40,19 @@ THRESHOLDS = np.dtype(
 )
 """Thresholds at which a lock is gained and lost (one record)."""
 
-LOCK = np.dtype([("state", "i8"), ("close_periods", "i8"), ("far_periods", "i8")])
-"""State of the phase lock (one record)."""
+LOCK = np.dtype(
+    [
+        ("state", "i8"),
+        ("close_periods", "i8"),
+        ("far_periods", "i8"),
+        ("astray_periods", "i8"),
+        ("strays", "i8"),
+        ("gained", "i8"),
+    ]
+)
+"""State of the phase lock (one record). ``close_periods``, ``far_periods``: in a row, up to the present one; ``astray_periods``:
+far periods less close ones at a held level; ``strays``: the error of the present period exceeds half of what counts as far;
+``gained``: there has been a lock before."""
 
 
 class LockRule(Settings):
@@ -54,7 +65,7 @@ class LockRule(Settings):
     lost_deg: float = Field(30.0, gt=0, le=180)
     """Mean phase error of a period above which the period counts as far, deg."""
     lost_periods: int = Field(20, ge=1, le=1000)
-    """Far periods in a row, at a held level, that lose a lock."""
+    """Far periods less close ones, at a held level, that lose a lock."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -79,11 +90,14 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     """Advance the lock state by one oscillator period, given the period's mean phase error (rad).
 
     ``present``: force and response exceed the smallest amplitudes whose phase can be read.
-    ``held``: the level is not being ramped; only then does a large error count towards a lost lock.
+    ``held``: the level is not being ramped; only then does a large error count towards a lost lock. Far periods need not follow
+    one another: a phase that swings through zero, and is far most of the time, is lost too, also where a ramp has shaken the
+    lock off before.
     """
     size = abs(error)
     if not present:
         lock.close_periods = 0
+        lock.strays = 0
         if lock.state == LOCKED:
             lock.far_periods += 1
             if lock.far_periods >= thresholds.lost_periods:
@@ -94,6 +108,13 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     if lock.state == SEARCHING:
         lock.state = ACQUIRING
     lock.close_periods = lock.close_periods + 1 if size < thresholds.locked_rad else 0
+    lock.strays = 1 if size > 0.5 * thresholds.lost_rad else 0
+    if not held:
+        lock.astray_periods = 0
+    elif size > thresholds.lost_rad:
+        lock.astray_periods += 1
+    elif size < thresholds.locked_rad and lock.astray_periods > 0:
+        lock.astray_periods -= 1
     if size > thresholds.lost_rad and held:
         lock.far_periods += 1
     elif size > thresholds.lost_rad and lock.state == LOCKED:
@@ -102,8 +123,10 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
         lock.far_periods = 0
     if lock.close_periods >= thresholds.locked_periods:
         lock.state = LOCKED
+        lock.gained = 1
         lock.far_periods = 0
-    elif lock.state == LOCKED and lock.far_periods >= thresholds.lost_periods:
+        lock.astray_periods = 0
+    elif lock.gained == 1 and lock.astray_periods >= thresholds.lost_periods:
         lock.state = LOST
 
 
@@ -112,4 +135,5 @@ def reacquire(lock: Record) -> None:
     """Return to ACQUIRING because a new level is being approached; a lost lock may be sought again."""
     lock.far_periods = 0
     lock.close_periods = 0
+    lock.astray_periods = 0
     lock.state = ACQUIRING

@@ -97,6 +97,7 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
         begin_to_follow(t.expected[0], t.following[0], amplitude.output.amplitude_v, 0.0, 0.0)
         measure_rms(t, segment.amplitude_law)
         progress.level = take_over(t.law[0].amplitude, amplitude, control.vibration, segment.amplitude_law)
+        progress.kept_level = 0.0
 
 
 @inner_kernel

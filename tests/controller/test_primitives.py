@@ -141,6 +141,18 @@ def test_a_lock_is_lost_after_far_periods_at_a_held_level_only():
     assert _periods(lock, thresholds, 1, 50.0) is LockState.LOST
 
 
+def test_a_phase_that_swings_to_and_fro_beyond_the_threshold_is_a_lost_lock():
+    lock, thresholds = _lock()
+    _periods(lock, thresholds, 10, 0.0)
+    swing_deg = 60.0 * np.sin(2 * np.pi * (np.arange(300) + 0.5) / 24)
+    states = [_periods(lock, thresholds, 1, error) for error in swing_deg]
+    assert states[-1] is LockState.LOST
+    few, _ = _lock()
+    _periods(few, thresholds, 10, 0.0)
+    knocks = [90.0 if period % 10 < 4 else 0.0 for period in range(300)]
+    assert all(_periods(few, thresholds, 1, error) is LockState.LOCKED for error in knocks)
+
+
 def test_a_lock_that_a_ramp_shakes_off_is_sought_again_and_not_a_loss():
     lock, thresholds = _lock()
     _periods(lock, thresholds, 10, 0.0)

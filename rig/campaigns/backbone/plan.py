@@ -85,14 +85,14 @@ class BackbonePlan(SettledPlan):
                 continue
             before = self._approach(targets, target)
             if before is not None and before != at:
-                out.append(Segment(SegmentKind.RAMP, -1, before, self.ramp_periods))
+                out.append(Segment(SegmentKind.RAMP, -1, before, self.ramp_periods, on_lost_lock=lost))
                 out.append(Segment(SegmentKind.HOLD, -1, before, self._hold_periods))
             number, level = target.number, target.level
             at, first = level, at is None and before is None
             if self.evaluation == "slow-flow":
-                out += self._short_point(target, failure, first)
+                out += self._short_point(target, failure, lost, first)
                 continue
-            out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods))
+            out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, lost))
             out.append(Segment(SegmentKind.SETTLE, number, level, self.settle.longest_periods, failure, lost))
             out.append(Segment(SegmentKind.RECORD, number, level, self.record_periods + 1.0, failure, lost))
         return tuple(out)
@@ -103,14 +103,14 @@ class BackbonePlan(SettledPlan):
         if self.evaluation == "slow-flow":
             self._check_slow_flow(bench)
 
-    def _short_point(self, target: Target, failure: OnFailure, first: bool) -> list[Segment]:
+    def _short_point(self, target: Target, failure: OnFailure, lost: OnFailure, first: bool) -> list[Segment]:
         """Return the ramp to a point and the time at the point, both evaluated.
 
         Before the first point, gain the lock at its level.
         """
         number, level = target.number, target.level
         geometric = self.levels_key != "levels_v"
-        ramp = Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, geometric=geometric)
+        ramp = Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, lost, geometric=geometric)
         waits = SegmentKind.START if self.levels_key == "levels_v" else SegmentKind.HOLD  # the others started before
         out = [replace(ramp, point=-1), replace(ramp, kind=waits, point=-1, periods=self._hold_periods)]
         # A ramp from a level to the same level: the point is judged by its slow flow, not by the settle rule.

@@ -134,6 +134,7 @@ class SteppedPhasePlan(SettledPlan):
                 target.number,
                 target.level,
                 self.ramp_periods,
+                on_lost_lock=lost,
                 lag_deg=target.phase_lag_deg,
                 geometric=True,
             )

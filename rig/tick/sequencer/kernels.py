@@ -48,6 +48,8 @@ SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
 STOP = int(OnFailure.STOP)
 
+LONGEST_WAIT = 200.0
+RETURN_PERIODS = 20.0
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
 
 
@@ -163,6 +165,7 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     progress.start_lag = progress.lag
     progress.last_cycle = progress.cycle
     progress.frozen_cycles = 0.0
+    progress.waited_cycles = 0.0
     progress.held = 0
     progress.lost = 0
     if segment.point != progress.point:
@@ -172,8 +175,28 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     entry.first_sample = progress.sample
     if is_ramp(segment.kind) and lock.state == LOST:
         reacquire(lock)
+        progress.returning = 1 if 0.0 < progress.kept_level < progress.level else 0
     if segment.kind == SETTLE:
         forget_periods(settling)
+
+
+@kernel
+def must_wait(progress: Record, segment: Record, lock: Record) -> bool:
+    """Return whether an upward ramp waits because the phase of a loop that has been locked is off; sweeps do not."""
+    return bool(segment.kind == RAMP and segment.drive == LOOP_DRIVE and progress.unlocked == 0 and lock.strays == 1)
+
+
+@kernel
+def has_returned(progress: Record, cycle: float) -> bool:
+    """Lower the level to where a lock was last held; return whether it is there, where the ramp then begins."""
+    done = min((cycle - progress.start_cycle) / RETURN_PERIODS, 1.0)
+    progress.level = between(progress.start_level, progress.kept_level, 0.5 * (1.0 - math.cos(math.pi * done)))
+    if done < 1.0:
+        return False
+    progress.returning = 0
+    progress.start_cycle = cycle
+    progress.start_level = progress.level
+    return True
 
 
 @kernel
@@ -188,8 +211,9 @@ def advance(
 ) -> None:
     """Run the sequencer for one sample: set level, lag and frequency, move on after a segment, end the run after the last.
 
-    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached, an upward ramp
-    waits.
+    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached or the phase of a loop
+    that has been locked is off, an upward ramp waits; that is a held level to the lock. After a lost lock the next ramp begins
+    where a lock was last held.
     """
     if progress.finished:
         return
@@ -208,14 +232,23 @@ def advance(
     segment, cycle = segments[progress.segment], progress.cycle
     if not progress.entered:
         enter_segment(progress, segments, outcomes, settling, lock)
-    if progress.unreached == 1 and is_ramp(segment.kind) and segment.level > progress.level:
-        progress.frozen_cycles += cycle - progress.last_cycle
+    passed = cycle - progress.last_cycle
     progress.last_cycle = cycle
     if lock.state == LOCKED:
         progress.unlocked = 0
+        if not is_ramp(segment.kind):
+            progress.kept_level = segment.level
+    if progress.returning == 1 and not has_returned(progress, cycle):
+        return
+    climbs = is_ramp(segment.kind) and segment.level > progress.level
+    if climbs and progress.unreached == 1:
+        progress.frozen_cycles += passed
+    progress.waits = 1 if climbs and must_wait(progress, segment, lock) else 0
+    if progress.waits == 1:
+        progress.waited_cycles += passed
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
-        done = min((elapsed - progress.frozen_cycles) / segment.periods, 1.0)
+        done = min((elapsed - progress.frozen_cycles - progress.waited_cycles) / segment.periods, 1.0)
         rise = 0.5 * (1.0 - math.cos(math.pi * done))
         progress.level = ramped(progress.start_level, segment.level, rise, segment.geometric == 1)
         progress.lag = between(progress.start_lag, segment.lag_rad, rise)
@@ -226,6 +259,8 @@ def advance(
             give_up(progress, segments, outcomes, settling, lock, guard, OUTSIDE_WINDOW)
         elif progress.frozen_cycles >= SATURATED_PERIODS:
             give_up(progress, segments, outcomes, settling, lock, guard, UNREACHABLE)
+        elif progress.waits == 1 and (lock.state == LOST or progress.waited_cycles >= LONGEST_WAIT):
+            give_up(progress, segments, outcomes, settling, lock, guard, LOST_LOCK)
         return
     progress.level = segment.level
     if segment.kind == SWEEP:
