@@ -22,6 +22,7 @@ import numpy as np
 from rig.arming.run_options import RunOptions
 from rig.bench import load_bench
 from rig.bench.configuration import merged
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import plan_from
 from rig.errors import RigError
@@ -36,7 +37,7 @@ from rig.tuning import tune
 
 BENCHES = ("magnet-beam", "friction-beam", "magnet-beam-symmetric")
 FIRST_TRUE = 5000  # numbers of the true rigs; those of the twins are below
-SPOILT = ("as tuned", "as tuned", "gains", "levels", "window", "ramps", "patience")
+SPOILT = ("as tuned", "as tuned", "gains", "levels", "window", "ramps", "patience", "limit", "limit")
 
 
 def spoilt(plan: Plan, how: str, generator: np.random.Generator) -> Plan:
@@ -48,6 +49,7 @@ def spoilt(plan: Plan, how: str, generator: np.random.Generator) -> Plan:
     gains = ("frequency_integral_per_s", "response_integral_per_s", "k1", "k2")
     changes: dict[str, Any] = {
         "as tuned": {},
+        "limit": {},
         "gains": {"controller": {name: factor * controller[name] for name in gains if controller.get(name)}},
         "levels": {key: [min(factor, 2.9) * level for level in table[key]]},
         "window": {"controller": {"frequency_window_hz": [middle * (1 - 0.06 / factor), middle * (1 + 0.06 / factor)]}},
@@ -58,6 +60,16 @@ def spoilt(plan: Plan, how: str, generator: np.random.Generator) -> Plan:
         return plan_from(merged(table, changes), how)
     except RigError:
         return plan
+
+
+def limited(bench: Any, plan: Plan, how: str, generator: np.random.Generator) -> Any:
+    """Return the bench, for ``limit`` with a force limit of 1 to 4 times the linear force (N) at the highest level."""
+    if how != "limit" or not isinstance(plan, BackbonePlan) or plan.plant is None or plan.levels_key != "levels_m":
+        return bench
+    plant = plan.plant
+    force_n = 2.0 * plant.damping_ratio * plant.frequency_rad_s**2 * max(plan.levels) / plant.drive_shape**2
+    limits = bench.limits.model_copy(update={"force_n": float(force_n * 4.0 ** generator.uniform(0.0, 1.0))})
+    return bench.model_copy(update={"limits": limits})
 
 
 def pairs(count: int, seed: int, folder: Path) -> Iterator[tuple[str, Any, Plan, Knowledge]]:
@@ -76,6 +88,7 @@ def pairs(count: int, seed: int, folder: Path) -> Iterator[tuple[str, Any, Plan,
             true, tuned, told = _measured(true, folder / f"{number}.h5")
             how = SPOILT[number % len(SPOILT)]
             tried = spoilt(tuned, how, generator)
+            true = limited(true, tried, how, generator)
             tried.check(true)
         except RigError as error:
             print(f"{name} {number}: no pair ({str(error)[:100]})", flush=True)

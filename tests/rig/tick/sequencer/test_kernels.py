@@ -165,6 +165,61 @@ def test_a_ramp_up_that_waits_for_twenty_periods_is_out_of_reach_and_skips_its_p
     assert walk.codes()[:3] == ["DONE", "UNREACHABLE", "RUNNING"]
 
 
+def test_a_ramp_up_waits_while_the_phase_of_a_locked_loop_is_off():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0)).go(6)
+    waiting = walk.levels[-1]
+    walk.lock["strays"] = 1
+    walk.go(15)
+    assert walk.levels[-1] == pytest.approx(waiting, abs=0.02)
+    assert walk.progress["waits"][0] == 1
+    walk.lock["strays"] = 0
+    walk.go(5.9)
+    assert walk.codes() == ["DONE", "DONE"]
+    assert walk.levels[-1] == 3.0
+
+
+def test_before_the_first_lock_no_ramp_waits_for_the_phase():
+    walk = Walk(_ramp(3.0, 10.0))
+    walk.lock["state"], walk.lock["strays"], walk.progress["unlocked"] = LockState.ACQUIRING, 1, 1
+    assert walk.go(10.1).codes() == ["DONE"]
+
+
+@pytest.mark.parametrize(("kind", "on_the_way"), [(SegmentKind.LEVEL_SWEEP, 3.0), (SegmentKind.RAMP, 0.5)])
+def test_neither_a_sweep_of_the_level_nor_a_ramp_down_waits_for_the_phase(kind, on_the_way):
+    walk = Walk(_held(1.0, 1.0), Segment(kind, 0, on_the_way, 10.0, amplitude_law=AmplitudeLaw.RESPONSE))
+    walk.lock["strays"] = 1
+    assert walk.go(11.1).codes() == ["DONE", "DONE"]
+
+
+def test_a_ramp_that_waits_in_vain_or_loses_the_lock_meanwhile_has_lost_it():
+    ramp = _ramp(3.0, 10.0, point=0, on_lost_lock=OnFailure.SKIP)
+    for state, periods in ((LockState.LOST, 1), (LockState.LOCKED, 200)):
+        walk = Walk(_held(1.0, 1.0), ramp, *_point(1, 4.0)).go(6)
+        walk.lock["strays"] = 1
+        walk.go(periods - 0.9)
+        assert walk.codes()[1] == "RUNNING"
+        walk.lock["state"] = state
+        assert walk.go(1.0).codes()[1] == "LOST_LOCK"
+
+
+def test_after_a_lost_lock_the_next_ramp_begins_where_a_lock_was_held():
+    skipped = Walk(
+        _held(1.0, 5.0),
+        Segment(SegmentKind.RAMP, 0, 2.0, 10.0, on_lost_lock=OnFailure.SKIP),
+        Segment(SegmentKind.SETTLE, 0, 2.0, 50.0, on_lost_lock=OnFailure.SKIP),
+        Segment(SegmentKind.RAMP, 1, 3.0, 10.0),
+    ).go(14)
+    skipped.lock["state"] = LockState.ACQUIRING
+    skipped.go(3)
+    skipped.lock["state"] = LockState.LOST
+    before = len(skipped.levels)
+    skipped.go(20.2)
+    fall = skipped.levels[before:]
+    assert max(fall) == 2.0
+    assert fall[-1] == pytest.approx(1.0, abs=0.01)
+    assert skipped.go(10).levels[-1] == pytest.approx(3.0, abs=0.01)
+
+
 def test_a_ramp_down_from_a_level_that_was_not_reached_does_not_wait():
     walk = Walk(_held(3.0, 1.0), _ramp(1.0, 10.0), _held(1.0, 5.0)).go(1).go(11, unreached=True)
     assert walk.codes() == ["DONE", "DONE", "RUNNING"]
