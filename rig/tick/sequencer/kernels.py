@@ -68,10 +68,14 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
 
 
 @kernel
-def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray) -> None:
-    """Skip the remaining segments of a failed point."""
-    point = segments[progress.segment - 1].point
-    while progress.segment < progress.segments and segments[progress.segment].point == point:
+def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, lost: bool) -> None:
+    """Skip the remaining segments of a failed point; after a ``lost`` lock also what follows above the last level with a lock."""
+    failed = segments[progress.segment - 1]
+    while progress.segment < progress.segments:
+        segment = segments[progress.segment]
+        above = lost and 0.0 < progress.kept_level < segment.level and segment.amplitude_law == failed.amplitude_law
+        if segment.point != failed.point and not above:
+            return
         entry = outcomes[progress.segment]
         entry.outcome = SKIPPED
         entry.first_sample = progress.sample
@@ -111,7 +115,9 @@ def give_up(
         progress.finished = 1
         shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, progress.sample, False)
     else:
-        skip_point(progress, segments, outcomes)
+        if failure == LOST_LOCK:
+            lock.state = LOST
+        skip_point(progress, segments, outcomes, failure == LOST_LOCK)
 
 
 @kernel
@@ -236,8 +242,6 @@ def advance(
     progress.last_cycle = cycle
     if lock.state == LOCKED:
         progress.unlocked = 0
-        if not is_ramp(segment.kind):
-            progress.kept_level = segment.level
     if progress.returning == 1 and not has_returned(progress, cycle):
         return
     climbs = is_ramp(segment.kind) and segment.level > progress.level
@@ -254,6 +258,8 @@ def advance(
         progress.lag = between(progress.start_lag, segment.lag_rad, rise)
         progress.omega = between(progress.start_omega, segment.omega, rise)
         if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
+            if lock.state == LOCKED and segment.kind == LEVEL_SWEEP:
+                progress.kept_level = segment.level
             close_segment(progress, outcomes, settling, DONE)
         elif progress.unlocked == 1 and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE:
             give_up(progress, segments, outcomes, settling, lock, guard, OUTSIDE_WINDOW)
@@ -296,4 +302,6 @@ def advance(
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
         if spoilt and measure_again(progress, segments, outcomes, settling, DISTURBED):
             return
+        if lock.state == LOCKED and not spoilt:
+            progress.kept_level = segment.level
         close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE)

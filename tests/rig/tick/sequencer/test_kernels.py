@@ -202,13 +202,17 @@ def test_a_ramp_that_waits_in_vain_or_loses_the_lock_meanwhile_has_lost_it():
         assert walk.go(1.0).codes()[1] == "LOST_LOCK"
 
 
-def test_after_a_lost_lock_the_next_ramp_begins_where_a_lock_was_held():
+def test_after_a_lost_lock_higher_levels_are_left_out_and_the_next_ramp_begins_where_a_lock_was_held():
     skipped = Walk(
         _held(1.0, 5.0),
-        Segment(SegmentKind.RAMP, 0, 2.0, 10.0, on_lost_lock=OnFailure.SKIP),
-        Segment(SegmentKind.SETTLE, 0, 2.0, 50.0, on_lost_lock=OnFailure.SKIP),
-        Segment(SegmentKind.RAMP, 1, 3.0, 10.0),
-    ).go(14)
+        _ramp(2.0, 10.0, point=0, on_lost_lock=OnFailure.SKIP),
+        _held(2.0, 50.0),
+        *(_ramp(3.0, 10.0, point=1), _held(3.0, 10.0)),
+        _ramp(0.5, 10.0, point=2),
+    )
+    skipped.table["kind"][2], skipped.table["point"][2] = SegmentKind.SETTLE, 0
+    skipped.table["on_lost_lock"][2] = OnFailure.SKIP
+    skipped.go(14)
     skipped.lock["state"] = LockState.ACQUIRING
     skipped.go(3)
     skipped.lock["state"] = LockState.LOST
@@ -217,7 +221,9 @@ def test_after_a_lost_lock_the_next_ramp_begins_where_a_lock_was_held():
     fall = skipped.levels[before:]
     assert max(fall) == 2.0
     assert fall[-1] == pytest.approx(1.0, abs=0.01)
-    assert skipped.go(10).levels[-1] == pytest.approx(3.0, abs=0.01)
+    skipped.go(10)
+    assert skipped.levels[-1] == pytest.approx(0.5, abs=0.01)
+    assert skipped.codes() == ["DONE", "DONE", "LOST_LOCK", "SKIPPED", "SKIPPED", "DONE"]
 
 
 def test_a_ramp_down_from_a_level_that_was_not_reached_does_not_wait():
