@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simulators.layout import DIVERGED, RigArrays, RigState
 from simulators.plant.kernels import advance, combine
-from simulators.sensing.kernels import anti_alias, condition, convert, delay, filter_channels, hold, sense
+from simulators.sensing.kernels import condition, convert, delay, filter_output, hold, sense
 from vibrolock.compiled import inner_kernel, kernel
 
 
@@ -46,10 +46,7 @@ def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.fl
 @inner_kernel
 def read(rig: RigArrays, state: RigState, instant: int) -> int:
     """Convert sensed values to conditioned, filtered volts and store them for skewed channels; return SENSOR_CLIPPED or 0."""
-    flags = 0
-    condition(rig.channels, state.filters, state.outputs)
-    if rig.sections.shape[0] > 0:
-        flags = anti_alias(rig.channels, rig.sections, state.memory, state.outputs)
+    flags = condition(rig.conditioning, state.filters, rig.sections, state.memory, state.outputs)
     n_ring = state.history.shape[0]
     if n_ring > 0:
         for c in range(rig.channels.size):
@@ -61,14 +58,11 @@ def read(rig: RigArrays, state: RigState, instant: int) -> int:
 def advance_internally(rig: RigArrays, state: RigState, instant: int, held_v: float) -> int:
     """Advance by one sample over its internal instants, with filters before and after the plant; return the flags."""
     flags = 0
-    filtered_v = state.output_v
     for m in range(rig.converter[0].oversampling):
         if m > 0:
             sense(rig.sense, state.inputs, state.outputs)
             flags |= read(rig, state, instant + m)
-        filtered_v[0] = held_v
-        filter_channels(rig.reconstruction, state.output_memory, filtered_v)
-        flags |= advance(rig, state, filtered_v[0])
+        flags |= advance(rig, state, filter_output(rig.reconstruction, state.output_memory, held_v))
     return flags
 
 

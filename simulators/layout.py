@@ -72,17 +72,13 @@ the process that made the table; ``parameters``: the numbers passed to it."""
 
 CHANNEL = np.dtype(
     [
-        ("hold", "f8"),
-        ("old", "f8"),
-        ("new", "f8"),
         ("noise_v", "f8"),
-        ("sensitivity", "f8"),
         ("range_v", "f8"),
         ("delay", "i8"),
     ]
 )
-"""A sensor: coefficients of the low-pass that forms its high-pass, noise of sensor and converter together (RMS, V), V per SI
-unit, the sensor's own range (V), and the number of internal instants back to its first tap."""
+"""A sensor: noise of sensor and converter together (RMS, V), the sensor's own range (V), and the number of internal instants
+back to its first tap."""
 
 CONVERTER = np.dtype(
     [
@@ -104,13 +100,14 @@ class RigArrays(NamedTuple):
     ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_joint]``; its
     rows are ``[joint coordinates, local coordinates, x]``. ``correct`` [n_site, n_row]: contribution of a change of each site
     force over the sub-step. ``elements`` [2, n_element, n_joint]: stiffness and slip force of every Jenkins element;
-    ``stuck`` [n_joint]: sum of the stiffnesses of a joint. ``sense`` [n_input, n_channel]: outputs (SI) from the same input
-    vector. Inputs, rows, joints and the columns of ``sense`` are padded with zeros to whole vectors of the compiled loops.
+    ``stuck`` [n_joint]: sum of the stiffnesses of a joint. ``sense`` [n_input, n_padded]: outputs (SI) from the same input
+    vector. Inputs, rows, joints and channels (n_padded) are padded with zeros to whole vectors of the compiled loops.
 
-    ``noise_keys`` [1 + n_channel]: key of the output, then of each channel. ``sections`` [n_section, 5, n_channel] and
-    ``reconstruction`` [n_section, 5, 1]: filters of sensors and output as second-order sections, b_0 b_1 b_2 a_1 a_2, at
-    the internal rate; n_section is 0 without filters. ``taps`` [n_channel, n_tap]: weights that interpolate a skewed
-    channel.
+    ``conditioning`` [5, n_padded]: coefficients hold, old and new of the low-pass that forms a sensor's high-pass, V per SI
+    unit, and the sensor's range (V). ``noise_keys`` [1 + n_channel]: key of the output, then of each channel. ``sections``
+    [n_section, 5, n_padded] and ``reconstruction`` [n_section, 5]: filters of sensors and output as second-order sections,
+    b_0 b_1 b_2 a_1 a_2, at the internal rate; n_section is 0 without filters. ``taps`` [n_channel, n_tap]: weights that
+    interpolate a skewed channel.
     """
 
     plant: NDArray[Any]
@@ -121,6 +118,7 @@ class RigArrays(NamedTuple):
     stuck: NDArray[np.float64]
     sense: NDArray[np.float64]
     channels: NDArray[Any]
+    conditioning: NDArray[np.float64]
     converter: NDArray[Any]
     noise_keys: NDArray[np.uint64]
     sections: NDArray[np.float64]
@@ -133,8 +131,8 @@ class RigState(NamedTuple):
 
     ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_joint]`` at the present instant. ``deflection``
     [n_joint] and ``friction`` [n_element, n_joint]: committed state of the Jenkins elements. ``filters``
-    [2, n_channel]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
-    which its noise is drawn. ``memory`` [n_section, 2, n_channel] and ``output_memory`` [n_section, 2, 1]: state of the
+    [2, n_padded]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
+    which its noise is drawn. ``memory`` [n_section, 2, n_padded] and ``output_memory`` [n_section, 2]: state of the
     filters. ``history`` [n_ring, n_channel]: ring of conditioned volts at internal instants; its length is a power of two, or 0
     if no channel is skewed. The other fields carry nothing from one sample to the next.
     """
@@ -147,7 +145,6 @@ class RigState(NamedTuple):
     memory: NDArray[np.float64]
     output_memory: NDArray[np.float64]
     history: NDArray[np.float64]
-    output_v: NDArray[np.float64]
     rows: NDArray[np.float64]
     forces: NDArray[np.float64]
     joints: NDArray[np.float64]

@@ -16,7 +16,7 @@ from numba.core import types
 from numba.core.datamodel import models
 from numba.extending import intrinsic, overload, register_model
 
-__all__ = ["WIDTH", "greatest", "least", "load", "spread", "store"]
+__all__ = ["WIDTH", "differ", "greatest", "least", "load", "spread", "store"]
 
 WIDTH = 8
 
@@ -81,6 +81,17 @@ def _lane_by_lane(build: Callable[[Any, Any, Any], Any]) -> Any:
     return intrinsic(typed)
 
 
+def _differ(typing: Any, a: Any, b: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        unequal = builder.fcmp_unordered("!=", *arguments)
+        mask = ir.IntType(WIDTH)
+        return builder.icmp_unsigned("!=", builder.bitcast(unequal, mask), ir.Constant(mask, 0))
+
+    return types.boolean(_lanes, _lanes), generate
+
+
+differ: Any = intrinsic(_differ)
+"""``differ(a, b)``: whether any lane differs, or is not a number."""
 load: Any = intrinsic(_load)
 """``load(array, index)``: return the eight numbers from a flat index on."""
 store: Any = intrinsic(_store)

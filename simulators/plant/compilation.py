@@ -123,6 +123,7 @@ def rig_arrays(
     sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
     delays, taps = skew_taps(sensors, converter)
     channels = [_channel(*pair, converter, noise_scale) for pair in zip(sensors, delays, strict=True)]
+    conditioning = [_conditioning(sensor, converter) for sensor in sensors]
     return RigArrays(
         plant=np.array([sizes], PLANT),
         step=step.predictor,
@@ -132,9 +133,10 @@ def rig_arrays(
         stuck=jenkins[0].sum(axis=0),
         sense=pad(np.array(outputs).T),
         channels=np.array(channels, CHANNEL),
+        conditioning=pad(np.array(conditioning).T, rows=False),
         converter=_converter(converter),
         noise_keys=np.random.SeedSequence(seed).generate_state(1 + len(sensors), np.uint64).astype(np.uint64),
-        sections=channel_sections(sensors, converter),
+        sections=_padded_sections(channel_sections(sensors, converter)),
         reconstruction=output_sections(converter),
         taps=taps,
     )
@@ -171,24 +173,33 @@ def at_rest(rig: RigArrays) -> RigState:
         inputs=aligned(n_input),
         deflection=aligned(rig.stuck.size),
         friction=aligned(rig.elements.shape[1:]),
-        filters=np.zeros((2, rig.channels.size)),
+        filters=aligned((2, rig.sense.shape[1])),
         counter=np.zeros(1, np.int64),
-        memory=np.zeros((rig.sections.shape[0], 2, rig.sections.shape[2])),
-        output_memory=np.zeros((rig.reconstruction.shape[0], 2, 1)),
+        memory=aligned((rig.sections.shape[0], 2, rig.sections.shape[2])),
+        output_memory=np.zeros((rig.reconstruction.shape[0], 2)),
         history=np.zeros((ring_size(rig.channels["delay"], rig.taps), rig.channels.size)),
-        output_v=np.zeros(1),
         rows=aligned(n_row + WIDTH),  # the last vector of x may reach beyond
         forces=np.zeros(rig.sites.size),
         joints=aligned(rig.stuck.size),
         changes=np.zeros(rig.correct.shape[0]),
-        outputs=np.zeros(rig.sense.shape[1]),
+        outputs=aligned(rig.sense.shape[1]),
     )
 
 
-def _channel(
-    sensor: Sensor, delay: int, converter: Converter, noise_scale: float
-) -> tuple[float, float, float, float, float, float, int]:
-    """Return the record of a sensor's channel.
+def _channel(sensor: Sensor, delay: int, converter: Converter, noise_scale: float) -> tuple[float, float, int]:
+    """Return the record of a sensor's channel."""
+    noise_v = math.hypot(noise_scale * sensor.noise_rms * sensor.sensitivity_v_per_unit, converter.adc_noise_v)
+    return noise_v, sensor.range_v, delay
+
+
+def _padded_sections(sections: Matrix) -> Matrix:
+    """Return sections [n_section, 5, n_channel] with their channels padded with zeros."""
+    n_section, n_coefficient, n_channel = sections.shape
+    return pad(sections.reshape(-1, n_channel), rows=False).reshape(n_section, n_coefficient, round_up(n_channel))
+
+
+def _conditioning(sensor: Sensor, converter: Converter) -> tuple[float, float, float, float, float]:
+    """Return how a sensor turns its quantity into volts: a column of ``RigArrays.conditioning``.
 
     The sensor's high-pass subtracts the low-pass ``y' = w_c (value - y)``, exact for a value that changes linearly from one
     internal instant to the next.
@@ -197,8 +208,7 @@ def _channel(
     hold = float(np.exp(-x))
     held_1 = -float(np.expm1(-x))
     new = 1.0 - held_1 / x if x > 0.0 else 0.0
-    noise_v = math.hypot(noise_scale * sensor.noise_rms * sensor.sensitivity_v_per_unit, converter.adc_noise_v)
-    return (hold, held_1 - new, new, noise_v, sensor.sensitivity_v_per_unit, sensor.range_v, delay)
+    return hold, held_1 - new, new, sensor.sensitivity_v_per_unit, sensor.range_v
 
 
 def _converter(converter: Converter) -> NDArray[Any]:

@@ -50,11 +50,11 @@ def channel_sections(sensors: Sequence[Sensor], converter: Converter) -> Matrix:
 
 
 def output_sections(converter: Converter) -> Matrix:
-    """Return the sections [n_section, 5, 1] of the reconstruction filter."""
+    """Return the sections [n_section, 5] of the reconstruction filter."""
     sections = low_pass_sections(
         converter.reconstruction_order, converter.reconstruction_hz, converter.internal_rate_hz
     )
-    return np.ascontiguousarray(sections[..., np.newaxis])
+    return np.ascontiguousarray(sections)
 
 
 def dc_delay(sections: Matrix) -> NDArray[np.float64]:
@@ -78,7 +78,7 @@ def channel_delays(sensors: Sequence[Sensor], converter: Converter) -> NDArray[n
 
 def filter_delay(converter: Converter) -> float:
     """Return the delay of every channel by anti-alias and reconstruction filter, in samples at low frequency."""
-    internal = _anti_alias_delay(converter) + float(dc_delay(output_sections(converter))[0])
+    internal = _anti_alias_delay(converter) + float(dc_delay(output_sections(converter)[..., np.newaxis])[0])
     return internal / converter.oversampling
 
 

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.layout import DAC_CLIPPED, SENSOR_CLIPPED
+from simulators.plant.kernels import combine
 from simulators.sensing.noise.kernels import normal
 from vibrolock.compiled import Record, inner_kernel, kernel
+from vibrolock.lanes import WIDTH, differ, greatest, least, load, spread, store
 
 
 @kernel
@@ -24,74 +26,69 @@ def quantise(volts: float, step_v: float, range_v: float) -> float:
 
 
 @kernel
-def filter_channels(sections: NDArray[np.float64], memory: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    """Filter ``values`` [n_channel] in place by second-order sections ``[n_section, 5, n_channel]``: b_0 b_1 b_2 a_1 a_2.
+def filter_output(sections: NDArray[np.float64], memory: NDArray[np.float64], volts: float) -> float:
+    """Filter a voltage by second-order sections ``[n_section, 5]``: b_0 b_1 b_2 a_1 a_2.
 
-    Transposed direct form II, with ``memory`` [n_section, 2, n_channel]; the inner loop runs over the channels.
+    Transposed direct form II, with ``memory`` [n_section, 2].
     """
     for s in range(sections.shape[0]):
-        for c in range(sections.shape[2]):
-            x = values[c]
-            y = sections[s, 0, c] * x + memory[s, 0, c]
-            memory[s, 0, c] = (sections[s, 1, c] * x - sections[s, 3, c] * y) + memory[s, 1, c]
-            memory[s, 1, c] = sections[s, 2, c] * x - sections[s, 4, c] * y
-            values[c] = y
+        y = sections[s, 0] * volts + memory[s, 0]
+        memory[s, 0] = (sections[s, 1] * volts - sections[s, 3] * y) + memory[s, 1]
+        memory[s, 1] = sections[s, 2] * volts - sections[s, 4] * y
+        volts = y
+    return volts
 
 
 @inner_kernel
 def sense(columns: NDArray[np.float64], weights: NDArray[np.float64], values: NDArray[np.float64]) -> bool:
-    """Compute the sensed quantities (SI) ``values = sum_j weights[j] columns[j]``; return False if one is not finite.
-
-    Both lengths are multiples of four. The loop takes four channels and two columns at a time, so that the sums stay in
-    registers.
-    """
+    """Compute the sensed quantities (SI) ``values = sum_j weights[j] columns[j]``; return False if one is not finite."""
+    combine(columns, weights, values)
     finite = True
-    for c in range(0, columns.shape[1], 4):
-        a_0, a_1, a_2, a_3 = 0.0, 0.0, 0.0, 0.0
-        b_0, b_1, b_2, b_3 = 0.0, 0.0, 0.0, 0.0
-        for j in range(0, columns.shape[0], 2):
-            a, b = weights[j], weights[j + 1]
-            a_0 += a * columns[j, c]
-            a_1 += a * columns[j, c + 1]
-            a_2 += a * columns[j, c + 2]
-            a_3 += a * columns[j, c + 3]
-            b_0 += b * columns[j + 1, c]
-            b_1 += b * columns[j + 1, c + 1]
-            b_2 += b * columns[j + 1, c + 2]
-            b_3 += b * columns[j + 1, c + 3]
-        values[c], values[c + 1], values[c + 2], values[c + 3] = a_0 + b_0, a_1 + b_1, a_2 + b_2, a_3 + b_3
-        finite &= math.isfinite((values[c] + values[c + 1]) + (values[c + 2] + values[c + 3]))
+    for c in range(0, columns.shape[1], WIDTH):
+        sensed = load(values, c)
+        finite &= not differ(sensed - sensed, spread(0.0))  # inf - inf is not a number either
     return finite
 
 
 @inner_kernel
-def condition(channels: NDArray[Any], filters: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    """Turn sensed ``values`` [n_channel] (SI) into volts, in place.
-
-    Each sensor is AC-coupled by a first-order high-pass, exact for values that change linearly between internal
-    instants; ``filters`` [2, n_channel] holds its low-passed and its last value.
-    """
-    for c in range(channels.size):
-        channel = channels[c]
-        value = values[c]
-        low = channel.hold * filters[0, c] + channel.old * filters[1, c] + channel.new * value
-        filters[0, c] = low
-        filters[1, c] = value
-        values[c] = (value - low) * channel.sensitivity
-
-
-@kernel
-def anti_alias(
-    channels: NDArray[Any], sections: NDArray[np.float64], memory: NDArray[np.float64], values: NDArray[np.float64]
+def condition(
+    coefficients: NDArray[np.float64],
+    filters: NDArray[np.float64],
+    sections: NDArray[np.float64],
+    memory: NDArray[np.float64],
+    values: NDArray[np.float64],
 ) -> int:
-    """Clip the conditioned volts at each sensor's range and filter them, in place; return SENSOR_CLIPPED or 0."""
+    """Turn sensed ``values`` [n_padded] (SI) into volts in place, as they reach the converter; return SENSOR_CLIPPED or 0.
+
+    ``coefficients`` [5, n_padded] are those of `simulators.layout.RigArrays`. Each sensor is AC-coupled by a first-order
+    high-pass, exact for values that change linearly between internal instants; ``filters`` [2, n_padded] holds its low-passed
+    and its last value. Where there are filters, volts are clipped at the sensor's range and then filtered by second-order
+    sections ``[n_section, 5, n_padded]`` (b_0 b_1 b_2 a_1 a_2) in transposed direct form II, with ``memory``
+    [n_section, 2, n_padded].
+    """
+    n, n_section = filters.shape[1], sections.shape[0]
     flags = 0
-    for c in range(channels.size):
-        range_v = channels[c].range_v
-        if abs(values[c]) > range_v:
-            flags = SENSOR_CLIPPED
-            values[c] = min(max(values[c], -range_v), range_v)
-    filter_channels(sections, memory, values)
+    for c in range(0, n, WIDTH):
+        value = load(values, c)
+        held, old = load(coefficients, c) * load(filters, c), load(coefficients, n + c) * load(filters, n + c)
+        low = held + old + load(coefficients, 2 * n + c) * value
+        store(filters, c, low)
+        store(filters, n + c, value)
+        x = (value - low) * load(coefficients, 3 * n + c)
+        if n_section > 0:
+            highest = load(coefficients, 4 * n + c)
+            clipped = least(greatest(x, spread(0.0) - highest), highest)
+            if differ(clipped, x):
+                flags = SENSOR_CLIPPED
+            x = clipped
+        for s in range(n_section):
+            at, state = 5 * n * s + c, 2 * n * s + c
+            y = load(sections, at) * x + load(memory, state)
+            first = load(sections, at + n) * x - load(sections, at + 3 * n) * y + load(memory, state + n)
+            store(memory, state, first)
+            store(memory, state + n, load(sections, at + 2 * n) * x - load(sections, at + 4 * n) * y)
+            x = y
+        store(values, c, x)
     return flags
 
 

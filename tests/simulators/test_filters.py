@@ -10,7 +10,7 @@ from simulators.analysis.frequency_responses import frequency_response
 from simulators.kernels import run_open_loop
 from simulators.layout import Flag, RigState
 from simulators.sensing.filters import dc_delay, lagrange_taps, low_pass_sections
-from simulators.sensing.kernels import filter_channels
+from simulators.sensing.kernels import condition, filter_output
 from simulators.shipped import shipped_specimens
 from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
@@ -45,18 +45,34 @@ def plant_response(rig: VirtualRig, row: np.ndarray, frequency_hz: float) -> com
 @pytest.mark.parametrize(("order", "corner_hz"), [(1, 300.0), (2, 300.0), (4, 320.0), (7, 100.0)])
 def test_filter_is_the_analogue_butterworth_filter(order: int, corner_hz: float) -> None:
     rate_hz = 8000.0
-    sections = low_pass_sections(order, corner_hz, rate_hz)[..., np.newaxis]
+    sections = low_pass_sections(order, corner_hz, rate_hz)
     b, a = signal.butter(order, 2 * np.pi * corner_hz, analog=True)
     for frequency_hz in (20.0, 0.5 * corner_hz, corner_hz, 2 * corner_hz):
-        memory = np.zeros((sections.shape[0], 2, 1))
-        values = np.cos(2 * np.pi * frequency_hz / rate_hz * np.arange(4000))[:, np.newaxis]
-        for value in values:
-            filter_channels(sections, memory, value)
+        memory = np.zeros((sections.shape[0], 2))
+        values = np.cos(2 * np.pi * frequency_hz / rate_hz * np.arange(4000))
+        filtered = np.array([filter_output(sections, memory, value) for value in values])
         _, (analogue,) = signal.freqs(b, a, [2 * np.pi * frequency_hz])
         # The stated shift of frequency, against a slope of the phase of up to 0.8 rad per corner and order.
         shift = max((np.pi * corner_hz / rate_hz) ** 2, (np.pi * frequency_hz / rate_hz) ** 2) / 3
-        measured = phasor(values[:, 0], frequency_hz, rate_hz)
+        measured = phasor(filtered, frequency_hz, rate_hz)
         assert abs(measured - analogue) < 1e-6 + order * shift * frequency_hz / corner_hz * abs(analogue)
+
+
+def test_every_channel_is_clipped_and_then_filtered_by_its_own_sections() -> None:
+    n, rng = 16, np.random.default_rng(1)  # two vectors
+    own = [signal.butter(3, corner, fs=8000.0, output="sos") for corner in np.linspace(100.0, 900.0, n)]
+    sections = np.ascontiguousarray(np.moveaxis([sos[:, [0, 1, 2, 4, 5]] for sos in own], 0, -1))
+    values, clipped = 3.0 * rng.standard_normal((200, n)), []
+    coefficients = np.zeros((5, n))
+    coefficients[3], coefficients[4] = np.linspace(0.5, 2.0, n), np.linspace(1.0, 20.0, n)
+    volts = np.clip(coefficients[3] * values, -coefficients[4], coefficients[4])
+    expected = np.stack([signal.sosfilt(sos, volts[:, c]) for c, sos in enumerate(own)], axis=1)
+    filters, memory = np.zeros((2, n)), np.zeros((2, 2, n))
+    for value in values:
+        beyond = bool(np.any(np.abs(coefficients[3] * value) > coefficients[4]))
+        clipped.append((condition(coefficients, filters, sections, memory, value) == Flag.SENSOR_CLIPPED) == beyond)
+    assert all(clipped)
+    np.testing.assert_allclose(values, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 8])

@@ -38,9 +38,9 @@ def test_sensors_are_coupled_by_the_high_pass_that_was_asked_for(frequency_hz: f
     corner_hz, rate_hz, n = 0.3, 5000.0, 150_000
     rig, _ = ideal(sensors=[_force_sensor() | {"high_pass_hz": corner_hz}]).build()
     omega = 2 * np.pi * frequency_hz / rate_hz
-    filters, readings = np.zeros((2, 1)), np.cos(omega * np.arange(n))[:, np.newaxis]
+    filters, readings = np.zeros((2, 8)), np.tile(np.cos(omega * np.arange(n))[:, np.newaxis], 8)
     for k in range(n):
-        condition(rig.channels, filters, readings[k])
+        condition(rig.conditioning, filters, np.zeros((0, 5, 8)), np.zeros((0, 2, 8)), readings[k])
     settled = slice(n - 50_000, n)
     phasor = 2 * np.mean(readings[settled, 0] * np.exp(-1j * omega * np.arange(n)[settled]))
     analogue = 1j * frequency_hz / (1j * frequency_hz + corner_hz)

@@ -30,10 +30,11 @@ def imposed_joint() -> tuple[RigArrays, RigState]:
         stuck=elements[0].sum(axis=0),
         sense=np.zeros((8, 8)),
         channels=np.zeros(1, CHANNEL),
+        conditioning=np.zeros((5, 8)),
         converter=np.zeros(1, CONVERTER),
         noise_keys=np.zeros(2, np.uint64),
-        sections=np.zeros((0, 5, 1)),
-        reconstruction=np.zeros((0, 5, 1)),
+        sections=np.zeros((0, 5, 8)),
+        reconstruction=np.zeros((0, 5)),
         taps=np.zeros((1, 1)),
     )
     return rig, at_rest(rig)
