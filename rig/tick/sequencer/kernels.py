@@ -69,7 +69,7 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
 
 @kernel
 def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, lost: bool) -> None:
-    """Skip the remaining segments of a failed point; after a ``lost`` lock also what follows above the last level with a lock."""
+    """Skip the remaining segments of a failed point; after a ``lost`` lock also what follows above the last level with one."""
     failed = segments[progress.segment - 1]
     while progress.segment < progress.segments:
         segment = segments[progress.segment]
@@ -217,9 +217,9 @@ def advance(
 ) -> None:
     """Run the sequencer for one sample: set level, lag and frequency, move on after a segment, end the run after the last.
 
-    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached or the phase of a loop
-    that has been locked is off, an upward ramp waits; that is a held level to the lock. After a lost lock the next ramp begins
-    where a lock was last held.
+    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached or the phase of a
+    loop that has been locked is off, an upward ramp waits; that is a held level to the lock. After a lost lock the next ramp
+    begins where a lock was last held.
     """
     if progress.finished:
         return
