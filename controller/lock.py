@@ -51,8 +51,8 @@ LOCK = np.dtype(
     ]
 )
 """State of the phase lock (one record). ``close_periods``, ``far_periods``: in a row, up to the present one;
-``astray_periods``: far periods less close ones at a held level; ``strays``: the error of the present period exceeds half of what
-counts as far; ``gained``: there has been a lock before."""
+``astray_periods``: far periods less close ones at a held level; ``strays``: the error of the present period exceeds half of
+what counts as far; ``gained``: there has been a lock before."""
 
 
 class LockRule(Settings):
