@@ -38,8 +38,6 @@ def sample(rig: RigArrays, state: RigState, voltage: float, out_v: NDArray[np.fl
     flags |= convert(rig.channels, converter, rig.noise_keys, index, values, out_v)
     held_v, clipped = hold(converter, rig.noise_keys[0], voltage, index)
     flags |= clipped
-    if oversampling == 1:
-        return flags | advance(rig, state, held_v)
     return flags | advance_internally(rig, state, index * oversampling, held_v)
 
 
@@ -54,7 +52,7 @@ def read(rig: RigArrays, state: RigState, instant: int) -> int:
     return flags
 
 
-@kernel
+@inner_kernel
 def advance_internally(rig: RigArrays, state: RigState, instant: int, held_v: float) -> int:
     """Advance by one sample over its internal instants, with filters before and after the plant; return the flags."""
     flags = 0
