@@ -1,0 +1,89 @@
+"""Dispatchers of kernels: what numba makes of a function, with machine code found by content. Loads numba.
+
+Only `vibrolock.compiled` uses it, when a kernel is first called.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+
+from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
+
+__all__ = ["dispatcher"]
+
+setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)
+
+
+def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return numba's dispatcher of a kernel, cached on disk; return the function itself if numba is told not to compile."""
+    made: Any = numba.njit(**options)(function)
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
+        made._cache = _ContentCache(made)
+    return made
+
+
+class _ContentLocator:
+    """Tells numba where a kernel's machine code is: in one folder, under the kernel's name and digest."""
+
+    def __init__(self, digest: str) -> None:
+        self._digest = digest
+        self._py_file = ""  # numba names it in a warning
+
+    @classmethod
+    def from_function(cls, function: Any, _: str) -> "_ContentLocator":
+        return cls(function._content_digest)
+
+    def ensure_cache_path(self) -> None:
+        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        return str(kernel_cache_folder())
+
+    def get_source_stamp(self) -> str:
+        return self._digest
+
+    def get_disambiguator(self) -> str:
+        return self._digest[:24]
+
+
+class _ContentImpl(CompileResultCacheImpl):
+    _locator_classes: list[type[object]] = [_ContentLocator]  # noqa: RUF012
+
+
+class _ContentCache(FunctionCache):
+    """numba's cache of one kernel, opened at the kernel's first call, when all names that it uses are defined."""
+
+    _impl_class = _ContentImpl
+
+    def __init__(self, dispatcher: Any) -> None:
+        self._dispatcher: Any = dispatcher
+        self._opened = False
+
+    def _open(self) -> None:
+        if self._opened:
+            return
+        self._opened = True
+        function = self._dispatcher.py_func
+        function._content_digest = content_digest(self._dispatcher)
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        note_use(Path(self._cache_file._index_path))
+
+    @property
+    def cache_path(self) -> str:
+        self._open()
+        return str(super().cache_path)
+
+    def flush(self) -> None:
+        self._open()
+        super().flush()  # type: ignore[no-untyped-call]
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        self._open()
+        try:
+            return super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+        except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
+            self.flush()
+            return None
