@@ -17,5 +17,5 @@ class Part(BaseModel):
     """Frozen; unknown keys, wrong types and non-finite numbers are refused. The docstring under a field describes it."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+        defer_build=True, frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )

@@ -120,7 +120,7 @@ def _kind(value: Any) -> str:
 class MappingTable(BaseModel):
     """Base of every part of a mapping: frozen, unknown keys are refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, defer_build=True)
 
 
 class ChannelMapping(MappingTable):

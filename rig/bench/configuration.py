@@ -24,7 +24,7 @@ FEW_NAMES = 10  # listed in one message
 class Configured(BaseModel):
     """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
