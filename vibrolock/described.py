@@ -36,7 +36,7 @@ def _docstrings(module: str) -> dict[str, dict[str, str]]:
     """Return the docstrings under the annotated names of each class of a module; none if there is no source."""
     try:
         tree = ast.parse(inspect.getsource(import_module(module)))
-    except (OSError, TypeError):
+    except (ImportError, OSError, TypeError):
         return {}
     return {node.name: dict(_described(node.body)) for node in tree.body if isinstance(node, ast.ClassDef)}
 
