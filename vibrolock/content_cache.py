@@ -1,6 +1,6 @@
-"""Dispatchers of kernels: what numba makes of a function, with machine code found by content. Loads numba.
+"""What numba makes of a function, with machine code cached in one folder. Importing this module loads numba.
 
-Only `vibrolock.compiled` uses it, when a kernel is first called.
+Kernels are declared with `vibrolock.compiled`, which comes here when one is first called.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
 
-__all__ = ["dispatcher"]
+__all__ = ["c_function", "dispatcher"]
 
 setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)
 
@@ -23,6 +23,12 @@ def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         made._cache = _ContentCache(made)
     return made
+
+
+def c_function(signature: str) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles a C function of a signature at once; its machine code is found by its file."""
+    decorate: Callable[[Callable[..., Any]], Any] = numba.cfunc(signature, cache=True)
+    return decorate
 
 
 class _ContentLocator:
