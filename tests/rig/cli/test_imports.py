@@ -30,19 +30,8 @@ LIGHT = {
 """Libraries of other libraries that take no time."""
 
 MATPLOTLIB = {
-    *(
-        "matplotlib",
-        "mpl_toolkits",
-        "PIL",
-        "cycler",
-        "dateutil",
-        "six",
-        "fontTools",
-        "kiwisolver",
-        "packaging",
-        "pyparsing",
-    ),
-    "contourpy",
+    *("matplotlib", "mpl_toolkits", "PIL", "contourpy", "cycler", "dateutil", "fontTools", "kiwisolver", "packaging"),
+    *("pyparsing", "six"),
 }
 NUMBA = {"numba", "llvmlite", "scipy"}
 OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
