@@ -8,4 +8,4 @@ __all__ = ["Settings"]
 class Settings(BaseModel):
     """Settings in SI units: validated, frozen, without unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)

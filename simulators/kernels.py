@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.layout import DIVERGED, RigArrays, RigState
-from simulators.plant.kernels import advance, combine
+from simulators.plant.kernels import advance
+from simulators.products import combine
 from simulators.sensing.kernels import condition, convert, delay, filter_output, hold, sense
 from vibrolock.compiled import inner_kernel, kernel
 

@@ -2,7 +2,9 @@
 
 from typing import Annotated, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
+
+from vibrolock.described import Described
 
 __all__ = ["Part", "Positive", "Several"]
 
@@ -13,9 +15,7 @@ Several = Annotated[tuple[Item, ...], Field(strict=False)]
 """A tuple that may also be given as a list, as in TOML."""
 
 
-class Part(BaseModel):
+class Part(Described):
     """Frozen; unknown keys, wrong types and non-finite numbers are refused. The docstring under a field describes it."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(defer_build=True, frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

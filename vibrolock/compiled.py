@@ -5,28 +5,28 @@ sample and never raises. It returns codes; its caller raises.
 
 numba's own cache identifies a kernel by its file. It does not notice changes in other files, of a called kernel or of a
 constant that is compiled in. Here machine code is found by a digest of everything that determines it (`content_digest`).
+
+numba itself is loaded when a kernel is first called, so that a module may declare kernels at no cost to those who call none.
 """
 
 import contextlib
 import enum
+import functools
 import hashlib
 import os
-import platform
 import re
 import shutil
 import tempfile
+import threading
 import time
 import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
-import llvmlite.binding
-import numba
 import numpy as np
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
-__all__ = ["Record", "content_digest", "inner_kernel", "kernel", "kernel_cache_folder"]
+__all__ = ["Record", "content_digest", "inner_kernel", "kernel", "kernel_cache_folder", "note_use"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -37,9 +37,6 @@ Record: TypeAlias = Any
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "_nrt": False}
 """Options of numba: IEEE arithmetic only, so that runs repeat bit for bit. Kernels allocate nothing, so that arrays inside them
 need no reference counts, which would cost a third of the time of a sample."""
-
-LEVEL_3 = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
-"""What x86-64-v3 adds to a processor."""
 
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 _UNUSED_AFTER_DAYS = 30
@@ -61,12 +58,46 @@ def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _compiled(function: Callable[P, R], options: dict[str, Any]) -> Callable[P, R]:
-    dispatcher: Any = numba.njit(**options)(function)
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
-        return function
-    dispatcher._cache = _ContentCache(dispatcher)
-    compiled: Callable[P, R] = dispatcher
-    return compiled
+    declared: Any = _Kernel(function, options)
+    return declared  # type: ignore[no-any-return]
+
+
+class _Kernel:
+    """A kernel as declared. What numba makes of it is made when it is first asked for.
+
+    It is called like a function and named in other kernels; numba asks an object that it does not know for its type.
+    """
+
+    _making = threading.RLock()
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        self.py_func = function
+        self._options = options
+        self._dispatcher: Any = None
+        functools.update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return (self._dispatcher or self._made())(*arguments, **named)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self._made(), name)
+
+    def __reduce__(self) -> str:
+        return str(self.py_func.__qualname__)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self._made()._numba_type_
+
+    def _made(self) -> Any:
+        from vibrolock.content_cache import dispatcher
+
+        with self._making:
+            if self._dispatcher is None:
+                self._dispatcher = dispatcher(self.py_func, self._options)
+            return self._dispatcher
 
 
 def content_digest(kernel: Any) -> str:
@@ -126,70 +157,6 @@ def _code(code: types.CodeType, names: dict[str, Any], seen: set[int], doc: str 
             yield from _content(names[name], seen)
 
 
-class _ContentLocator:
-    """Tells numba where a kernel's machine code is: in one folder, under the kernel's name and digest."""
-
-    def __init__(self, digest: str) -> None:
-        self._digest = digest
-        self._py_file = ""  # numba names it in a warning
-
-    @classmethod
-    def from_function(cls, function: Any, _: str) -> "_ContentLocator":
-        return cls(function._content_digest)
-
-    def ensure_cache_path(self) -> None:
-        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
-
-    def get_cache_path(self) -> str:
-        return str(kernel_cache_folder())
-
-    def get_source_stamp(self) -> str:
-        return self._digest
-
-    def get_disambiguator(self) -> str:
-        return self._digest[:24]
-
-
-class _ContentImpl(CompileResultCacheImpl):
-    _locator_classes: list[type[object]] = [_ContentLocator]  # noqa: RUF012
-
-
-class _ContentCache(FunctionCache):
-    """numba's cache of one kernel, opened at the kernel's first call, when all names that it uses are defined."""
-
-    _impl_class = _ContentImpl
-
-    def __init__(self, dispatcher: Any) -> None:
-        self._dispatcher: Any = dispatcher
-        self._opened = False
-
-    def _open(self) -> None:
-        if self._opened:
-            return
-        self._opened = True
-        function = self._dispatcher.py_func
-        function._content_digest = content_digest(self._dispatcher)
-        super().__init__(function)  # type: ignore[no-untyped-call]
-        _note_use(Path(self._cache_file._index_path))
-
-    @property
-    def cache_path(self) -> str:
-        self._open()
-        return str(super().cache_path)
-
-    def flush(self) -> None:
-        self._open()
-        super().flush()  # type: ignore[no-untyped-call]
-
-    def load_overload(self, signature: Any, target_context: Any) -> Any:
-        self._open()
-        try:
-            return super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
-        except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
-            self.flush()
-            return None
-
-
 _folder: Path | None = None
 
 
@@ -226,7 +193,8 @@ def _possible_parents() -> Iterator[Path]:
         yield Path.home() / ".cache" / "vibrolock"
 
 
-def _note_use(index: Path) -> None:
+def note_use(index: Path) -> None:
+    """Note that the machine code of an index was used, so that it is kept for another month."""
     with contextlib.suppress(OSError):
         if index.stat().st_mtime < time.time() - _DAY_S:
             os.utime(index)
@@ -243,21 +211,3 @@ def _remove_unused(parent: Path) -> None:
             if index.stat().st_mtime < oldest:
                 for file in index.parent.glob(f"{index.stem}.*"):
                     file.unlink(missing_ok=True)
-
-
-def _choose_processor() -> None:
-    """Compile for any x86-64 processor with AVX2 (level v3 of the psABI) where this is one, whatever its make.
-
-    The code is the same on all of them, to the bit, and quicker than what LLVM makes for the very processor: see decision 0063.
-    ``NUMBA_CPU_NAME`` overrides it.
-    """
-    if os.environ.get("NUMBA_CPU_NAME") or os.environ.get("NUMBA_CPU_FEATURES"):
-        return
-    features = llvmlite.binding.get_host_cpu_features()
-    if platform.machine().lower() in ("x86_64", "amd64") and all(features.get(name, False) for name in LEVEL_3):
-        setattr(numba.config, "CPU_NAME", "x86-64-v3")  # noqa: B010 (made at run time, unknown to type checkers)
-        setattr(numba.config, "CPU_FEATURES", "")  # noqa: B010
-
-
-_choose_processor()
-setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)

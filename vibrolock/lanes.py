@@ -16,9 +16,9 @@ from numba.core import types
 from numba.core.datamodel import models
 from numba.extending import intrinsic, overload, register_model
 
-__all__ = ["WIDTH", "differ", "greatest", "least", "load", "spread", "store"]
+from vibrolock.width import WIDTH
 
-WIDTH = 8
+__all__ = ["WIDTH", "differ", "greatest", "least", "load", "spread", "store"]
 
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)

@@ -6,11 +6,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from identification.channels import Channel, Role
 from identification.errors import IdentificationError
 from identification.mapping.units import UNITS, si_of
+from vibrolock.described import Described
 
 __all__ = [
     "ChannelMapping",
@@ -117,10 +118,10 @@ def _kind(value: Any) -> str:
     return f"a {type(value).__name__}"
 
 
-class MappingTable(BaseModel):
+class MappingTable(Described):
     """Base of every part of a mapping: frozen, unknown keys are refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class ChannelMapping(MappingTable):

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_discrete_lyapunov
 
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
@@ -134,7 +134,7 @@ def _observability(model: PnlssModel, experiments: Sequence[Experiment]) -> Floa
     """Observability Gramian, with outputs scaled by their RMS."""
     weight = 1.0 / np.sqrt(np.mean(np.hstack([e.counted_outputs for e in experiments]) ** 2, axis=1))
     seen = (model.c * weight[:, None]).T @ (model.c * weight[:, None])
-    return np.asarray(solve_discrete_lyapunov(model.a.T, seen))
+    return np.asarray(scipy.linalg.solve_discrete_lyapunov(model.a.T, seen))
 
 
 def linear_pnlss(

@@ -4,8 +4,8 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import firwin, resample_poly
 
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
@@ -56,6 +56,6 @@ def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray
     if ratio == 1:
         return np.array(array)
     up, down = ratio.numerator, ratio.denominator
-    low_pass: Any = firwin(2 * EDGE_SAMPLES * down + 1, _CORNER / down, window=("kaiser", _KAISER_BETA))
-    slower: Any = resample_poly(array, up, down, axis=-1, window=low_pass)
+    low_pass: Any = scipy.signal.firwin(2 * EDGE_SAMPLES * down + 1, _CORNER / down, window=("kaiser", _KAISER_BETA))
+    slower: Any = scipy.signal.resample_poly(array, up, down, axis=-1, window=low_pass)
     return np.asarray(slower, np.float64)

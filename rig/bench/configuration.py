@@ -13,7 +13,16 @@ from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
 from rig.text.printable import shown
 
-__all__ = ["Configured", "explain", "find_toml", "merged", "read_toml", "shipped_names", "validated"]
+__all__ = [
+    "Configured",
+    "explain",
+    "find_toml",
+    "merged",
+    "read_toml",
+    "shipped_descriptions",
+    "shipped_names",
+    "validated",
+]
 
 LARGEST_TOML_BYTES = 1_000_000
 MOST_DOTS = 100  # between two commas of a line: the parser's time grows with the square of the number of a key's parts
@@ -24,7 +33,7 @@ FEW_NAMES = 10  # listed in one message
 class Configured(BaseModel):
     """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
@@ -39,6 +48,12 @@ def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
 def shipped_names(folder: Path) -> list[str]:
     """Return the names of the TOML files below a folder, without the suffix."""
     return sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.toml"))
+
+
+def shipped_descriptions(folder: Path) -> dict[str, str]:
+    """Return the descriptions in the TOML files below a folder, by name. Nothing else of the files is validated."""
+    names = shipped_names(folder)
+    return {name: str(read_toml(folder / f"{name}.toml").get("description", "")) for name in names}
 
 
 def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
 from rig.check.findings import Finding, failed
 from rig.check.judging import driven_findings, latency_findings
+from rig.check.recorded import about, is_check
 from rig.check.reference import reference_findings
 from rig.check.responses import Mode, Responses, responses_of
 from rig.check.silence import silent_findings
@@ -23,9 +24,8 @@ from rig.measurements import bench_of_recording
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 
-__all__ = ["PURPOSE", "Assessment", "assess", "is_check", "responses_in"]
+__all__ = ["Assessment", "assess", "responses_in"]
 
-PURPOSE = "check"
 SKIPPED = 0.1  # part of the silence that is left out at its beginning because of the transient of the filters
 CUT_SHORT = "the multisine was not played to its end"
 
@@ -58,11 +58,6 @@ class Assessment:
     def failed(self) -> tuple[str, ...]:
         """Labels of the findings that failed."""
         return failed(self.findings)
-
-
-def is_check(recording: Recording) -> bool:
-    """Whether a recording is that of a check."""
-    return bool(recording.parts) and _about(recording.parts[0].information).get("purpose") == PURPOSE
 
 
 def assess(recording: Recording, reference: Recording | None = None) -> Assessment:
@@ -156,10 +151,5 @@ def _how_it_ended(recording: Recording, bench: Bench) -> list[Finding]:
 
 
 def _lead_fraction(recording: Recording) -> float:
-    lead = float(_about(recording.parts[-1].information).get("lead_samples", 0.0))
+    lead = float(about(recording.parts[-1].information).get("lead_samples", 0.0))
     return lead - float(np.floor(lead))
-
-
-def _about(information: Any) -> dict[str, Any]:
-    about = information.get("about", {})
-    return dict(about) if isinstance(about, dict) else {}

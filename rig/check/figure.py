@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.check.assessment import Assessment
+from rig.check.assessment import Assessment, assess
 from rig.check.reference import on_lines_of
 from rig.errors import RecordingError
 from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, say_why_empty, title
+from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_check", "write_check"]
+__all__ = ["draw_check", "draw_recorded_check", "write_check"]
 
 COLOURS = (MAIN, SECOND, "#4f8f4f", "#8064a2", "#c9a227", "#3aa6a6")
 MOST_LINES, WIDTH, LINE_IN = 22, 72, 0.128
@@ -35,6 +36,11 @@ def write_check(found: Assessment, figure: Path) -> None:
             page.savefig(figure)
         except OSError as error:
             raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
+
+
+def draw_recorded_check(page: "Figure", recording: Recording) -> None:
+    """Assess the recording of a check and draw it on an empty page."""
+    draw_check(page, assess(recording))
 
 
 def draw_check(page: "Figure", found: Assessment) -> None:

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
@@ -35,7 +35,7 @@ def by_shape(found: NDArray[np.complex128], expected: NDArray[np.complex128]) ->
 
 def best_assignment(cost: Float) -> tuple[int, ...] | None:
     """Return the assignment of channels that fits far better than the declared wiring; None if there is none."""
-    rows, columns = linear_sum_assignment(cost)
+    rows, columns = scipy.optimize.linear_sum_assignment(cost)
     as_wired, best = float(np.mean(np.diag(cost))), float(np.mean(cost[rows, columns]))
     if as_wired < WRONG**2 or best > BETTER**2 * as_wired or np.array_equal(rows, columns):
         return None

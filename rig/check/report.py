@@ -2,16 +2,18 @@
 
 from collections import Counter
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rig.check.assessment import Assessment
 from rig.text.console import number, print_table
 from rig.text.printable import printable_strings
+
+if TYPE_CHECKING:
+    from rig.check.assessment import Assessment
 
 __all__ = ["say", "summary"]
 
 
-def summary(found: Assessment) -> dict[str, Any]:
+def summary(found: "Assessment") -> dict[str, Any]:
     """Return verdict, findings and mode as a dictionary for JSON."""
     mode = found.mode
     return {

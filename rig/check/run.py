@@ -9,7 +9,8 @@ from rig.bench import Bench, load_bench
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, Seen, share_of_limits
-from rig.check.assessment import PURPOSE, Assessment, assess, responses_in
+from rig.check.assessment import Assessment, assess, responses_in
+from rig.check.recorded import PURPOSE
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason

@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.group import Group
+
 if TYPE_CHECKING:
     from rig.analysis.study import Study
     from rig.analysis.subject import Subject
 
 __all__ = ["app"]
 
-app = typer.Typer(no_args_is_help=True, help="What can be known of a virtual bench without a test.")
+app = typer.Typer(cls=Group, no_args_is_help=True, help="What can be known of a virtual bench without a test.")
 
 BenchName = Annotated[str, typer.Option("--bench", help="Shipped bench or TOML file, with the virtual driver.")]
 NearHz = Annotated[float | None, typer.Option(help="Mode under test, nearest to this, Hz; default: the bench's.")]

@@ -14,6 +14,7 @@ from rig.cli.doctor import doctor
 from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
 from rig.cli.flags import with_flags
+from rig.cli.group import Group
 from rig.cli.identify import identify
 from rig.cli.list import list_
 from rig.cli.options import say_what_is_imported
@@ -29,9 +30,11 @@ __all__ = ["app", "main"]
 STOPPED = 130
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # the help would load a parser of Markdown and be shown in twice the time
 )
 
 app.add_typer(analyse_app, name="analyse")

@@ -103,7 +103,6 @@ def identify(
 ) -> None:
     """Turn recordings into a model."""
     from rig.models.files.files import save
-    from rig.models.files.pnlss import IdentifiedPnlss
     from rig.models.identify.identify import Request, identify_model
     from rig.models.identify.pnlss_request import PnlssOptions
     from rig.show.progress import FitLines
@@ -142,6 +141,6 @@ def identify(
             lines.close()
     save(found, output)
     show_file(output, json)
-    if isinstance(found, IdentifiedPnlss) and found.fit is not None and found.fit.interrupted:
+    if kind == "pnlss" and found.fit is not None and found.fit.interrupted:
         print(f"rig: interrupted; the best so far is in {output}, and --resume goes on", file=sys.stderr)
         raise typer.Exit(1)

@@ -1,6 +1,8 @@
 """``rig list``: shipped benches, plans and specimens, and the parts of a virtual rig."""
 
+from importlib import resources
 from json import dumps
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -25,18 +27,23 @@ def list_(
 
 
 def _everything() -> dict[str, Any]:
-    from rig.bench import load_bench, shipped_benches
-    from rig.campaigns.plans import load_plan, shipped_plans
     from rig.drivers import driver_names
     from rig.drivers.virtual.parts import parts, specimens
 
     return {
-        "benches": [{"name": name, "description": load_bench(name).description} for name in shipped_benches()],
-        "plans": [{"name": name, "description": load_plan(name).description} for name in shipped_plans()],
+        "benches": _shipped_in("rig.bench"),
+        "plans": _shipped_in("rig.campaigns"),
         "drivers": driver_names(),
         "specimens": specimens(),
         "parts": parts(),
     }
+
+
+def _shipped_in(package: str) -> list[dict[str, str]]:
+    from rig.bench.configuration import shipped_descriptions
+
+    found = shipped_descriptions(Path(str(resources.files(package))) / "shipped")
+    return [{"name": name, "description": description} for name, description in found.items()]
 
 
 def _print_everything(everything: dict[str, Any]) -> None:

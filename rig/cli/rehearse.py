@@ -11,7 +11,7 @@ from rig.cli.options import Json, Overwrite, keep_existing
 
 if TYPE_CHECKING:
     from rig.models.rehearse import Listener, Subject
-    from rig.rehearsal.foreseen import Comparison
+    from rig.rehearsal.comparison import Comparison
 
 __all__ = ["Rehearsing", "rehearse_"]
 

@@ -83,10 +83,10 @@ def resume(
 
 
 def _with_rehearsal(options: "RunOptions", rehearsal: Path | None, override: str) -> "RunOptions":
-    from rig.models.rehearse import load_rehearsal
-    from rig.rehearsal.foreseen import rehearsed_in
-
     if rehearsal is not None:
+        from rig.models.rehearse import load_rehearsal
+        from rig.rehearsal.foreseen import rehearsed_in
+
         options = replace(options, rehearsal=rehearsed_in(load_rehearsal(rehearsal), str(rehearsal)))
     return replace(options, override_rehearsal=override)
 

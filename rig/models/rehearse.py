@@ -14,8 +14,9 @@ from rig.models.files.files import KINDS, load, load_as, save
 from rig.models.files.rehearsal import REHEARSAL
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
+from rig.rehearsal.comparison import Comparison, compared
 from rig.rehearsal.files import write_bench, write_plan
-from rig.rehearsal.foreseen import Comparison, compared, foreseen_by
+from rig.rehearsal.foreseen import foreseen_by
 from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
 from rig.rehearsal.knowledge import gathered
 from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, draws_path, rehearse

@@ -8,13 +8,14 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numba
 import numpy as np
+
+from vibrolock.content_cache import c_function
 
 __all__ = ["describing_function", "drag", "drag_for", "hardening_for", "softening_for"]
 
 SAMPLES = 720  # of a period
-cfunction = numba.cfunc("float64(float64, CPointer(float64))", cache=True)
+cfunction = c_function("float64(float64, CPointer(float64))")
 """Compiles a force law as `simulators.sites.elements.User` wants it."""
 BOUND = 0.5  # of the highest displacement: where a softening spring begins to stop softening
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from controller.tuning import PlantModel
 from identification import (
@@ -156,7 +156,7 @@ def _inside(bench: Bench, frequency_hz: Real) -> NDArray[np.bool_]:
 def _std(matrix: FrequencyResponseMatrix) -> Real:
     total, noise = matrix.total_std[:, :, 0], matrix.noise_std[:, :, 0]
     variance = np.nan_to_num(np.where(np.isfinite(total), total, noise)) ** 2
-    return np.asarray(np.sqrt(uniform_filter1d(variance, SMOOTHED, axis=0, mode="nearest")))
+    return np.asarray(np.sqrt(scipy.ndimage.uniform_filter1d(variance, SMOOTHED, axis=0, mode="nearest")))
 
 
 def _thinned(responses: Responses) -> Responses:

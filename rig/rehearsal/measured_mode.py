@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from identification import NonlinearMode
 from rig.rehearsal.forces import drag, odd_polynomial
@@ -57,7 +57,7 @@ def _drawn_fit(terms: Real, target: Real, error: Real, lowest: float, generator:
         columns = np.column_stack([np.ones(target.size), terms[:, :count]]) / error[:, None]
         scale = np.max(np.abs(columns), axis=0)
         bounds = ([-np.inf, *[lowest] * count], np.inf)
-        found = lsq_linear(columns / scale, target / error, bounds=bounds)
+        found = scipy.optimize.lsq_linear(columns / scale, target / error, bounds=bounds)
         fits.append((float(np.sqrt(2.0 * found.cost / target.size)), (found.x / scale)[1:].tolist()))
     chosen = generator.random()
     if not fits:

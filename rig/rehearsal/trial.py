@@ -6,7 +6,7 @@ from itertools import count
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from rig.arming.run_options import Silent
 from rig.bench import Bench
@@ -116,7 +116,9 @@ class _Peaks:
         inputs = np.nan_to_num(rows["inputs"].astype(float))
         self.inputs = np.maximum(self.inputs, np.abs(inputs).max(axis=0))
         self.output_v = max(self.output_v, float(np.abs(rows["output_v"]).max()))
-        moved, self.state = lfilter(self.numerator, self.denominator, inputs[:, self.moving], axis=0, zi=self.state)
+        moved, self.state = scipy.signal.lfilter(
+            self.numerator, self.denominator, inputs[:, self.moving], axis=0, zi=self.state
+        )
         self.moved_m = np.maximum(self.moved_m, np.abs(moved).max(axis=0))
 
     def shares(self) -> dict[str, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest, spearmanr
+import scipy
 
 from rig.rehearsal.rehearsal import Draw, Rehearsal
 
@@ -49,7 +49,7 @@ class Share:
         """Lower and upper end."""
         if not self.n:
             return 0.0, 1.0
-        found = binomtest(self.count, self.n).proportion_ci(0.95, method="wilson")
+        found = scipy.stats.binomtest(self.count, self.n).proportion_ci(0.95, method="wilson")
         return float(found.low), float(found.high)
 
     def to_dict(self) -> dict[str, Any]:
@@ -297,7 +297,7 @@ def _influences(draws: Sequence[Draw]) -> tuple[Influence, ...]:
                 kept = np.isfinite(values) & np.isfinite(x)
                 if kept.sum() < FEW or np.ptp(values[kept]) == 0.0 or np.ptp(x[kept]) == 0.0:
                     continue
-                found = spearmanr(x[kept], values[kept])
+                found = scipy.stats.spearmanr(x[kept], values[kept])
                 if found.pvalue < SIGNIFICANT / tested:
                     out.append(
                         Influence(outcome, of, float(found.statistic), float(found.pvalue), ADVICE.get(name, ""))

@@ -4,8 +4,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.check.assessment import assess, is_check
-from rig.check.figure import draw_check
+from rig.check.recorded import is_check
 from rig.errors import RecordingError
 from rig.figures.style import STYLE
 from rig.models.files.files import KINDS, load, understood
@@ -14,6 +13,8 @@ from rig.recording.reader import Recording
 from rig.show.lateness_figure import draw_lateness
 
 __all__ = ["plot"]
+
+CHECK = "rig.check.figure:draw_recorded_check"
 
 
 def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
@@ -44,10 +45,8 @@ def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
                 resolve_name(KINDS[kind].draw)(page, found)
         else:
             with Recording(source) as recording:
-                if is_check(recording):
-                    draw_check(page, assess(recording))
-                else:
-                    resolve_name(CAMPAIGNS[recording.kind].draw)(page, recording)
+                draw = CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw
+                resolve_name(draw)(page, recording)
         try:
             page.savefig(figure)
         except OSError as error:

@@ -13,14 +13,14 @@ from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
-from rig.check.assessment import assess, is_check
+from rig.check.recorded import is_check
 from rig.check.report import summary
 from rig.models.files.files import KINDS, load, understood
 from rig.recording.arrays import kind_of
 from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from rig.rehearsal.foreseen import compared
+from rig.rehearsal.comparison import compared
 
 __all__ = ["summarise", "summarise_recording"]
 
@@ -49,6 +49,8 @@ def summarise(path: Path) -> dict[str, Any]:
             return {"kind": kind, "integrity": file_integrity(path), **KINDS[kind].summarise(found)}
     with Recording(path) as recording, understood(path, f"recording of kind {kind}"):
         if is_check(recording):
+            from rig.check.assessment import assess  # evaluates the recording anew, which few files need
+
             return {**summary(assess(recording)), "integrity": recording.integrity}
         return summarise_recording(recording)
 

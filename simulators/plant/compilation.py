@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from simulators.exciter import Exciter
 from simulators.layout import CHANNEL, CONVERTER, PLANT, RigArrays, RigState
@@ -16,7 +16,7 @@ from simulators.sensing.filters import channel_sections, output_sections, ring_s
 from simulators.sensing.parts import Converter, Sensor
 from simulators.sites.elements import Element
 from simulators.sites.friction import FrictionSite
-from vibrolock.lanes import WIDTH
+from vibrolock.width import WIDTH
 
 __all__ = [
     "PhiMatrices",
@@ -56,7 +56,7 @@ def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrice
     augmented[:n, :n] = step_s * dynamics
     augmented[:n, n : n + k] = step_s * columns
     augmented[n : n + k, n + k :] = np.eye(k)
-    exponential = expm(augmented)
+    exponential = scipy.linalg.expm(augmented)
     return PhiMatrices(exponential[:n, :n], exponential[:n, n : n + k], exponential[:n, n + k :])
 
 

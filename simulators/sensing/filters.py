@@ -1,5 +1,6 @@
 """Filters and fractional delays of sensors and converters, as arrays for the kernels."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,16 +27,23 @@ _IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
 def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Matrix:
     """Return a Butterworth low-pass as sections [n_section, 5] (b_0 b_1 b_2 a_1 a_2); none if the corner is 0.
 
-    The bilinear transform is prewarped to the corner of the analogue filter. Below the corner the response is that of the
-    analogue filter at a frequency that differs by less than ``(pi corner / rate)^2 / 3``: 0.5 % if the rate is 25 times the
-    corner.
+    With the corner at 1 rad/s, the poles of order n lie on the unit circle at ``pi/(2n)``, ``3 pi/(2n)`` ... from the imaginary
+    axis. A pair at angle ``t`` gives ``1/(s^2 + 2 sin(t) s + 1)``, the real pole of an odd order ``1/(s + 1)``; the sections
+    become less damped from the first to the last. The bilinear transform ``s = (z - 1)/(z + 1)/k`` is prewarped to the corner,
+    ``k = tan(pi corner / rate)`` (Oppenheim and Schafer, Discrete-Time Signal Processing, section 7.1.2). Below the corner the
+    response is that of the analogue filter at a frequency that differs by less than ``(pi corner / rate)^2 / 3``: 0.5 % if the
+    rate is 25 times the corner.
     """
     if corner_hz == 0.0:
         return np.zeros((0, 5))
-    from scipy.signal import butter  # half a second, which a rig without filters need not wait for
-
-    sections: Matrix = butter(order, corner_hz, fs=rate_hz, output="sos")
-    return sections[:, [0, 1, 2, 4, 5]]
+    k = math.tan(math.pi * corner_hz / rate_hz)
+    sections = [[k / (1.0 + k), k / (1.0 + k), 0.0, (k - 1.0) / (k + 1.0), 0.0]] if order % 2 else []
+    for pair in range(order // 2, 0, -1):
+        damping = 2.0 * k * math.sin((2 * pair - 1) * math.pi / (2 * order))
+        scale = 1.0 / (1.0 + damping + k * k)
+        gain = k * k * scale
+        sections.append([gain, 2.0 * gain, gain, 2.0 * (k * k - 1.0) * scale, (1.0 - damping + k * k) * scale])
+    return np.array(sections)
 
 
 def channel_sections(sensors: Sequence[Sensor], converter: Converter) -> Matrix:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.layout import DAC_CLIPPED, SENSOR_CLIPPED
-from simulators.plant.kernels import combine
+from simulators.products import combine
 from simulators.sensing.noise.kernels import normal
 from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.lanes import WIDTH, differ, greatest, least, load, spread, store

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from numba.core.ccallback import CFunc
-
 __all__ = ["Loaded", "loaded", "named", "portable"]
 
 _ARGUMENTS = (ctypes.c_double, ctypes.POINTER(ctypes.c_double))
@@ -57,7 +55,7 @@ def loaded(function: Any) -> Loaded:
     """Return the function of a name or an object; raise `ValueError` if it is missing or has another signature."""
     what = f"function = {named(function)!r}"
     found = _imported(function) if isinstance(function, str) else function
-    pointer: Any = found.ctypes if isinstance(found, CFunc) else found
+    pointer: Any = getattr(found, "ctypes", found)  # of a numba cfunc
     if not isinstance(pointer, _FUNCTION_POINTER):
         raise ValueError(f"{what}: is a {type(found).__name__}, {_ALLOWED}")
     if pointer.restype is not ctypes.c_double or tuple(pointer.argtypes or ()) != _ARGUMENTS:

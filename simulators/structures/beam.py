@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 __all__ = [
     "BeamModes",
@@ -118,7 +118,7 @@ def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> t
     to the highest modes, and K may be singular (rigid-body modes). ``shift`` (rad/s)^2 is about ``omega^2`` of the lowest mode.
     """
     n = mass.shape[0]
-    mu, vectors = eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
+    mu, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
     return np.maximum(1.0 / mu[::-1] - shift, 0.0), vectors[:, ::-1] / np.sqrt(mu[::-1])
 
 

@@ -42,6 +42,16 @@ def plant_response(rig: VirtualRig, row: np.ndarray, frequency_hz: float) -> com
     return complex(row[:n] @ state)
 
 
+@pytest.mark.parametrize("order", range(1, 9))
+@pytest.mark.parametrize("corner_hz", [10.0, 320.0, 3600.0])
+def test_sections_have_the_poles_of_another_design_and_pass_0_hz(order: int, corner_hz: float) -> None:
+    sections = low_pass_sections(order, corner_hz, 8000.0)
+    other = signal.butter(order, corner_hz, fs=8000.0, output="sos")
+    assert sections[:, 3:] == pytest.approx(other[:, 4:], abs=1e-12)
+    assert sections[:, :3].sum(axis=1) == pytest.approx(1.0 + sections[:, 3:].sum(axis=1), rel=1e-9)
+    assert (sections[:, 1] / sections[:, 0]).tolist() == pytest.approx([1.0] * (order % 2) + [2.0] * (order // 2))
+
+
 @pytest.mark.parametrize(("order", "corner_hz"), [(1, 300.0), (2, 300.0), (4, 320.0), (7, 100.0)])
 def test_filter_is_the_analogue_butterworth_filter(order: int, corner_hz: float) -> None:
     rate_hz = 8000.0

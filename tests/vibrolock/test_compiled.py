@@ -105,3 +105,59 @@ def test_a_type_of_argument_that_stands_in_another_module_now_compiles_anew(tmp_
         out = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
         assert out.stdout == "3.0\n"
         (tmp_path / f"{module}.py").unlink()
+
+
+CODE = """
+import pickle, sys, threading
+from vibrolock.compiled import kernel
+
+@kernel
+def half(x: float) -> float:
+    \"\"\"Half of x.\"\"\"
+    return 0.5 * x
+
+@kernel
+def quarter(x: float) -> float:
+    return half(half(x))
+
+@kernel
+def applied(f, x: float) -> float:
+    return f(x)
+"""
+
+
+def run(code, **environment):
+    out = subprocess.run(
+        [sys.executable, "-c", CODE + code],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return out.stdout.split()
+
+
+def test_the_compiler_is_loaded_by_the_first_call():
+    assert run("print('numba' in sys.modules); quarter(1.0); print('numba' in sys.modules)") == ["False", "True"]
+
+
+def test_a_declared_kernel_looks_like_its_function_is_pickled_by_name_and_passed_to_kernels():
+    code = (
+        "print(half.__doc__.split()[0], half.__name__, pickle.loads(pickle.dumps(half)) is half, applied(quarter, 4.0))"
+    )
+    assert run(code) == ["Half", "half", "True", "1.0"]
+
+
+def test_threads_that_call_a_kernel_first_at_once_share_its_machine_code():
+    code = """
+made = set()
+threads = [threading.Thread(target=lambda: made.add((id(quarter._made()), quarter(2.0)))) for _ in range(8)]
+[thread.start() for thread in threads]
+[thread.join() for thread in threads]
+print(len(made), len(quarter.signatures))
+"""
+    assert run(code) == ["1", "1"]
+
+
+def test_without_a_compiler_kernels_are_plain_functions():
+    assert run("print(quarter(1.0), hasattr(quarter, 'signatures'))", NUMBA_DISABLE_JIT="1") == ["0.25", "False"]

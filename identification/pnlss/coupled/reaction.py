@@ -15,9 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
-from scipy.ndimage import maximum_filter1d
 
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
@@ -88,7 +87,7 @@ class Reaction:
                 inputs.append(np.array([1.0 - z.real]))
         blocks.append(np.eye(_DELAYS, k=-1))
         inputs.append(np.eye(_DELAYS)[0])
-        return np.asarray(block_diag(*blocks)), np.concatenate(inputs)
+        return np.asarray(scipy.linalg.block_diag(*blocks)), np.concatenate(inputs)
 
     def filters(self, linear: Response) -> list[Loop]:
         """Return filters that minimise the factor of a pass by least squares, in rising weight of small gain below the band."""
@@ -113,7 +112,9 @@ class Reaction:
         """float[n]: ``|G / (1 - P G)|``, as the maximum over the range within which resonances shift with amplitude."""
         g = linear(lines_hz)
         reach = int(np.ceil(np.log1p(_SHIFT) / np.log(lines_hz[1] / lines_hz[0])))
-        return np.asarray(maximum_filter1d(np.abs(g / (1.0 - self.exact(lines_hz) * g)), 2 * reach + 1, mode="nearest"))
+        return np.asarray(
+            scipy.ndimage.maximum_filter1d(np.abs(g / (1.0 - self.exact(lines_hz) * g)), 2 * reach + 1, mode="nearest")
+        )
 
     def lines(self, count: int) -> Float:
         """Frequencies in Hz from the lowest frequency on, evenly spaced by logarithm."""
@@ -162,7 +163,7 @@ def _stable(loop: Loop, linear: StateSpace, row: int, output: int) -> bool:
     through = 1.0 / (1.0 - loop.d * d)
     force = through * np.concatenate([loop.d * linear.c[output], loop.c])
     motion = np.concatenate([linear.c[output], np.zeros(loop.c.size)]) + d * force
-    whole = block_diag(linear.a, loop.a)
+    whole = scipy.linalg.block_diag(linear.a, loop.a)
     n = len(linear.a)
     whole[:n] += np.outer(linear.b[:, row], force)
     whole[n:] += np.outer(loop.b, motion)

@@ -10,8 +10,8 @@ al., IEEE Trans. CAD 1, 1982).
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
@@ -119,7 +119,7 @@ class _Run:
         self._loop = chosen_filter(reaction, model.linear_part, row, output)
         rest = int(np.ceil(_AFTER_PERIODS * rate_hz / low))
         self._count = voltage_v.size + rest
-        self._size = int(next_fast_len(self._count + rest, real=True))
+        self._size = int(scipy.fft.next_fast_len(self._count + rest, real=True))
         hz = np.arange(self._size // 2 + 1) * rate_hz / self._size
         made = np.zeros(hz.size, dtype=complex)
         made[1:] = reaction.exciter.force(1.0, 0.0, hz[1:])
@@ -132,7 +132,7 @@ class _Run:
 
     def _filtered(self, response: Complex, values: Float) -> Float:
         """float[count]: response of a filter to values that are zero after their end."""
-        return np.asarray(irfft(response * rfft(values, self._size), self._size)[: self._count])
+        return np.asarray(scipy.fft.irfft(response * scipy.fft.rfft(values, self._size), self._size)[: self._count])
 
     def found(self) -> CoupledRun:
         m, model = self._model.matrices, self._model

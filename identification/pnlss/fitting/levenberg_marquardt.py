@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from identification.pnlss.fitting.normal_equations import NormalEquations
 from identification.pnlss.fitting.problem import Problem
@@ -51,7 +51,7 @@ class Steps:
         diagonal = np.sqrt(np.diag(equations.hessian))
         self._scale = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
         scaled = equations.hessian * self._scale * self._scale[:, None]
-        values, vectors = eigh(scaled, driver="evd", overwrite_a=True, check_finite=False)
+        values, vectors = scipy.linalg.eigh(scaled, driver="evd", overwrite_a=True, check_finite=False)
         self._kept = values > max(truncation, np.finfo(float).tiny) * values[-1]
         self._values = values[self._kept]
         self._vectors = vectors[:, self._kept]

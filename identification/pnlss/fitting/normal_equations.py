@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.blas import dgemm, dsyrk
 
 from identification.pnlss.fitting.frequency_lines import transformed
 from identification.pnlss.fitting.kernels import sensitivities
@@ -120,10 +120,12 @@ class _Sums:
     def add(self, blocks: Blocks, every: int) -> None:
         """Add all blocks in time, where rows are the same for all outputs."""
         for jacobian, rows, _ in blocks:
-            dsyrk(every, jacobian.reshape(-1, jacobian.shape[2]).T, beta=1.0, c=self.shared, overwrite_c=1)
+            scipy.linalg.blas.dsyrk(
+                every, jacobian.reshape(-1, jacobian.shape[2]).T, beta=1.0, c=self.shared, overwrite_c=1
+            )
             for mine, into in zip(jacobian, self.mixed, strict=True):
-                dgemm(every, mine.T, rows.T, beta=1.0, c=into, trans_b=1, overwrite_c=1)
-            dsyrk(every, rows.T, beta=1.0, c=self.own[0], overwrite_c=1)
+                scipy.linalg.blas.dgemm(every, mine.T, rows.T, beta=1.0, c=into, trans_b=1, overwrite_c=1)
+            scipy.linalg.blas.dsyrk(every, rows.T, beta=1.0, c=self.own[0], overwrite_c=1)
         self.gradient, self.own_gradient = blocks.gradient, blocks.own_gradient
 
     def add_lines(self, record: Record, lines: Float, blocks: Blocks, weights: Float) -> None:

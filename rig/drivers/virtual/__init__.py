@@ -1,5 +1,12 @@
 """The virtual driver: a shaker, a stinger and a structure in software behind the DAQ contract."""
 
-from rig.drivers.virtual.driver import VirtualDAQ
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from rig.drivers.virtual.driver import VirtualDAQ
+else:
+    __getattr__, __dir__ = on_use(__name__, {"VirtualDAQ": "driver"})  # `rig list` reads the parts alone
 
 __all__ = ["VirtualDAQ"]

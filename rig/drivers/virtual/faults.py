@@ -8,12 +8,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from rig.bench.configuration import Configured
 from simulators.layout import Flag
 from simulators.sensing.noise.kernels import mix, unit
 from vibrolock.compiled import kernel
+from vibrolock.described import Described
 
 __all__ = ["FAULT_FLAGS", "OUTPUT_HELD", "FaultArrays", "PassingFaults", "is_hit"]
 
@@ -29,13 +30,11 @@ _HELD, _LOST = (
 )  # separate the draws of the two faults from each other and from the sensors' noise
 
 
-class PassingFaults(Configured):
+class PassingFaults(Configured, Described):
     """Passing faults of the virtual device, as devices with a clock have them. None by default.
 
     Times of a fault are rounded to whole blocks of the bench. Faults may follow each other without a gap.
     """
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     held_per_s: float = Field(0.0, ge=0, le=1000)
     """How often the host's outputs come too late, 1/s on average. The converter then repeats its last output, and the late ones

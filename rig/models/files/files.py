@@ -8,38 +8,13 @@ from typing import Any
 
 from numpy.exceptions import ComplexWarning
 
-from identification import LinearModes, ModalAnalysis, PnlssFit, PnlssModel
 from rig.errors import RecordingError
-from rig.models.files.exciter import EXCITER
-from rig.models.files.force_surface import FORCE_SURFACE
-from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.files.kind import FileKind
-from rig.models.files.linear_modes import LINEAR_MODES
-from rig.models.files.measured_backbone import MEASURED_BACKBONE
-from rig.models.files.nonlinear_mode import NONLINEAR_MODE
-from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
-from rig.models.files.predictions import PREDICTIONS
-from rig.models.files.rehearsal import REHEARSAL
-from rig.models.files.response_matrix import RESPONSE_MATRIX
+from rig.models.files.kinds import KINDS, kind_of_file_for
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
 from rig.text.printable import error_text
 
 __all__ = ["KINDS", "load", "load_as", "save", "understood"]
-
-_ALL = (
-    NONLINEAR_MODE,
-    LINEAR_MODES,
-    EXCITER,
-    PNLSS,
-    FORCE_SURFACE,
-    FREQUENCY_RESPONSES,
-    RESPONSE_MATRIX,
-    MEASURED_BACKBONE,
-    PREDICTIONS,
-    REHEARSAL,
-)
-KINDS = {kind.name: kind for kind in _ALL}
-"""Every kind of file other than recordings, by its name in the file."""
 
 _MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
 
@@ -50,13 +25,7 @@ def save(thing: Any, path: Path) -> None:
     Linear modes without responses are written as a modal analysis. A fit or a model without further results is written as an
     identified PNLSS model.
     """
-    if isinstance(thing, LinearModes):
-        thing = ModalAnalysis(thing)
-    elif isinstance(thing, PnlssFit):
-        thing = IdentifiedPnlss(model=thing.model, fit=thing)
-    elif isinstance(thing, PnlssModel):
-        thing = IdentifiedPnlss(model=thing)
-    kind = next((kind for kind in KINDS.values() if isinstance(thing, kind.holds)), None)
+    kind = kind_of_file_for(thing)
     if kind is None:
         raise RecordingError(f"{path}: a {type(thing).__name__} has no file of its own; known are {', '.join(KINDS)}")
     write_arrays(path, kind.name, *kind.pack(thing))

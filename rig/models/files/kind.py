@@ -2,12 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["Arrays", "Attributes", "FileKind"]
 
@@ -21,8 +18,8 @@ class FileKind:
 
     name: str
     """Name in the file."""
-    holds: type
-    """Type of the object in the file."""
+    holds: type | tuple[type, ...]
+    """Types of the objects that are saved in such a file; the first is the one that is loaded."""
     pack: Callable[[Any], tuple[Arrays, Attributes]]
     """Converts the object to arrays and JSON-able attributes."""
     unpack: Callable[[Arrays, Attributes], Any]

@@ -2,11 +2,15 @@
 
 from typing import Any
 
-from identification import ModalAnalysis
-from rig.models.files.kind import FileKind
+from identification import LinearModes, ModalAnalysis
+from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
 
 __all__ = ["LINEAR_MODES"]
+
+
+def _pack(found: ModalAnalysis | LinearModes) -> tuple[Arrays, Attributes]:
+    return (ModalAnalysis(found) if isinstance(found, LinearModes) else found).to_arrays()
 
 
 def _summarise(analysis: ModalAnalysis) -> dict[str, Any]:
@@ -48,8 +52,8 @@ def _say(summary: dict[str, Any]) -> None:
 
 LINEAR_MODES = FileKind(
     name="linear-modes",
-    holds=ModalAnalysis,
-    pack=ModalAnalysis.to_arrays,
+    holds=(ModalAnalysis, LinearModes),
+    pack=_pack,
     unpack=ModalAnalysis.from_arrays,
     summarise=_summarise,
     say=_say,

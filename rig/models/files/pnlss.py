@@ -50,7 +50,11 @@ class IdentifiedPnlss:
     uses: Mapping[str, str] = field(default_factory=dict)
 
 
-def _pack(found: IdentifiedPnlss) -> tuple[Arrays, Attributes]:
+def _pack(found: IdentifiedPnlss | PnlssFit | PnlssModel) -> tuple[Arrays, Attributes]:
+    if isinstance(found, PnlssFit):
+        found = IdentifiedPnlss(model=found.model, fit=found)
+    elif isinstance(found, PnlssModel):
+        found = IdentifiedPnlss(model=found)
     kept: PnlssFit | PnlssModel = found.model if found.fit is None else found.fit
     arrays, attributes = kept.to_arrays()
     head = "model" if found.fit is None else "fit"
@@ -192,7 +196,7 @@ def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str
 
 PNLSS = FileKind(
     name="pnlss",
-    holds=IdentifiedPnlss,
+    holds=(IdentifiedPnlss, PnlssFit, PnlssModel),
     pack=_pack,
     unpack=_unpack,
     summarise=_summarise,

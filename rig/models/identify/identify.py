@@ -3,13 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from identification import (
     Backbone,
     ContinuousBackbone,
     Exciter,
-    FitProgress,
     FrequencyResponse,
     FrequencyResponseMatrix,
     IdentificationError,
@@ -43,16 +42,18 @@ from rig.models.files.files import KINDS, load, load_as
 from rig.models.files.force_surface import MeasuredSurface
 from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.files.linear_modes import LINEAR_MODES
-from rig.models.identify.pnlss import identified_pnlss
 from rig.models.identify.request import Request
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from identification import FitProgress
 
 __all__ = ["Request", "identify_model", "modes_in"]
 
 
 def identify_model(
-    paths: Sequence[Path], request: Request, *, progress: Callable[[FitProgress], None] | None = None
+    paths: Sequence[Path], request: Request, *, progress: "Callable[[FitProgress], None] | None" = None
 ) -> Any:
     """Identify a model in recordings or imported measurements.
 
@@ -63,6 +64,8 @@ def identify_model(
         if any(path.exists() and other.exists() and path.samefile(other) for other in paths[:index]):
             raise ConfigurationError(f"{path}: is given twice; each file once")
     if request.kind == "pnlss":
+        from rig.models.identify.pnlss import identified_pnlss  # a second, which the other models need not wait for
+
         return identified_pnlss(paths, request.pnlss, progress)
     return _MODELS[request.kind](paths, request)
 

@@ -175,10 +175,11 @@ def test_list_prints_the_keys_of_a_part_as_its_model_has_them(command, name, mod
     status, out, _ = command(f"list {name} --json")
     assert status == 0
     keys = {key["key"]: key for key in json.loads(out)["keys"]}
+    described = model.model_json_schema()["properties"]
     assert {key for key in keys if "." not in key} == set(model.model_fields)
     for key, field in model.model_fields.items():
         assert keys[key]["required"] == field.is_required()
-        assert keys[key]["description"] == field.description.replace("`", "")
+        assert keys[key]["description"] == described[key]["description"].replace("`", "").replace("\n", " ")
         if not field.is_required():
             assert keys[key]["default"] == json.loads(json.dumps(field.default))
     text = command(f"list {name}")[1]

@@ -12,7 +12,8 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.running.runner import carry_out, take_up
 from rig.errors import NotArmed
 from rig.recording.reader import Recording
-from rig.rehearsal.foreseen import compared, foreseen_by, rehearsed_in
+from rig.rehearsal.comparison import compared
+from rig.rehearsal.foreseen import foreseen_by, rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.show.summary import summarise
 from rig.show.tables import print_summary

@@ -1,0 +1,19 @@
+"""A group of commands whose help shows the first paragraph of each command in full."""
+
+from typing import Any
+
+from typer.core import TyperGroup
+
+__all__ = ["Group"]
+
+
+class Group(TyperGroup):
+    """Lists its commands with whole sentences; typer cuts them off where a line ends."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the list of commands."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, command.get_short_help_str(limit=1000)) for name, command in commands if command]
+            )

@@ -1,0 +1,53 @@
+"""Registry of the kinds of files: one line for each kind. A kind is imported when a file of it is read or written."""
+
+from collections.abc import Iterator, Mapping
+from pkgutil import resolve_name
+from typing import Any
+
+from rig.models.files.kind import FileKind
+
+__all__ = ["KINDS", "kind_of_file_for"]
+
+_DECLARED = {
+    "nonlinear-mode": ("nonlinear_mode:NONLINEAR_MODE", ("NonlinearMode",)),
+    "linear-modes": ("linear_modes:LINEAR_MODES", ("ModalAnalysis", "LinearModes")),
+    "exciter": ("exciter:EXCITER", ("Exciter",)),
+    "pnlss": ("pnlss:PNLSS", ("IdentifiedPnlss", "PnlssFit", "PnlssModel")),
+    "force-surface": ("force_surface:FORCE_SURFACE", ("MeasuredSurface",)),
+    "frequency-responses": ("frequency_responses:FREQUENCY_RESPONSES", ("tuple",)),
+    "frequency-response-matrix": ("response_matrix:RESPONSE_MATRIX", ("FrequencyResponseMatrix",)),
+    "measured-backbone": ("measured_backbone:MEASURED_BACKBONE", ("Backbone",)),
+    "predictions": ("predictions:PREDICTIONS", ("Predictions",)),
+    "rehearsal": ("rehearsal:REHEARSAL", ("Rehearsal",)),
+}
+"""By the name in the file: where the kind is declared, and the names of the types that it holds."""
+
+
+class _Kinds(Mapping[str, FileKind]):
+    """The kinds by name, each imported when it is asked for."""
+
+    def __getitem__(self, name: str) -> FileKind:
+        kind: FileKind = resolve_name(f"rig.models.files.{_DECLARED[name][0]}")
+        return kind
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_DECLARED)
+
+    def __len__(self) -> int:
+        return len(_DECLARED)
+
+    def __contains__(self, name: object) -> bool:
+        return name in _DECLARED
+
+
+KINDS: Mapping[str, FileKind] = _Kinds()
+"""Every kind of file other than recordings, by its name in the file."""
+
+
+def kind_of_file_for(thing: Any) -> FileKind | None:
+    """Return the kind of file that holds an object; None if there is none."""
+    types = {one.__name__ for one in type(thing).__mro__}
+    for name, (_, held) in _DECLARED.items():
+        if types & set(held) and isinstance(thing, KINDS[name].holds):
+            return KINDS[name]
+    return None

@@ -1,0 +1,130 @@
+"""What each command imports: no library that it has no use for. A new import of a heavy library must be listed here."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+import rig
+
+PLAN = """
+kind = "backbone"
+bench = "magnet-beam"
+levels_v = [0.4, 0.8, 1.2]
+record_periods = 20
+
+[controller]
+low_pass_rad_s = 6.283185307179586
+k1 = 2.0
+k2 = 6.283185307179586
+centre_frequency_hz = 24.0
+frequency_window_hz = [21.933, 26.807]
+"""
+
+LIGHT = {
+    *("typer", "shellingham", "annotated_doc", "click"),
+    *("typing_extensions", "typing_inspection", "annotated_types", "pydantic_core"),
+}
+"""Libraries of other libraries that take no time."""
+
+MATPLOTLIB = {
+    *("matplotlib", "mpl_toolkits", "PIL", "contourpy", "cycler", "dateutil", "fontTools", "kiwisolver", "packaging"),
+    *("pyparsing", "six"),
+}
+NUMBA = {"numba", "llvmlite", "scipy"}
+OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
+FILES = {"numpy", "pydantic", "h5py"}
+
+ALLOWED = {
+    "--help": set(),
+    "list": {"numpy", "pydantic", "scipy", "simulators"},
+    "list beam": {"numpy", "pydantic", "scipy", "simulators"},
+    "show run.h5": FILES,
+    "show mode.h5": FILES,
+    "show --json run.h5": FILES,
+    "plot run.h5 -o run.png": FILES | MATPLOTLIB,
+    "plot mode.h5 -o mode.svg": FILES | MATPLOTLIB,
+    "identify run.h5 -o again.h5": FILES,
+    "export run.h5 -o run.csv": FILES | {"identification.pnlss"},
+    "analyse modes --bench magnet-beam": {"numpy", "pydantic", "simulators"} | NUMBA | {"scipy.linalg"},
+    "doctor": {"numpy", "pydantic", "serial", "rig.loop", "multiprocessing"},
+    "run plan.toml -o new.h5": FILES | NUMBA | {"scipy.linalg", "simulators", "rig.loop", "multiprocessing"},
+    "check --bench magnet-beam -o check.h5": FILES | NUMBA | OPTIMIZE | {"simulators", "rig.loop", "multiprocessing"},
+}
+"""What a command may load beyond Python and what is `LIGHT`: libraries, subpackages of scipy, and the heavy ones of `PARTS`."""
+
+PARTS = ("simulators", "rig.loop", "rig.rehearsal.rehearsal", "identification.pnlss", "multiprocessing", "asyncio")
+"""Packages of the distribution and of Python that take long and of which few commands have use."""
+
+LOADED = f"""
+import atexit, json, sys
+PARTS = {PARTS}
+
+def loaded():
+    own = {{"rig", "controller", "simulators", "identification", "vibrolock"}}
+    tops = {{name.partition(".")[0] for name, module in sys.modules.items() if getattr(module, "__spec__", None)}}
+    libraries = {{name for name in tops - own - set(sys.stdlib_module_names) if not name.startswith("_")}}
+    scipy = {{".".join(name.split(".")[:2]) for name in sys.modules if name.startswith("scipy.")}}
+    scipy = {{name for name in scipy if not name.startswith("scipy._") and hasattr(sys.modules[name], "__path__")}}
+    return sorted(libraries | scipy | {{part for part in PARTS if part in sys.modules}})
+
+atexit.register(lambda: print(json.dumps(loaded()), file=open("loaded.json", "w")))
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a plan, a recording and a model."""
+    folder = tmp_path_factory.mktemp("imports")
+    (folder / "plan.toml").write_text(PLAN)
+    rig.run(folder / "plan.toml", output=folder / "run.h5").close()
+    _loaded(folder, "import sys; from rig.cli import main; main()", *["identify", "run.h5", "-o", "mode.h5"])
+    return folder
+
+
+def _loaded(folder, code, *arguments):
+    path = os.pathsep.join(sys.path)
+    environment = {**os.environ, "PYTHONPATH": path, "COVERAGE_PROCESS_START": "", "XDG_STATE_HOME": str(folder)}
+    command = [sys.executable, "-c", LOADED + code, *arguments]
+    out = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert out.returncode == 0, out.stderr
+    return set(json.loads((folder / "loaded.json").read_text()))
+
+
+@pytest.mark.parametrize("line", ALLOWED)
+def test_a_command_loads_what_it_uses_and_nothing_else(folder, line):
+    loaded = _loaded(folder, "from rig.cli import main; main()", *line.split())
+    assert loaded - LIGHT - ALLOWED[line] == set()
+
+
+@pytest.mark.parametrize(
+    ("line", "used"),
+    [
+        ("show run.h5", {"h5py", "numpy"}),
+        ("plot run.h5 -o run.png", {"matplotlib"}),
+        ("run plan.toml -o newer.h5", {"numba", "rig.loop", "simulators", "scipy.linalg"}),
+    ],
+)
+def test_what_a_command_uses_is_seen(folder, line, used):
+    assert used <= _loaded(folder, "from rig.cli import main; main()", *line.split())
+
+
+@pytest.mark.parametrize("package", ["rig", "controller", "simulators", "identification", "vibrolock"])
+def test_importing_a_package_loads_no_library_and_leaves_its_names_to_their_use(folder, package):
+    assert _loaded(folder, f"import {package}; dir({package})") - {"simulators"} == set()
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "rig.tick.kernels",
+        "rig.tick.sequencer.kernels",
+        "controller.law",
+        "identification.pnlss.kernels",
+        "rig.campaigns.plans",
+    ],
+)
+def test_declaring_kernels_loads_no_compiler(folder, module):
+    assert "numba" not in _loaded(folder, f"import {module}")

@@ -1,0 +1,117 @@
+"""What numba makes of a function, with machine code cached in one folder. Importing this module loads numba.
+
+Kernels are declared with `vibrolock.compiled`, which comes here when one is first called.
+"""
+
+import os
+import platform
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+
+from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
+
+__all__ = ["c_function", "dispatcher"]
+
+LEVEL_3 = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+"""What x86-64-v3 adds to a processor."""
+
+
+def _choose_processor() -> None:
+    """Compile for any x86-64 processor with AVX2 (level v3 of the psABI) where this is one, whatever its make.
+
+    The code is the same on all of them, to the bit, and quicker than what LLVM makes for the very processor: see decision 0063.
+    ``NUMBA_CPU_NAME`` overrides it.
+    """
+    if os.environ.get("NUMBA_CPU_NAME") or os.environ.get("NUMBA_CPU_FEATURES"):
+        return
+    features = llvmlite.binding.get_host_cpu_features()
+    if platform.machine().lower() in ("x86_64", "amd64") and all(features.get(name, False) for name in LEVEL_3):
+        setattr(numba.config, "CPU_NAME", "x86-64-v3")  # noqa: B010 (made at run time, unknown to type checkers)
+        setattr(numba.config, "CPU_FEATURES", "")  # noqa: B010
+
+
+_choose_processor()
+setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)
+
+
+def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return numba's dispatcher of a kernel, cached on disk; return the function itself if numba is told not to compile."""
+    made: Any = numba.njit(**options)(function)
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
+        made._cache = _ContentCache(made)
+    return made
+
+
+def c_function(signature: str) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles a C function of a signature at once; its machine code is found by its file."""
+    decorate: Callable[[Callable[..., Any]], Any] = numba.cfunc(signature, cache=True)
+    return decorate
+
+
+class _ContentLocator:
+    """Tells numba where a kernel's machine code is: in one folder, under the kernel's name and digest."""
+
+    def __init__(self, digest: str) -> None:
+        self._digest = digest
+        self._py_file = ""  # numba names it in a warning
+
+    @classmethod
+    def from_function(cls, function: Any, _: str) -> "_ContentLocator":
+        return cls(function._content_digest)
+
+    def ensure_cache_path(self) -> None:
+        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        return str(kernel_cache_folder())
+
+    def get_source_stamp(self) -> str:
+        return self._digest
+
+    def get_disambiguator(self) -> str:
+        return self._digest[:24]
+
+
+class _ContentImpl(CompileResultCacheImpl):
+    _locator_classes: list[type[object]] = [_ContentLocator]  # noqa: RUF012
+
+
+class _ContentCache(FunctionCache):
+    """numba's cache of one kernel, opened at the kernel's first call, when all names that it uses are defined."""
+
+    _impl_class = _ContentImpl
+
+    def __init__(self, dispatcher: Any) -> None:
+        self._dispatcher: Any = dispatcher
+        self._opened = False
+
+    def _open(self) -> None:
+        if self._opened:
+            return
+        self._opened = True
+        function = self._dispatcher.py_func
+        function._content_digest = content_digest(self._dispatcher)
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        note_use(Path(self._cache_file._index_path))
+
+    @property
+    def cache_path(self) -> str:
+        self._open()
+        return str(super().cache_path)
+
+    def flush(self) -> None:
+        self._open()
+        super().flush()  # type: ignore[no-untyped-call]
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        self._open()
+        try:
+            return super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+        except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
+            self.flush()
+            return None
