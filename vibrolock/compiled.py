@@ -65,7 +65,8 @@ def _compiled(function: Callable[P, R], options: dict[str, Any]) -> Callable[P, 
 class _Kernel:
     """A kernel as declared. What numba makes of it is made when it is first asked for.
 
-    It is called like a function and named in other kernels; numba asks an object that it does not know for its type.
+    It is called like a function and named in other kernels; numba asks an object that it does not know for its type. For the
+    second it is compiled without what only calls from Python need, which for bundles of arrays is most of a kernel.
     """
 
     _making = threading.RLock()
@@ -74,6 +75,7 @@ class _Kernel:
         self.py_func = function
         self._options = options
         self._dispatcher: Any = None
+        self._inner: Any = None
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
@@ -89,7 +91,12 @@ class _Kernel:
 
     @property
     def _numba_type_(self) -> Any:
-        return self._made()._numba_type_
+        from vibrolock.content_cache import inner_dispatcher
+
+        with self._making:
+            if self._inner is None:
+                self._inner = inner_dispatcher(self.py_func, self._options)
+            return self._inner._numba_type_
 
     def _made(self) -> Any:
         from vibrolock.content_cache import dispatcher

@@ -15,7 +15,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
 
-__all__ = ["c_function", "dispatcher"]
+__all__ = ["c_function", "dispatcher", "inner_dispatcher"]
 
 LEVEL_3 = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 """What x86-64-v3 adds to a processor."""
@@ -44,6 +44,23 @@ def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     made: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         made._cache = _ContentCache(made)
+    return made
+
+
+def inner_dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Return a dispatcher for calls from other kernels only.
+
+    It has no entries for Python and C. A constant among the arguments is taken as a number like any other: numba would compile
+    the kernel anew for each.
+    """
+    made = dispatcher(function, {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
+    template: Any = made.get_call_template
+    plain: Any = numba.types.unliteral
+
+    def get_call_template(arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        return template(tuple(map(plain, arguments)), {name: plain(value) for name, value in named.items()})
+
+    made.get_call_template = get_call_template
     return made
 
 
