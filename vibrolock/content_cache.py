@@ -13,7 +13,7 @@ import llvmlite.binding
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
-from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
+from vibrolock.compiled import content_digest, kernel_cache_folder, note_use, on_compiling
 
 __all__ = ["c_function", "dispatcher", "inner_dispatcher"]
 
@@ -127,8 +127,12 @@ class _ContentCache(FunctionCache):
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         self._open()
+        found = None
         try:
-            return super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+            found = super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
         except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
             self.flush()
-            return None
+        if found is None:
+            for told in on_compiling:
+                told(self._dispatcher.py_func.__name__)
+        return found

@@ -9,6 +9,7 @@ import typer
 
 from rig.cli.analyse import app as analyse_app
 from rig.cli.check import check_
+from rig.cli.compiling import say_what_is_compiled
 from rig.cli.conformance import conformance
 from rig.cli.doctor import doctor
 from rig.cli.emulate import emulate
@@ -70,6 +71,7 @@ def main() -> None:
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     say_what_is_imported()
+    say_what_is_compiled()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # also print to a terminal that cannot show µ

@@ -161,3 +161,26 @@ print(len(made), len(quarter.signatures))
 
 def test_without_a_compiler_kernels_are_plain_functions():
     assert run("print(quarter(1.0), hasattr(quarter, 'signatures'))", NUMBA_DISABLE_JIT="1") == ["0.25", "False"]
+
+
+def test_a_kernel_called_by_kernels_is_compiled_once_for_all_constants_and_told(tmp_path):
+    code = """
+from vibrolock.compiled import on_compiling
+told = []
+on_compiling.append(told.append)
+
+@kernel
+def power(x: float, n: int) -> float:
+    return x**n
+
+@kernel
+def cubes(x: float) -> float:
+    return power(x, 3) + power(x, 2) + power(x, 1)
+
+print(cubes(2.0), ",".join(told))
+told.clear()
+print(power(2.0, 3), ",".join(told))
+"""
+    cold = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run(code, **cold) == ["14.0", "cubes,power", "8.0", "power"]  # the second for Python
+    assert run(code, **cold) == ["14.0", "8.0"]
