@@ -10,9 +10,9 @@ from identification.errors import IdentificationError
 from identification.pnlss.best_linear import check_periodic
 from identification.pnlss.experiment import Experiment, same_channels, same_data
 from identification.pnlss.fitting.blocks import block_samples
-from identification.pnlss.fitting.normal_equations import available_threads
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.result import PnlssFit
+from identification.pnlss.fitting.threads import available_threads
 from identification.pnlss.model import PnlssModel
 
 __all__ = [

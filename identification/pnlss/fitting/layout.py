@@ -47,7 +47,7 @@ def slopes_of(system: System, weights: Float) -> Slopes:
     The derivatives of a cubic model need few products, however many monomials it has.
     """
     n, variables = system.state.shape[0], system.state_table.limits.size
-    whole = np.concatenate([system.state, weights[:, None] * system.output])[:, :n]
+    whole = np.concatenate([system.state[:, :n], weights[:, None] * system.output[:, :n]])
     products: dict[tuple[int, ...], Float] = {}
     functions: list[Float] = []
     for first, matrix, table in (

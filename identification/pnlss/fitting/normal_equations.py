@@ -4,7 +4,6 @@ The samples are cut into as many pieces as there are threads. The state at the b
 piece; by its derivatives, which are the sensitivities at the end of the piece before, the pieces are joined.
 """
 
-import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -17,16 +16,15 @@ from identification.pnlss.fitting.blocks import Blocks
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record
 from identification.pnlss.fitting.sums import Sums, summed
+from identification.pnlss.fitting.threads import threads
 
-__all__ = ["NormalEquations", "available_threads", "jacobian", "normal_equations"]
+__all__ = ["NormalEquations", "jacobian", "normal_equations"]
 
 Float = NDArray[np.float64]
 Piece = tuple[Record, tuple[int, int]]
 
 _SHORTEST = 1000
 """Number of samples below which a piece is not worth a thread."""
-_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
-
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
@@ -44,16 +42,16 @@ def normal_equations(parameters: Parameters, vector: Float, records: list[Record
     """
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     hessian, gradient = np.zeros((parameters.count, parameters.count)), np.zeros(parameters.count)
-    shared, threads, derivatives = slice(parameters.shared), available_threads(), np.zeros(())
+    shared, derivatives = slice(parameters.shared), np.zeros(())
 
     def of(piece: Piece) -> Sums | None:
         record, span = piece
         x = np.zeros(parameters.start.states) if record.place is None else begins[record.place]
         return summed(system, record, x, weights, span)
 
-    pieces = [(record, span) for record in records for span in _spans(record, -(-threads // len(records)))]
-    with ThreadPoolExecutor(threads) as pool:
-        for (record, span), sums in zip(pieces, pool.map(of, pieces) if threads > 1 else map(of, pieces), strict=True):
+    with threads() as count, ThreadPoolExecutor(count) as pool:
+        pieces = [(record, span) for record in records for span in _spans(record, -(-count // len(records)))]
+        for (record, span), sums in zip(pieces, pool.map(of, pieces) if count > 1 else map(of, pieces), strict=True):
             if sums is None:
                 return NormalEquations(np.full_like(hessian, np.nan), np.full_like(gradient, np.nan))
             onto = parameters.onto(derivatives if span[0] else parameters.begin_derivatives(record.place))
@@ -68,13 +66,6 @@ def normal_equations(parameters: Parameters, vector: Float, records: list[Record
                 hessian[mine, mine] += record.weight * by**2 * sums.own[output % len(sums.own)]
                 gradient[mine] += mixed[:, -1]
     return NormalEquations(hessian, gradient)
-
-
-def available_threads() -> int:
-    """Return the number of threads: that given to the linear algebra by its variable, else that of the cores."""
-    given = [int(os.environ[name]) for name in _THREADS if os.environ.get(name, "").isdecimal()]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(given[0], cores) if given else cores)
 
 
 def _spans(record: Record, most: int) -> Iterator[tuple[int, int]]:
