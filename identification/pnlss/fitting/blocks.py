@@ -2,22 +2,23 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.kernels import derivatives, run, sensitivities
+from identification.pnlss.fitting.kernels import linearise, run, sensitivities
 from identification.pnlss.fitting.layout import System, slopes_of
 from identification.pnlss.fitting.records import BOUND, Record
-from identification.pnlss.kernels import Table
 
-__all__ = ["Blocks", "block_samples", "even"]
+__all__ = ["Blocks", "Derivatives", "block_samples", "even"]
 
 Float = NDArray[np.float64]
+Derivatives = Literal["parameters", "state", "all"]
 
 _BYTES = 2_000_000
 """Size of the derivatives of a block: few enough to stay in the cache between the recursions and the products."""
-_FEWEST, _MOST = 16, 4096
+_FEWEST, _MOST = 16, 1024
 _EVEN = 4
 """Widths of factors of products are multiples of this: linear algebra loses a quarter of its speed on odd ones."""
 
@@ -30,8 +31,8 @@ def block_samples(states: int, outputs: int, columns: int) -> int:
 class Blocks:
     """Iterator over the blocks of the samples ``begin`` to ``end`` of a record, of which only counted ones are yielded.
 
-    The sensitivities begin at ``begin`` with the state ``x``, which is itself a parameter. With ``only_state`` there is no
-    other in the state equation. After each step, the attributes describe one block of n samples; arrays are reused.
+    The run begins at ``begin`` with the state ``x``. Derivatives are those with respect to the ``parameters``, this ``state``,
+    or ``all``. After each step, the attributes describe one block of n samples; arrays are reused.
 
     Attributes
     ----------
@@ -54,18 +55,19 @@ class Blocks:
         weights: Float,
         x: Float,
         span: tuple[int, int],
-        only_state: bool = False,
+        of: Derivatives = "all",
     ) -> None:
         n, outputs = len(system.state), len(system.output)
         self._system, self._record, self._weights, self._span = system, record, weights, span
         self._slopes, self._alike, self._x = slopes_of(system, weights), system.alike, x.copy()
         own = system.output_table.weights
-        self.linear = 0 if only_state else system.state.size
-        self._inner = 0 if only_state else system.state_table.weights.size
-        columns = self.linear + self._inner + n
+        self.linear = 0 if of == "state" else system.state.size
+        self._inner = 0 if of == "state" else system.state_table.weights.size
+        begin = self.linear + self._inner
+        columns = begin + (0 if of == "parameters" else n)
         self.columns, self.own = columns + own.size + 1, system.output.shape[1]
         self._s = np.zeros((2, n, columns))
-        self._s[0, :, columns - n :] = np.eye(n)
+        self._s[0, :, begin:] = np.eye(n, columns - begin)
         self._state_factors, self._output_factors = (
             np.repeat(matrix[:, matrix.shape[1] - len(table.weights) :], table.limits.size + 1, axis=1)
             for matrix, table in (
@@ -93,7 +95,8 @@ class Blocks:
                 return
             self._linearise(y)
             self.before[:] = self.s
-            sensitivities(self.effective, self.z, self._inner_rows, self._state_factors, self._s, self.rows)
+            into = (self._inner_rows, self._state_factors, self._s, self.rows)
+            sensitivities(self.effective, self.linear, self.z, *into)
             if begin >= self._record.counted_from:
                 yield True
 
@@ -114,30 +117,22 @@ class Blocks:
         self.effective = np.zeros((count, height, n))
         self.rows = np.zeros((count, height, columns))
         self._inner_rows = np.zeros((count, self._inner))
-        self._products = np.zeros((count, len(self._slopes.by_product)))
+        self._products = np.zeros(len(self._slopes.by_product))
         self._steep = np.zeros((count, functions, 2))
 
     def _linearise(self, y: Float) -> None:
         """Fill ``effective`` and those columns of ``rows`` that need no sensitivities of the state."""
-        system, slopes = self._system, self._slopes
-        n, variables = len(system.state), system.state_table.limits.size
-        derivatives(system, slopes.products, self.z, self.q, self._products, self._steep)
-        flat = self.effective.reshape(len(y), -1)
-        np.matmul(self._products, slopes.by_product, out=flat)
-        held = np.abs(self.z[:, :n]) > slopes.products.limits[:n]
-        if np.any(held):
-            self.effective *= ~held[:, None]
-        self.effective += slopes.linear
-        self.rows[:, n:, -1] = self._weights * (self.q[:, : self.own] @ system.output.T - y)
-        if self._steep.size:
-            flat += self._steep[:, :, 0] @ slopes.by_function
-            functions = len(system.state_table.weights)
-            v = self.z[:, :variables]
+        system, steep = self._system, self._steep
+        into = (self._products, steep, self.effective, self.rows)
+        linearise(system, self._slopes, self._weights, y, self.z, self.q, *into)
+        if steep.size:
+            functions, v = len(system.state_table.weights), self.z[:, : system.state_table.limits.size]
             if self._inner:
-                self._inner_rows[:] = _by_weights(system.state_table, v, self._steep[:, :functions])
-            by_output = _by_weights(system.output_table, v, self._steep[:, functions:])
-            end = self.columns - 1
-            self.rows[:, n:, end - by_output.shape[1] : end] = self._output_factors * by_output[:, None]
+                self._inner_rows[:] = _by_weights(v, steep[:, :functions])
+            by_output, end = _by_weights(v, steep[:, functions:]), self.columns - 1
+            self.rows[:, len(system.state) :, end - by_output.shape[1] : end] = (
+                self._output_factors * by_output[:, None]
+            )
 
 
 def even(width: int) -> int:
@@ -145,7 +140,7 @@ def even(width: int) -> int:
     return width + -width % _EVEN
 
 
-def _by_weights(table: Table, v: Float, steep: Float) -> Float:
+def _by_weights(v: Float, steep: Float) -> Float:
     """float[n, n_weights]: derivatives of functions of weighted sums with respect to the weights."""
     found = np.concatenate([steep[:, :, :1] * v[:, None], steep[:, :, :1] - steep[:, :, 1:]], axis=2)
     return found.reshape(len(v), -1)

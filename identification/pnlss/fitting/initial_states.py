@@ -42,7 +42,7 @@ def fitted_initial_state(system: System, record: Record, weights: Float, samples
     best = error(x)
     for _ in range(_ITERATIONS):
         products, gradient = PRIOR * np.eye(n), PRIOR * x
-        blocks = Blocks(system, replace(record, lines=None), weights, x, (0, end), only_state=True)
+        blocks = Blocks(system, replace(record, lines=None), weights, x, (0, end), "state")
         with np.errstate(over="ignore", invalid="ignore"):
             for bounded in blocks:
                 rows = blocks.rows[:, n:].reshape(-1, blocks.columns) * (1.0 if bounded else np.nan)

@@ -5,11 +5,11 @@ Inner kernels are inlined: passing tuples of arrays would cost as much as the wo
 
 import numpy as np
 
-from identification.pnlss.fitting.layout import System
+from identification.pnlss.fitting.layout import Slopes, System
 from identification.pnlss.kernels import Table, feature_values, function_slope, weighted_sum
 from vibrolock.compiled import inner_kernel, kernel
 
-__all__ = ["adjoint", "derivatives", "run", "sensitivities"]
+__all__ = ["adjoint", "linearise", "run", "sensitivities"]
 
 
 @inner_kernel
@@ -50,7 +50,7 @@ def _copy(rows: np.ndarray, out: np.ndarray) -> None:
 
 
 @inner_kernel
-def _next_state(matrix: np.ndarray, z: np.ndarray, x: np.ndarray) -> None:
+def _product(matrix: np.ndarray, z: np.ndarray, x: np.ndarray) -> None:
     """Write ``matrix . z`` to ``x``: four rows at a time, whose sums do not wait for each other."""
     rows, width = matrix.shape
     fours = rows - rows % 4
@@ -85,7 +85,7 @@ def run(system: System, u: np.ndarray, bound: float, x: np.ndarray, alike: bool,
                 return int(k)
         v = z[k, :variables]
         feature_values(system.state_table, v, z[k, variables:])
-        _next_state(system.state, z[k], x)
+        _product(system.state, z[k], x)
         if not alike:
             for j in range(variables):
                 q[k, j] = v[j]
@@ -94,16 +94,54 @@ def run(system: System, u: np.ndarray, bound: float, x: np.ndarray, alike: bool,
 
 
 @kernel
-def derivatives(
-    system: System, products_of: Table, z: np.ndarray, q: np.ndarray, products: np.ndarray, steep: np.ndarray
+def linearise(
+    system: System,
+    slopes: Slopes,
+    weights: np.ndarray,
+    y: np.ndarray,
+    z: np.ndarray,
+    q: np.ndarray,
+    products: np.ndarray,
+    steep: np.ndarray,
+    effective: np.ndarray,
+    rows: np.ndarray,
 ) -> None:
-    """Write the monomials in derivatives (float[n, n_products]) and the slopes of functions (float[n, n_functions, 2])."""
+    """Linearise the model at each sample of a run, and compare its outputs with measured ones ``y`` (float[n, n_outputs]).
+
+    Write the slopes of functions to ``steep`` (float[n, n_functions, 2]), the linearised model with weighted outputs to
+    ``effective`` (float[n, n_states + n_outputs, n_states]), and the weighted errors to the last column of ``rows`` (float[n,
+    n_states + n_outputs, n_columns]). ``products`` (float[n_products]) is work space.
+    """
     variables, functions = system.state_table.limits.size, system.state_table.weights.shape[0]
-    for k in range(z.shape[0]):
-        v = z[k, :variables]
-        feature_values(products_of, v, products[k])
+    n = system.state.shape[0]
+    for k in range(y.shape[0]):
+        v, flat = z[k, :variables], effective[k].reshape(slopes.linear.size)
+        feature_values(slopes.products, v, products)
         _slopes(system.state_table, v, z[k], steep[k])
         _slopes(system.output_table, v, q[k], steep[k, functions:])
+        for c in range(flat.size):
+            flat[c] = 0.0
+        fours = products.size - products.size % 4
+        for m in range(0, fours, 4):
+            a, b, d, e = products[m], products[m + 1], products[m + 2], products[m + 3]
+            by = slopes.by_product[m : m + 4]
+            for c in range(flat.size):
+                flat[c] += a * by[0, c] + b * by[1, c] + d * by[2, c] + e * by[3, c]
+        for m in range(fours, products.size):
+            for c in range(flat.size):
+                flat[c] += products[m] * slopes.by_product[m, c]
+        for j in range(n):
+            if abs(v[j]) > slopes.products.limits[j]:
+                effective[k, :, j] = 0.0
+        for c in range(flat.size):
+            flat[c] += slopes.linear[c]
+        for f in range(steep.shape[1]):
+            for c in range(flat.size):
+                flat[c] += steep[k, f, 0] * slopes.by_function[f, c]
+        errors = rows[k, n:, rows.shape[2] - 1]
+        _product(system.output, q[k], errors)
+        for o in range(errors.size):
+            errors[o] = weights[o] * (errors[o] - y[k, o])
 
 
 @inner_kernel
@@ -118,17 +156,22 @@ def _slopes(table: Table, v: np.ndarray, features: np.ndarray, steep: np.ndarray
 
 @kernel
 def sensitivities(
-    effective: np.ndarray, z: np.ndarray, inner: np.ndarray, factors: np.ndarray, s: np.ndarray, rows: np.ndarray
+    effective: np.ndarray,
+    linear: int,
+    z: np.ndarray,
+    inner: np.ndarray,
+    factors: np.ndarray,
+    s: np.ndarray,
+    rows: np.ndarray,
 ) -> None:
     """Carry the sensitivities ``s`` of the state (float[2, n_states, n_columns], the first is current) over a block.
 
-    Their columns are the elements of [A B E] (row by row), the weights in the state features, and the state at some earlier
-    sample; ``z`` and ``inner`` (float[n, ...]) are the derivatives with respect to the former two, the latter still to be
-    multiplied by ``factors`` (float[n_states, n_weights]). With ``effective`` (float[n, n_states + n_outputs, n_states]), the
-    derivatives of the outputs are written to ``rows`` (float[n, n_states + n_outputs, ...]).
+    Their first columns are the ``linear`` elements of [A B E] (row by row) and the weights in the state features; ``z`` and
+    ``inner`` (float[n, ...]) are the derivatives with respect to these, the latter still to be multiplied by ``factors``
+    (float[n_states, n_weights]). The derivatives of the outputs by ``effective`` (float[n, n_states + n_outputs, n_states])
+    are written to ``rows`` (float[n, n_states + n_outputs, ...]).
     """
     n, here = s.shape[1], 0
-    linear = s.shape[2] - n - inner.shape[1]
     wide = linear // n
     for k in range(effective.shape[0]):
         before, after = s[here], s[1 - here]
@@ -151,11 +194,12 @@ def adjoint(effective: np.ndarray, rows: np.ndarray, back: np.ndarray) -> None:
     Row i of the states at sample k becomes the sum, over all later outputs of the block, of their derivatives times those
     with respect to state i after sample k; ``back`` (float[n_states, n_columns]) the same before the block.
     """
-    back[:, :] = 0.0
-    for k in range(effective.shape[0] - 1, -1, -1):
-        _copy(back, rows[k])
-        _combine(effective[k].T, rows[k], back)
+    n, end = back.shape[0], effective.shape[0] - 1
+    rows[end, :n] = 0.0
+    for k in range(end, 0, -1):
+        _combine(effective[k].T, rows[k], rows[k - 1])
+    _combine(effective[0].T, rows[0], back)
 
 
-for _kernel in (run, derivatives, sensitivities, adjoint):  # pieces of a record run in threads
+for _kernel in (run, linearise, sensitivities, adjoint):  # pieces of a record run in threads
     getattr(_kernel, "targetoptions", {})["nogil"] = True

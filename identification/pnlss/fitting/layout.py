@@ -31,13 +31,13 @@ class System(NamedTuple):
 class Slopes(NamedTuple):
     """``A + E d phi / d x`` above ``C + F d chi / d x`` as a combination of few values; of n_effective elements."""
 
-    linear: Float
-    """float[n_states + n_outputs, n_states], A above C."""
+    linear: np.ndarray
+    """float[n_effective], A above C, row by row."""
     products: Table
     """Monomials that occur in derivatives, of degree one and above."""
-    by_product: Float
+    by_product: np.ndarray
     """float[n_monomials, n_effective]."""
-    by_function: Float
+    by_function: np.ndarray
     """float[n_functions, n_effective], coefficients of the slopes of functions, of states first."""
 
 
@@ -75,7 +75,7 @@ def slopes_of(system: System, weights: Float) -> Slopes:
         np.zeros(0, dtype=np.int64),
     )
     return Slopes(
-        whole,
+        whole.ravel(),
         table,
         np.array(list(products.values())).reshape(-1, whole.size),
         np.array(functions).reshape(-1, whole.size),

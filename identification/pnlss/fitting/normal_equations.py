@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.blocks import Blocks
+from identification.pnlss.fitting.blocks import Blocks, Derivatives
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record
 from identification.pnlss.fitting.sums import Sums, summed
@@ -25,6 +25,7 @@ Piece = tuple[Record, tuple[int, int]]
 
 _SHORTEST = 1000
 """Number of samples below which a piece is not worth a thread."""
+
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
@@ -83,7 +84,8 @@ def jacobian(parameters: Parameters, vector: Float, record: Record, weights: Flo
     x, at = np.zeros(n) if record.place is None else begins[record.place], 0
     onto = parameters.onto(parameters.begin_derivatives(record.place))
     whole = np.zeros((len(weights), len(record.u) - record.counted_from, parameters.count))
-    blocks = Blocks(system, record, weights, x, (0, len(record.u)))
+    of: Derivatives = "parameters" if record.place is None else "all"
+    blocks = Blocks(system, record, weights, x, (0, len(record.u)), of)
     for _ in blocks:
         part = whole[:, at : at + len(blocks.rows)]
         at += len(blocks.rows)

@@ -80,9 +80,9 @@ class Parameters:
         """Return the derivatives of an experiment's columns with respect to the shared parameters, and one column for errors.
 
         float[n_columns, shared + 1], for columns as in `identification.pnlss.fitting.blocks.Blocks`. ``begin`` (float[n_states,
-        shared + 1]) are the derivatives of the state with which its samples begin.
+        shared + 1]) are the derivatives of the state with which its samples begin; without rows if that is constant.
         """
-        inner_state, inner_output, n = self.ends[1], self.ends[2] - self.ends[1], self.start.states
+        inner_state, inner_output, n = self.ends[1], self.ends[2] - self.ends[1], len(begin)
         found = np.zeros((inner_state + n + inner_output + 1, self.shared + 1))
         found[:inner_state, :inner_state] = np.eye(inner_state)
         found[inner_state : inner_state + n] = begin
@@ -91,10 +91,9 @@ class Parameters:
         return found
 
     def begin_derivatives(self, place: int | None) -> Float:
-        """float[n_states, shared + 1]: derivatives of the initial state of the experiment at ``place``; zero for None."""
+        """float[n_states, shared + 1]: derivatives of the initial state of the experiment at ``place``; no rows for None."""
         n = self.start.states
-        first = 0 if place is None else self.ends[2] + place * n
-        return np.eye(n, self.shared + 1, first) * (place is not None)
+        return np.zeros((0, self.shared + 1)) if place is None else np.eye(n, self.shared + 1, self.ends[2] + place * n)
 
     def own(self, output: int) -> slice:
         """Return the slice of the parameters of one output."""

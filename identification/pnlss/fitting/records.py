@@ -1,6 +1,6 @@
 """Experiments in the scaled units of a fit, and their simulation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.kernels import run
 from identification.pnlss.fitting.layout import System
 
-__all__ = ["BOUND", "Record", "records_of", "simulated"]
+__all__ = ["BOUND", "Record", "records_of", "simulated", "state_after"]
 
 Float = NDArray[np.float64]
 
@@ -72,15 +72,31 @@ def records_of(
 def simulated(system: System, u: Float, initial_state: Float) -> tuple[Float, Float] | None:
     """Return states and outputs, float[n, ...]; None if a run is unbounded."""
     x, y = np.empty((len(u), len(system.state))), np.empty((len(u), len(system.output)))
-    at, alike, size = np.array(initial_state), system.alike, min(len(u), _CHUNK)
+    for chunk, z, q in _chunks(system, u, np.array(initial_state)):
+        x[chunk] = z[:, : x.shape[1]]
+        with np.errstate(over="ignore", invalid="ignore"):
+            y[chunk] = q @ system.output.T
+        if chunk.stop == len(u):
+            return (x, y) if bool(np.all(np.isfinite(y))) else None
+    return None
+
+
+def state_after(system: System, u: Float, initial_state: Float) -> Float:
+    """float[n_states]: state after the last sample; not a number if a run is unbounded."""
+    x, done = np.array(initial_state), 0
+    for chunk, _, _ in _chunks(system, u, x):
+        done = chunk.stop
+    return x if done == len(u) else np.full_like(x, np.nan)
+
+
+def _chunks(system: System, u: Float, x: Float) -> Iterator[tuple[slice, Float, Float]]:
+    """Yield samples, (x, u, phi) and (x, u, chi), moving ``x`` on, until the end or the first chunk that is unbounded."""
+    alike, size = system.alike, min(len(u), _CHUNK)
     z = np.empty((size, system.state.shape[1]))
     q = z if alike else np.empty((size, system.output.shape[1]))
     for begin in range(0, len(u), _CHUNK):
         chunk = slice(begin, min(begin + _CHUNK, len(u)))
         n = chunk.stop - begin
-        if run(system, u[chunk], BOUND, at, alike, z, q) < n:
-            return None
-        x[chunk] = z[:n, : x.shape[1]]
-        with np.errstate(over="ignore", invalid="ignore"):
-            y[chunk] = q[:n] @ system.output.T
-    return (x, y) if bool(np.all(np.isfinite(y))) else None
+        if run(system, u[chunk], BOUND, x, alike, z, q) < n:
+            return
+        yield chunk, z[:n], q[:n]

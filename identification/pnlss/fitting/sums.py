@@ -11,17 +11,17 @@ of a block that begins at sample b, zero after its end,
     sum of (C(k) S(k))' J(k)  =  S(b)' m(b)  +  sum of Z(k)' m(k+1),
 
 and the products with Z are products of z with one row of m for each state. Their work does not grow with the number of
-outputs: with four states and four outputs it is a third of that of J' J.
+outputs: with four states and four outputs it is a third of that of J' J. With one output, J' J itself is less.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.blocks import Blocks, even
+from identification.pnlss.fitting.blocks import Blocks, Derivatives, even
 from identification.pnlss.fitting.frequency_lines import transformed
 from identification.pnlss.fitting.kernels import adjoint
 from identification.pnlss.fitting.layout import System
-from identification.pnlss.fitting.records import Record, simulated
+from identification.pnlss.fitting.records import Record, state_after
 
 __all__ = ["Sums", "summed"]
 
@@ -46,29 +46,34 @@ class Sums:
 
     def add(self, blocks: Blocks) -> bool:
         """Add all samples; return False if the run leaves all bounds."""
-        n, linear, columns = len(self.after), blocks.linear, blocks.columns
-        wide, own = linear // n, len(self.mixed)
-        before, back = np.zeros((_WAITING, n, linear)), np.zeros((_WAITING, n, columns))
+        (own, outputs, columns), n = self.mixed.shape, len(self.after)
+        linear = blocks.linear if outputs > 1 else 0
+        wide = linear // n
+        before, back = np.zeros((_WAITING * n, linear)), np.zeros((_WAITING * n, columns))
         mixed, product = self.mixed.reshape(own, -1), np.zeros((even(own), self.mixed[0].size))
         for index, bounded in enumerate(blocks):
             if not bounded:
                 return False
-            waiting = index % _WAITING
-            before[waiting] = blocks.before[:, :linear]
-            adjoint(blocks.effective, blocks.rows, back[waiting])
-            if waiting == _WAITING - 1:
-                self.shared[:linear] += before.reshape(-1, linear).T @ back.reshape(-1, columns)
-                before[:] = 0.0
             flat = blocks.rows.reshape(len(blocks.rows), -1)
-            for i in range(n):
-                right = flat[:, i * (columns + wide) : (i + 1) * columns]
-                self.shared[i * wide : (i + 1) * wide, i * wide :] += (blocks.z.T @ right)[:wide]
+            if linear:
+                waiting = slice(index % _WAITING * n, (index % _WAITING + 1) * n)
+                before[waiting] = blocks.before[:, :linear]
+                adjoint(blocks.effective, blocks.rows, back[waiting])
+                for i in range(n):
+                    right = flat[:, i * (columns + wide) : (i + 1) * columns]
+                    self.shared[i * wide : (i + 1) * wide, i * wide :] += (blocks.z.T @ right)[:wide]
+                if waiting.stop == len(before):
+                    self._add_begins(before, back)
             mixed += np.matmul(blocks.q.T, flat[:, n * columns :], out=product)[:own]
             self.own += (blocks.q.T @ blocks.q)[:own, :own]
             rest = blocks.rows[:, n:, linear:].reshape(-1, columns - linear)
             self.shared[linear:, linear:] += rest.T @ rest
-        self.shared[:linear] += before.reshape(-1, linear).T @ back.reshape(-1, columns)
+        self._add_begins(before, back)
         return True
+
+    def _add_begins(self, before: Float, back: Float) -> None:
+        self.shared[: before.shape[1]] += before.T @ back
+        before[:] = 0.0
 
     def add_lines(self, blocks: Blocks, record: Record, lines: Float) -> bool:
         """Add all frequency lines; return False if the run leaves all bounds."""
@@ -86,12 +91,8 @@ class Sums:
 def summed(system: System, record: Record, x: Float, weights: Float, span: tuple[int, int]) -> Sums | None:
     """Sum over the samples ``span`` of a record that begins with state ``x``; None if the run leaves all bounds."""
     with np.errstate(all="ignore"):
-        if span[0]:
-            run = simulated(system, record.u[: span[0] + 1], x)
-            if run is None:
-                return None
-            x = run[0][-1]
-        blocks = Blocks(system, record, weights, x, span)
+        of: Derivatives = "all" if span[0] or record.place is not None else "parameters"
+        blocks = Blocks(system, record, weights, state_after(system, record.u[: span[0]], x), span, of)
         sums = Sums(blocks, *system.output.shape)
         bounded = sums.add(blocks) if record.lines is None else sums.add_lines(blocks, record, record.lines)
         return sums if bounded else None
