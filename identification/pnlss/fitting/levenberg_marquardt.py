@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from identification.pnlss.fitting.normal_equations import NormalEquations
 from identification.pnlss.fitting.problem import Problem
 from identification.pnlss.fitting.result import FitHistory
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
+from identification.pnlss.fitting.threads import threads
 
 __all__ = ["Iterates", "Steps", "iterate"]
 
@@ -46,7 +46,7 @@ class Steps:
         diagonal = np.sqrt(np.diag(equations.hessian))
         self._scale = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
         scaled = equations.hessian * self._scale * self._scale[:, None]
-        values, vectors = eigh(scaled, driver="evd", overwrite_a=True, check_finite=False)
+        values, vectors = np.linalg.eigh(scaled)
         self._kept = values > max(truncation, np.finfo(float).tiny) * values[-1]
         self._values = values[self._kept]
         self._vectors = vectors[:, self._kept]
@@ -125,13 +125,14 @@ def iterate(problem: Problem, iterates: Iterates, progress: Callable[[FitProgres
     settings = problem.settings
     try:
         while (reason := _reason(iterates, settings)) is None:
-            equations = problem.equations(iterates.vector)
-            if not (np.all(np.isfinite(equations.hessian)) and np.all(np.isfinite(equations.gradient))):
-                return "the sensitivities of the last iterate leave all bounds", False
-            found = _descend(problem, Steps(equations, settings.truncation), iterates)
-            if found is None:
-                return "no step of any damping fits better", False
-            iterates.add(problem, *found)
+            with threads() as count:
+                equations = problem.equations(iterates.vector, count)
+                if not (np.all(np.isfinite(equations.hessian)) and np.all(np.isfinite(equations.gradient))):
+                    return "the sensitivities of the last iterate leave all bounds", False
+                found = _descend(problem, Steps(equations, settings.truncation), iterates)
+                if found is None:
+                    return "no step of any damping fits better", False
+                iterates.add(problem, *found)
             if progress is not None:
                 progress(_told(iterates, settings))
     except KeyboardInterrupt:

@@ -16,7 +16,6 @@ from identification.pnlss.fitting.blocks import Blocks, Derivatives
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record
 from identification.pnlss.fitting.sums import Sums, summed
-from identification.pnlss.fitting.threads import threads
 
 __all__ = ["NormalEquations", "jacobian", "normal_equations"]
 
@@ -35,11 +34,13 @@ class NormalEquations:
     gradient: Float
 
 
-def normal_equations(parameters: Parameters, vector: Float, records: list[Record], weights: Float) -> NormalEquations:
+def normal_equations(
+    parameters: Parameters, vector: Float, records: list[Record], weights: Float, threads: int = 1
+) -> NormalEquations:
     """Sum the normal equations over all experiments at ``vector``.
 
     Errors are weighted by output (``weights``, float[n_outputs]) and by the weights of each record. The result is not finite
-    if a run is unbounded. As many threads are used as the linear algebra may use.
+    if a run is unbounded. With several ``threads``, the linear algebra must keep to one.
     """
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     hessian, gradient = np.zeros((parameters.count, parameters.count)), np.zeros(parameters.count)
@@ -50,9 +51,9 @@ def normal_equations(parameters: Parameters, vector: Float, records: list[Record
         x = np.zeros(parameters.start.states) if record.place is None else begins[record.place]
         return summed(system, record, x, weights, span)
 
-    with threads() as count, ThreadPoolExecutor(count) as pool:
-        pieces = [(record, span) for record in records for span in _spans(record, -(-count // len(records)))]
-        for (record, span), sums in zip(pieces, pool.map(of, pieces) if count > 1 else map(of, pieces), strict=True):
+    with ThreadPoolExecutor(threads) as pool:
+        pieces = [(record, span) for record in records for span in _spans(record, -(-threads // len(records)))]
+        for (record, span), sums in zip(pieces, pool.map(of, pieces) if threads > 1 else map(of, pieces), strict=True):
             if sums is None:
                 return NormalEquations(np.full_like(hessian, np.nan), np.full_like(gradient, np.nan))
             onto = parameters.onto(derivatives if span[0] else parameters.begin_derivatives(record.place))

@@ -121,8 +121,8 @@ class Problem:
             return float(np.inf)
         return error**2 + float(self._ridge @ vector**2)
 
-    def equations(self, vector: Float) -> NormalEquations:
+    def equations(self, vector: Float, threads: int = 1) -> NormalEquations:
         """Return the normal equations of half of `cost`; a small weight keeps unobservable initial states near zero."""
-        found = normal_equations(self.parameters, vector, self.training, self.weights)
+        found = normal_equations(self.parameters, vector, self.training, self.weights, threads)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
         return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)

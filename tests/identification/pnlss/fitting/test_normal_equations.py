@@ -1,6 +1,5 @@
 """Normal equations against derivatives by complex steps through a simulation in plain numpy, in one piece and in several."""
 
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -71,8 +70,7 @@ def test_they_are_products_of_derivatives_by_complex_steps(
     assert np.all(size > 0.0)
     monkeypatch.setattr(module, "_SHORTEST", 30)
     for pieces in (1, 2, 3):
-        monkeypatch.setattr(module, "threads", contextmanager(lambda count=pieces: iter([count])))
-        found = normal_equations(parameters, vector, [record], weights)
+        found = normal_equations(parameters, vector, [record], weights, pieces)
         np.testing.assert_allclose(found.hessian / np.outer(size, size), hessian / np.outer(size, size), atol=1e-12)
         np.testing.assert_allclose(found.gradient / size, gradient / size, atol=1e-11)
 
@@ -85,8 +83,7 @@ def test_a_run_that_leaves_all_bounds_in_a_later_piece_gives_no_finite_equations
     inputs = one.inputs * np.where(np.arange(4000) < 3000, 1.0, 1e3)
     (record,) = records_of([replace(one, inputs=inputs)], np.ones(1), np.ones(2))
     parameters = Parameters(system)
-    monkeypatch.setattr(module, "threads", contextmanager(lambda: iter([2])))
-    found = normal_equations(parameters, parameters.vector(system, np.zeros((0, 2))), [record], np.ones(2))
+    found = normal_equations(parameters, parameters.vector(system, np.zeros((0, 2))), [record], np.ones(2), 2)
     assert not np.any(np.isfinite(found.hessian))
 
 
