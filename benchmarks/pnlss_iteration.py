@@ -1,26 +1,28 @@
 """Seconds per iteration of a nonlinear state-space fit: ``python -m benchmarks.pnlss_iteration [--json]``.
 
 Each case runs some iterations of `fit_pnlss` and takes their median; all that belongs to an iteration is in it: sensitivities,
-normal equations, their decomposition, and the simulations that try dampings. The baseline in the same run is what one writes
-first in numpy: the recursion sample by sample, the whole Jacobian, its product; on a short piece, scaled to the samples of
-the case. One core: the pools of the linear algebra are held to one thread; on a busy machine the processor time and the best
-iteration tell more. A fit is there when it is nearer to the data than the system that made them, noise added; NaN for one that
-is not. Memory is the peak of the process after each case, the data themselves included.
+normal equations, their decomposition, and the simulations that try dampings. There are two baselines in the same run. One is
+the product of a Jacobian of that size with itself by the machine's own ``dsyrk`` on one core: what a fit costs at least that
+multiplies derivatives of outputs. Its ratio is that of processor times, which tell more than wall times on a busy machine. The
+other is what one writes first in numpy: the recursion sample by sample, the whole Jacobian, its product; on a short piece,
+scaled to the samples of the case. A fit is there when it is nearer to the data than the system that made them, noise added;
+NaN for one that is not. Memory is the peak of the process after each case, the data themselves included. Each number of
+threads has a process of its own.
 """
 
+import argparse
 import json
 import os
 import resource
 import statistics
+import subprocess
 import sys
 import time
 
-for pool in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(pool, "1")
+import numpy as np
+from scipy.linalg.blas import dsyrk
 
-import numpy as np  # noqa: E402 (threads are set first)
-
-from identification import (  # noqa: E402
+from identification import (
     Channel,
     Experiment,
     Features,
@@ -30,17 +32,23 @@ from identification import (  # noqa: E402
     fit_pnlss,
 )
 
-ITERATIONS = 7
 PIECE = 400
 """Samples of the baseline."""
 CASES = {
-    "4 states, 4 outputs, 400 coefficients, 25 600": (4, 4, 25_600, True, None),
-    "the same, Hessian from all samples": (4, 4, 25_600, True, 1),
-    "the same, from one of each 8": (4, 4, 25_600, True, 8),
-    "as the first, 256 000": (4, 4, 256_000, True, None),
-    "2 states, 1 output, 14 coefficients, 73 728": (2, 1, 73_728, False, None),
-    "the same, Hessian from all samples ": (2, 1, 73_728, False, 1),
+    "4 states, 4 outputs, 400 coefficients, 25 600": (4, 4, 25_600, True, 7),
+    "the same, 256 000": (4, 4, 256_000, True, 3),
+    "2 states, 1 output, 14 coefficients, 73 728": (2, 1, 73_728, False, 7),
 }
+POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+COLUMNS = (
+    "seconds",
+    "processor_seconds",
+    "best",
+    "over_syrk",
+    "wall_over_syrk",
+    "seconds_until_there",
+    "times_plain_numpy",
+)
 
 
 def system(states: int, outputs: int, nonlinear_outputs: bool) -> tuple[PnlssModel, PnlssModel]:
@@ -103,6 +111,17 @@ def plain(model: PnlssModel, experiment: Experiment) -> float:
     return (time.perf_counter() - begin) / PIECE
 
 
+def syrk(model: PnlssModel, samples: int) -> float:
+    """Processor seconds of the product with itself of the derivatives that outputs share, block by block."""
+    columns = model.states * (model.states + 1 + model.state_features.count)
+    block = np.random.default_rng(0).normal(size=(1024, columns))
+    total = np.zeros((columns, columns), order="F")
+    begin = time.process_time()
+    for _ in range(samples * len(model.outputs) // len(block)):
+        dsyrk(1.0, block.T, beta=1.0, c=total, overwrite_c=1)
+    return time.process_time() - begin
+
+
 def error_of(true: PnlssModel, experiment: Experiment) -> float:
     """Training error of the system itself, as `fit_pnlss` has it."""
     wrong, whole = (
@@ -112,29 +131,32 @@ def error_of(true: PnlssModel, experiment: Experiment) -> float:
     return float(np.sqrt(np.mean(wrong / whole)))
 
 
-def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool, every: int | None) -> dict[str, float]:
+def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool, iterations: int) -> dict[str, float]:
     """One case."""
     start, true = system(states, outputs, nonlinear_outputs)
     experiment = measured(true, samples)
     fit_pnlss(start, [measured(true, 3000)], settings=FitSettings(iterations=1))  # compiles
     baseline = min(plain(true, experiment) for _ in range(3)) * samples
-    processor = [time.process_time()]
+    product, processor = [syrk(true, samples) for _ in range(3)], [time.process_time()]
     fit = fit_pnlss(
         start,
         [experiment],
-        settings=FitSettings(iterations=ITERATIONS, tolerance=0.0, every=every),
+        settings=FitSettings(iterations=iterations, tolerance=0.0),
         progress=lambda _: processor.append(time.process_time()),
     )
+    product += [syrk(true, samples) for _ in range(3)]
     seconds = np.diff(fit.history.seconds)
     there = np.flatnonzero(fit.history.training_error <= error_of(true, experiment))
+    used = statistics.median(np.diff(processor)[1:])
     return {
         "coefficients": true.nonlinear_coefficients,
         "seconds": statistics.median(seconds),
-        "processor_seconds": statistics.median(np.diff(processor)[1:]),
+        "processor_seconds": used,
         "best": float(np.min(seconds)),
+        "syrk": statistics.median(product),
         "seconds_until_there": float(fit.history.seconds[there[0]]) if there.size else float("nan"),
         "plain_numpy": baseline,
-        "times_faster": baseline / statistics.median(seconds),
+        "times_plain_numpy": baseline / statistics.median(seconds),
         "training_error": fit.training_error,
         "data_mb": (experiment.inputs.nbytes + experiment.outputs.nbytes) / 1e6,
         "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3,
@@ -142,24 +164,29 @@ def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool, ev
 
 
 def main() -> None:
-    results = {name: measure(*case) for name, case in CASES.items()}
-    if "--json" in sys.argv:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--here", action="store_true", help="in this process, with the threads of its environment")
+    given = parser.parse_args()
+    if given.here:
+        print(json.dumps({name: measure(*case) for name, case in CASES.items()}))
+        return
+    command = [sys.executable, "-m", "benchmarks.pnlss_iteration", "--here"]
+    results = {}
+    for threads in (1, 2):
+        environment = {**os.environ, **dict.fromkeys(POOLS, str(threads))}
+        out = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        results[f"threads: {threads}"] = json.loads(out)
+        for case, row in results[f"threads: {threads}"].items():
+            row["over_syrk"] = row["processor_seconds"] / results["threads: 1"][case]["syrk"]
+            row["wall_over_syrk"] = row["seconds"] / results["threads: 1"][case]["syrk"]
+    if given.json:
         print(json.dumps(results, indent=1))
         return
-    columns = (
-        "seconds",
-        "processor_seconds",
-        "best",
-        "seconds_until_there",
-        "plain_numpy",
-        "times_faster",
-        "training_error",
-        "data_mb",
-        "peak_mb",
-    )
-    print(f"{'':46}" + "".join(f"{name:>20}" for name in columns))
-    for name, row in results.items():
-        print(f"{name:46}" + "".join(f"{row[column]:20.4g}" for column in columns))
+    for name, cases in results.items():
+        print(f"{name:46}" + "".join(f"{column:>20}" for column in COLUMNS))
+        for case, row in cases.items():
+            print(f"{case:46}" + "".join(f"{row[column]:20.4g}" for column in COLUMNS))
 
 
 if __name__ == "__main__":

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.checks import belongs, check_not_zero
+from identification.pnlss.fitting.initial_states import SAMPLES, fitted_initial_state
 from identification.pnlss.fitting.parameters import Parameters
-from identification.pnlss.fitting.records import SAMPLES, fitted_initial_state, records_of
+from identification.pnlss.fitting.records import records_of
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulation import Simulation
 from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun

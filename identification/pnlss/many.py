@@ -8,8 +8,8 @@ The work goes through joblib, whose backend the user selects in one line::
         for model in identify_many(jobs, partial(identify_pnlss, states=2)):
             ...
 
-A fit consists mostly of small matrices and compiled loops on one core. Models in parallel therefore gain more than BLAS
-threads within a model; ``parallel_config("loky", inner_max_num_threads=1)`` keeps the two from competing for cores.
+A fit uses as many threads as the linear algebra, but not all of an iteration gains by them. Models in parallel therefore gain
+more; ``parallel_config("loky", inner_max_num_threads=1)`` keeps the two from competing for cores.
 """
 
 import time

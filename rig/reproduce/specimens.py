@@ -38,8 +38,6 @@ class Specimen:
     """Largest number of iterations of a fit."""
     patience: int
     """Iterations without a smaller validation error after which a fit ends."""
-    every: int = 1
-    """Every how many samples one is used for the Hessian of a step."""
     backbone: str = "backbone-fine"
     """Plan of the backbone whose points can be used for training together with the multisines."""
     exciter: str = "exciter"
@@ -78,7 +76,6 @@ SPECIMENS = {
         # Validation errors are smallest after 5 to 15 iterations; later iterations fit the training data alone.
         iterations=30,
         patience=10,
-        every=8,
         sweeps=("sweep-1", "sweep-2"),
     ),
 }

@@ -9,9 +9,10 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.pnlss.best_linear import check_periodic
 from identification.pnlss.experiment import Experiment, same_channels, same_data
-from identification.pnlss.fitting.normal_equations import BLOCK
+from identification.pnlss.fitting.blocks import block_samples
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.result import PnlssFit
+from identification.pnlss.fitting.threads import available_threads
 from identification.pnlss.model import PnlssModel
 
 __all__ = [
@@ -149,14 +150,14 @@ def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int, validated
 
 def needed_bytes(parameters: Parameters, experiments: Sequence[Experiment], by_frequency: bool) -> dict[str, int]:
     """Estimate of the peak memory of a fit, by purpose."""
-    outputs = len(parameters.start.outputs)
-    columns = parameters.shared - parameters.start.states * max(parameters.estimated - 1, 0)
+    outputs, states = len(parameters.start.outputs), parameters.start.states
+    columns = parameters.shared - states * max(parameters.estimated - 1, 0)
     widest = max(e.inputs.shape[1] for e in experiments)
     need = {
         "data": 8 * sum(e.inputs.size + e.outputs.size for e in experiments),
-        "simulation": 8 * widest * (2 * outputs + parameters.start.states),
+        "simulation": 8 * widest * (2 * outputs + states),
         "normal equations": 8 * _SQUARES * parameters.count**2,
-        "blocks": 16 * outputs * BLOCK * columns,
+        "blocks": 16 * block_samples(states, outputs, columns) * (states + outputs) * columns * available_threads(),
     }
     if by_frequency:
         need["Jacobian of a period"] = 8 * (outputs + 1) * max(e.period_samples for e in experiments) * columns

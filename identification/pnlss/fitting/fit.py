@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment, excited_band
 from identification.pnlss.fitting.checks import check_data, check_memory, check_resumed
+from identification.pnlss.fitting.initial_states import fitted_initial_state
 from identification.pnlss.fitting.levenberg_marquardt import Iterates, iterate
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.problem import Problem, Scales, scales_of
-from identification.pnlss.fitting.records import fitted_initial_state
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.model import PnlssModel

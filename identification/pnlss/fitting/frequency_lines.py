@@ -1,12 +1,13 @@
 """Errors of periodic experiments by frequency line: their weights, and the Jacobian of the lines."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from identification.pnlss.fitting.blocks import Blocks
 from identification.pnlss.fitting.records import Record
 from identification.pnlss.fitting.settings import FitSettings
 
@@ -67,34 +68,34 @@ def _line_weights(settings: FitSettings, record: Record, sample_rate_hz: float) 
     return rows
 
 
-def transformed(
-    record: Record, lines: Float, blocks: Iterable[tuple[Float, Float, Float]]
-) -> Iterator[tuple[Float, Float, Float]]:
-    """Yield for each output the Jacobian float[2 n_used, n_columns] of its lines, rows float[2 n_used, n_own] and errors.
+def transformed(record: Record, lines: Float, blocks: Blocks) -> Iterator[tuple[Float, Float]] | None:
+    """For each output the Jacobian float[2 n_used, n_columns] of its lines, and rows float[2 n_used, n_own].
 
-    Errors are float[2 n_used, n_outputs]. Periods are averaged first; real parts stand above imaginary ones, all weighted.
+    Periods are averaged first; real parts stand above imaginary ones, all weighted. None if the run leaves all bounds.
     """
     periods = (len(record.u) - record.counted_from) // record.period
-    means: list[Float] = []
+    jacobian = np.zeros((record.period, len(lines), blocks.columns))
+    rows = np.zeros((record.period, blocks.own))
     at = 0
-    for block in blocks:
-        if not means:
-            means = [np.zeros((*part.shape[:-2], record.period, part.shape[-1])) for part in block]
-        n = block[0].shape[1]
-        place = slice(at % record.period, at % record.period + n)
-        for mean, part in zip(means, block, strict=True):
-            mean[..., place, :] += part / periods
-        at += n
-    rows, errors = (np.fft.rfft(mean, axis=0) for mean in means[1:])
-    for mine, weight in zip(means[0], lines, strict=True):
+    for bounded in blocks:
+        if not bounded:
+            return None
+        place = slice(at % record.period, at % record.period + len(blocks.rows))
+        jacobian[place] += blocks.rows[:, -len(lines) :] / periods
+        rows[place] += blocks.q[:, : blocks.own] / periods
+        at += len(blocks.rows)
+    return _by_output(jacobian, np.fft.rfft(rows, axis=0), lines)
+
+
+def _by_output(jacobian: Float, rows: NDArray[np.complex128], lines: Float) -> Iterator[tuple[Float, Float]]:
+    for output, weight in enumerate(lines):
         used = np.flatnonzero(weight)
         by = weight[used, None]
-        out = np.empty((2 * used.size, mine.shape[1]))
-        for begin in range(0, mine.shape[1], _COLUMNS):
-            part = np.fft.rfft(mine[:, begin : begin + _COLUMNS], axis=0)[used] * by
-            out[: used.size, begin : begin + _COLUMNS] = part.real
-            out[used.size :, begin : begin + _COLUMNS] = part.imag
-        yield out, _stacked(rows[used] * by), _stacked(errors[used] * by)
+        out = np.empty((2 * used.size, jacobian.shape[2]))
+        for begin in range(0, jacobian.shape[2], _COLUMNS):
+            columns = slice(begin, begin + _COLUMNS)
+            out[:, columns] = _stacked(np.fft.rfft(jacobian[:, output, columns], axis=0)[used] * by)
+        yield out, _stacked(rows[used] * by)
 
 
 def _stacked(lines: NDArray[np.complex128]) -> Float:

@@ -1,212 +1,205 @@
-"""Compiled sensitivities of a nonlinear state-space model: blocks of its Jacobian by recursion over time.
+"""Compiled passes over a block of samples: the states, their sensitivities forward, and the adjoint of these back.
 
-All functions but the recursion itself are inlined: passing tuples of arrays would cost as much as the work on them.
+Inner kernels are inlined: passing tuples of arrays would cost as much as the work on them.
 """
 
 import numpy as np
 
-from identification.pnlss.fitting.layout import Room, Slopes, System
+from identification.pnlss.fitting.layout import Slopes, System
 from identification.pnlss.kernels import Table, feature_values, function_slope, weighted_sum
 from vibrolock.compiled import inner_kernel, kernel
 
-__all__ = ["combine_rows", "effective_matrices", "sensitivities"]
+__all__ = ["adjoint", "linearise", "run", "sensitivities"]
 
 
 @inner_kernel
-def combine_rows(factors: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """Write ``factors . rows`` to the first elements of ``out``, several rows at a time along contiguous columns."""
-    count, width = rows.shape
-    if count >= 4:
-        f, g, h, q = factors[0], factors[1], factors[2], factors[3]
-        for c in range(width):
-            out[c] = f * rows[0, c] + g * rows[1, c] + h * rows[2, c] + q * rows[3, c]
-        done = 4
-    elif count >= 2:
-        f, g = factors[0], factors[1]
-        for c in range(width):
-            out[c] = f * rows[0, c] + g * rows[1, c]
-        done = 2
-    else:
-        f = factors[0]
-        for c in range(width):
-            out[c] = f * rows[0, c]
-        done = 1
-    for j in range(done, count):
-        f = factors[j]
-        for c in range(width):
-            out[c] += f * rows[j, c]
+def _combine(factors: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+    """Write ``factors . rows`` to the first columns of ``out``: blocks of two by four, along contiguous columns."""
+    height, count, width = factors.shape[0], rows.shape[0], rows.shape[1]
+    pairs, fours = height - height % 2, count - count % 4
+    for i in range(height):
+        if count < 4 or i >= pairs:
+            for c in range(width):
+                out[i, c] = 0.0
+    for i in range(0, pairs, 2):
+        for j in range(0, fours, 4):
+            f0, f1, f2, f3 = factors[i, j], factors[i, j + 1], factors[i, j + 2], factors[i, j + 3]
+            g0, g1, g2, g3 = factors[i + 1, j], factors[i + 1, j + 1], factors[i + 1, j + 2], factors[i + 1, j + 3]
+            if j == 0:
+                for c in range(width):
+                    r0, r1, r2, r3 = rows[j, c], rows[j + 1, c], rows[j + 2, c], rows[j + 3, c]
+                    out[i, c] = f0 * r0 + f1 * r1 + f2 * r2 + f3 * r3
+                    out[i + 1, c] = g0 * r0 + g1 * r1 + g2 * r2 + g3 * r3
+            else:
+                for c in range(width):
+                    r0, r1, r2, r3 = rows[j, c], rows[j + 1, c], rows[j + 2, c], rows[j + 3, c]
+                    out[i, c] += f0 * r0 + f1 * r1 + f2 * r2 + f3 * r3
+                    out[i + 1, c] += g0 * r0 + g1 * r1 + g2 * r2 + g3 * r3
+    for i in range(height):
+        for j in range(fours if i < pairs else 0, count):
+            f = factors[i, j]
+            for c in range(width):
+                out[i, c] += f * rows[j, c]
 
 
 @inner_kernel
-def effective_matrices(system: System, slopes: Slopes, v: np.ndarray, r: Room) -> None:
-    """Linearise at ``v``, whose features are in ``r.z`` and ``r.q``."""
-    n, outputs = system.state.shape[0], system.output.shape[0]
-    if r.slopes.size:
-        feature_values(slopes.table, v, r.slopes)
-        combine_rows(r.slopes, slopes.coefficients, r.effective)
-    else:
-        r.effective[:] = 0.0
-    for j in range(n):
-        held = abs(v[j]) > slopes.table.limits[j]
-        for i in range(n + outputs):
-            linear = system.state[i, j] if i < n else system.output[i - n, j]
-            r.effective[i * n + j] = linear if held else r.effective[i * n + j] + linear
-    _add_functions(system.state_table, system.state, v, n, r.z, r.state_steep, r.effective[: n * n])
-    _add_functions(system.output_table, system.output, v, n, r.q, r.output_steep, r.effective[n * n :])
+def _copy(rows: np.ndarray, out: np.ndarray) -> None:
+    for i in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            out[i, c] = rows[i, c]
 
 
 @inner_kernel
-def _add_functions(
-    table: Table,
-    matrix: np.ndarray,
-    v: np.ndarray,
-    n: int,
-    features: np.ndarray,
+def _product(matrix: np.ndarray, z: np.ndarray, x: np.ndarray) -> None:
+    """Write ``matrix . z`` to ``x``: four rows at a time, whose sums do not wait for each other."""
+    rows, width = matrix.shape
+    fours = rows - rows % 4
+    for i in range(0, fours, 4):
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for j in range(width):
+            a += matrix[i, j] * z[j]
+            b += matrix[i + 1, j] * z[j]
+            c += matrix[i + 2, j] * z[j]
+            d += matrix[i + 3, j] * z[j]
+        x[i], x[i + 1], x[i + 2], x[i + 3] = a, b, c, d
+    for i in range(fours, rows):
+        a = 0.0
+        for j in range(width):
+            a += matrix[i, j] * z[j]
+        x[i] = a
+
+
+@kernel
+def run(system: System, u: np.ndarray, bound: float, x: np.ndarray, alike: bool, z: np.ndarray, q: np.ndarray) -> int:
+    """Simulate from ``x`` under ``u`` (float[n, n_inputs]); ``x`` becomes the state after the last sample.
+
+    Write ``(x, u, phi)`` to ``z`` and, unless they are ``alike``, ``(x, u, chi)`` to ``q`` (float[n, ...], may be wider).
+    Returns n, or the sample at which a state is beyond ``bound`` or not a number.
+    """
+    n, variables = system.state.shape[0], system.state_table.limits.size
+    for k in range(u.shape[0]):
+        for j in range(variables):
+            z[k, j] = x[j] if j < n else u[k, j - n]
+        for i in range(n):
+            if not abs(x[i]) <= bound:
+                return int(k)
+        v = z[k, :variables]
+        feature_values(system.state_table, v, z[k, variables:])
+        _product(system.state, z[k], x)
+        if not alike:
+            for j in range(variables):
+                q[k, j] = v[j]
+            feature_values(system.output_table, v, q[k, variables:])
+    return int(u.shape[0])
+
+
+@kernel
+def linearise(
+    system: System,
+    slopes: Slopes,
+    weights: np.ndarray,
+    y: np.ndarray,
+    z: np.ndarray,
+    q: np.ndarray,
+    products: np.ndarray,
     steep: np.ndarray,
     effective: np.ndarray,
+    rows: np.ndarray,
 ) -> None:
-    """Add the derivatives of functions of weighted sums to ``effective``; their slopes go to ``steep``."""
-    first = table.limits.size + table.factors.shape[0]
+    """Linearise the model at each sample of a run, and compare its outputs with measured ones ``y`` (float[n, n_outputs]).
+
+    Write the slopes of functions to ``steep`` (float[n, n_functions, 2]), the linearised model with weighted outputs to
+    ``effective`` (float[n, n_states + n_outputs, n_states]), and the weighted errors to the last column of ``rows`` (float[n,
+    n_states + n_outputs, n_columns]). ``products`` (float[n_products]) is work space.
+    """
+    variables, functions = system.state_table.limits.size, system.state_table.weights.shape[0]
+    n = system.state.shape[0]
+    for k in range(y.shape[0]):
+        v, flat = z[k, :variables], effective[k].reshape(slopes.linear.size)
+        feature_values(slopes.products, v, products)
+        _slopes(system.state_table, v, z[k], steep[k])
+        _slopes(system.output_table, v, q[k], steep[k, functions:])
+        for c in range(flat.size):
+            flat[c] = 0.0
+        fours = products.size - products.size % 4
+        for m in range(0, fours, 4):
+            a, b, d, e = products[m], products[m + 1], products[m + 2], products[m + 3]
+            by = slopes.by_product[m : m + 4]
+            for c in range(flat.size):
+                flat[c] += a * by[0, c] + b * by[1, c] + d * by[2, c] + e * by[3, c]
+        for m in range(fours, products.size):
+            for c in range(flat.size):
+                flat[c] += products[m] * slopes.by_product[m, c]
+        for j in range(n):
+            if abs(v[j]) > slopes.products.limits[j]:
+                effective[k, :, j] = 0.0
+        for c in range(flat.size):
+            flat[c] += slopes.linear[c]
+        for f in range(steep.shape[1]):
+            for c in range(flat.size):
+                flat[c] += steep[k, f, 0] * slopes.by_function[f, c]
+        errors = rows[k, n:, rows.shape[2] - 1]
+        _product(system.output, q[k], errors)
+        for o in range(errors.size):
+            errors[o] = weights[o] * (errors[o] - y[k, o])
+
+
+@inner_kernel
+def _slopes(table: Table, v: np.ndarray, features: np.ndarray, steep: np.ndarray) -> None:
+    """Write the slope of each function at its weighted sum, and at its bias."""
+    first = v.size + table.factors.shape[0]
     for f in range(table.weights.shape[0]):
         code, at_rest = table.codes[f], table.at_rest[f]
         steep[f, 0] = function_slope(code, weighted_sum(table, f, v), features[first + f] + at_rest)
         steep[f, 1] = function_slope(code, table.weights[f, v.size], at_rest)
-        for i in range(matrix.shape[0]):
-            factor = matrix[i, first + f] * steep[f, 0]
-            for j in range(n):
-                effective[i * n + j] += factor * table.weights[f, j]
-
-
-@inner_kernel
-def _add_errors(
-    system: System, v: np.ndarray, y: np.ndarray, weight: np.ndarray, columns: int, r: Room, errors: np.ndarray
-) -> None:
-    """Write the errors of a sample, weight the linearised outputs, and add errors times derivatives to the gradients."""
-    n = system.state.shape[0]
-    outputs, own = system.output.shape
-    r.back[:] = 0.0
-    for o in range(outputs):
-        total = -y[o]
-        for j in range(own):
-            total += system.output[o, j] * r.q[j]
-        error = weight[o] * total
-        errors[o] = error
-        for j in range(own):
-            r.own_gradient[o, j] += weight[o] * error * r.q[j]
-        _output_weights(system, o, v, weight[o], r.output_steep, r.row)
-        for c in range(r.row.size):
-            r.gradient[columns + c] += error * r.row[c]
-        for i in range(n):
-            r.effective[(n + o) * n + i] *= weight[o]
-            r.back[i] += error * r.effective[(n + o) * n + i]
-
-
-@inner_kernel
-def _output_weights(system: System, o: int, v: np.ndarray, weight: float, steep: np.ndarray, row: np.ndarray) -> None:
-    """Write the derivatives of output ``o`` with respect to the weights in its features."""
-    begin = 0
-    monomials = system.output_table.factors.shape[0]
-    for f in range(system.output_table.weights.shape[0]):
-        factor = weight * system.output[o, v.size + monomials + f]
-        for j in range(v.size):
-            row[begin + j] = factor * steep[f, 0] * v[j]
-        row[begin + v.size] = factor * (steep[f, 0] - steep[f, 1])
-        begin += v.size + 1
-
-
-@inner_kernel
-def _keep(
-    system: System, v: np.ndarray, s: np.ndarray, weight: np.ndarray, r: Room, jacobian: np.ndarray, row: np.ndarray
-) -> None:
-    """Write the derivatives of the weighted outputs to ``jacobian`` (float[n_outputs, ...]), q to ``row``."""
-    n, columns = s.shape
-    for o in range(system.output.shape[0]):
-        combine_rows(r.effective[(n + o) * n : (n + o + 1) * n], s, jacobian[o])
-        _output_weights(system, o, v, weight[o], r.output_steep, jacobian[o, columns:])
-    for j in range(row.size):
-        row[j] = r.q[j]
-
-
-@inner_kernel
-def _advance(system: System, v: np.ndarray, linear: int, s: np.ndarray, r: Room, after: np.ndarray) -> None:
-    """Step the state, and its sensitivities from ``s`` to ``after``."""
-    n, wide = system.state.shape
-    monomials = system.state_table.factors.shape[0]
-    for i in range(n):
-        combine_rows(r.effective[i * n : (i + 1) * n], s, after[i])
-        total = 0.0
-        for j in range(wide):
-            total += system.state[i, j] * r.z[j]
-        r.x[i] = total
-        if linear == 0:
-            continue
-        for j in range(wide):
-            after[i, i * wide + j] += r.z[j]
-        for f in range(system.state_table.weights.shape[0]):
-            begin = linear + f * (v.size + 1)
-            factor = system.state[i, v.size + monomials + f]
-            for j in range(v.size):
-                after[i, begin + j] += factor * r.state_steep[f, 0] * v[j]
-            after[i, begin + v.size] += factor * (r.state_steep[f, 0] - r.state_steep[f, 1])
 
 
 @kernel
 def sensitivities(
-    system: System,
-    slopes: Slopes,
-    u: np.ndarray,
-    y: np.ndarray,
-    bound: float,
-    weight: np.ndarray,
+    effective: np.ndarray,
     linear: int,
-    counted: bool,
-    kept: np.ndarray,
-    r: Room,
-    jacobian: np.ndarray,
+    z: np.ndarray,
+    inner: np.ndarray,
+    factors: np.ndarray,
+    s: np.ndarray,
     rows: np.ndarray,
-    errors: np.ndarray,
-) -> int:
-    """Process a block of inputs and measured outputs (float[n, n_inputs], float[n, n_outputs]), with the state in ``r``.
+) -> None:
+    """Carry the sensitivities ``s`` of the state (float[2, n_states, n_columns], the first is current) over a block.
 
-    The columns of the sensitivities are first the ``linear`` entries of [A B E] (row by row; 0 for none), then, unless linear
-    is 0, the weights in the state features (row by row), then the initial states. If the block is ``counted``, these arrays
-    are written:
-
-    - ``errors`` (float[n, n_outputs]): the weighted errors, simulated minus measured.
-    - ``r``: the sums of the products of errors and derivatives.
-    - ``jacobian`` (float[n_outputs, n_kept, n_columns + n_output_weights]): the derivatives of the weighted outputs at the
-      samples ``kept`` (int[n_kept], rising), with the weights in the output features last.
-    - ``rows`` (float[n_kept, n_output_columns]): q at the same samples. The derivative of output l with respect to its row of
-      [C D F] is ``weight[l] q``.
-
-    Returns n, or the sample at which a state is beyond ``bound`` or not a number.
+    Their first columns are the ``linear`` elements of [A B E] (row by row) and the weights in the state features; ``z`` and
+    ``inner`` (float[n, ...]) are the derivatives with respect to these, the latter still to be multiplied by ``factors``
+    (float[n_states, n_weights]). The derivatives of the outputs by ``effective`` (float[n, n_states + n_outputs, n_states])
+    are written to ``rows`` (float[n, n_states + n_outputs, ...]).
     """
-    n, columns = system.state.shape[0], r.s.shape[2]
-    variables = system.state_table.limits.size
-    here, at = 0, 0
-    for k in range(u.shape[0]):
+    n, here = s.shape[1], 0
+    wide = linear // n
+    for k in range(effective.shape[0]):
+        before, after = s[here], s[1 - here]
+        _combine(effective[k, n:], before, rows[k, n:])
+        _combine(effective[k, :n], before, after)
         for i in range(n):
-            if not abs(r.x[i]) <= bound:
-                return int(k)
-        for j in range(variables):
-            r.z[j] = r.x[j] if j < n else u[k, j - n]
-            r.q[j] = r.z[j]
-        v, s = r.z[:variables], r.s[here]
-        feature_values(system.state_table, v, r.z[variables:])
-        feature_values(system.output_table, v, r.q[variables:])
-        effective_matrices(system, slopes, v, r)
-        if counted:
-            _add_errors(system, v, y[k], weight, columns, r, errors[k])
-            for i in range(n):
-                for c in range(columns):
-                    r.gradient[c] += r.back[i] * s[i, c]
-            if at < kept.size and kept[at] == k:
-                _keep(system, v, s, weight, r, jacobian[:, at], rows[at])
-                at += 1
-        _advance(system, v, linear, s, r, r.s[1 - here])
+            for j in range(wide):
+                after[i, i * wide + j] += z[k, j]
+            for c in range(inner.shape[1]):
+                after[i, linear + c] += factors[i, c] * inner[k, c]
         here = 1 - here
     if here == 1:
-        for i in range(n):
-            for c in range(columns):
-                r.s[0, i, c] = r.s[1, i, c]
-    return int(u.shape[0])
+        _copy(s[1], s[0])
+
+
+@kernel
+def adjoint(effective: np.ndarray, rows: np.ndarray, back: np.ndarray) -> None:
+    """Carry the derivatives of the outputs, in ``rows`` below those of the states, back over a block.
+
+    Row i of the states at sample k becomes the sum, over all later outputs of the block, of their derivatives times those
+    with respect to state i after sample k; ``back`` (float[n_states, n_columns]) the same before the block.
+    """
+    n, end = back.shape[0], effective.shape[0] - 1
+    rows[end, :n] = 0.0
+    for k in range(end, 0, -1):
+        _combine(effective[k].T, rows[k], rows[k - 1])
+    _combine(effective[0].T, rows[0], back)
+
+
+for _kernel in (run, linearise, sensitivities, adjoint):  # pieces of a record run in threads
+    getattr(_kernel, "targetoptions", {})["nogil"] = True

@@ -1,12 +1,15 @@
-"""Data of the kernels of a fit: a system, its derivatives, and the work space of a recursion over time."""
+"""A system in the form that the kernels of a fit use, and its linearisation."""
 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.pnlss.kernels import Table
 
-__all__ = ["Room", "Slopes", "System", "room"]
+__all__ = ["Slopes", "System", "slopes_of"]
+
+Float = NDArray[np.float64]
 
 
 class System(NamedTuple):
@@ -19,55 +22,61 @@ class System(NamedTuple):
     state_table: Table
     output_table: Table
 
+    @property
+    def alike(self) -> bool:
+        """Whether states and outputs have the same features."""
+        return all(map(np.array_equal, self.state_table, self.output_table))
+
 
 class Slopes(NamedTuple):
-    """Derivatives of the monomials of a system, which are combinations of a few monomials."""
+    """``A + E d phi / d x`` above ``C + F d chi / d x`` as a combination of few values; of n_effective elements."""
 
-    table: Table
+    linear: np.ndarray
+    """float[n_effective], A above C, row by row."""
+    products: Table
     """Monomials that occur in derivatives, of degree one and above."""
-    coefficients: np.ndarray
-    """float[n_monomials, (n_states + n_outputs) * n_states], coefficients in ``E d phi / d x`` and ``F d chi / d x``."""
+    by_product: np.ndarray
+    """float[n_monomials, n_effective]."""
+    by_function: np.ndarray
+    """float[n_functions, n_effective], coefficients of the slopes of functions, of states first."""
 
 
-class Room(NamedTuple):
-    """State of the recursion from sample to sample, and its work arrays."""
+def slopes_of(system: System, weights: Float) -> Slopes:
+    """Return the linearisation of a system whose outputs are multiplied by ``weights``, with as few monomials as possible.
 
-    x: np.ndarray
-    """float[n_states], the state before the next sample."""
-    s: np.ndarray
-    """float[2, n_states, n_columns], sensitivities of the state; between calls the first of the two is current."""
-    z: np.ndarray
-    q: np.ndarray
-    slopes: np.ndarray
-    """float[n_slopes], values of the monomials in derivatives."""
-    effective: np.ndarray
-    """float[(n_states + n_outputs) * n_states], ``A + E d phi / d x`` above ``C + F d chi / d x``."""
-    back: np.ndarray
-    """float[n_states], errors propagated back through the outputs."""
-    gradient: np.ndarray
-    """float[n_columns + n_output_weights], sum of derivatives times errors."""
-    own_gradient: np.ndarray
-    """float[n_outputs, n_output_columns], sum of derivatives times errors for [C D F]."""
-    row: np.ndarray
-    """float[n_output_weights], derivatives of an output with respect to the weights in its features."""
-    state_steep: np.ndarray
-    output_steep: np.ndarray
-
-
-def room(system: System, slopes: Slopes, columns: int) -> Room:
-    """Return the work space of a recursion with ``columns`` columns of sensitivities."""
-    n, outputs = system.state.shape[0], system.output.shape[0]
-    return Room(
-        np.zeros(n),
-        np.zeros((2, n, columns)),
-        np.zeros(system.state.shape[1]),
-        np.zeros(system.output.shape[1]),
-        np.zeros(len(slopes.coefficients)),
-        np.zeros((n + outputs) * n),
-        np.zeros(n),
-        np.zeros(columns + system.output_table.weights.size),
-        np.zeros((outputs, system.output.shape[1])),
-        np.zeros(system.output_table.weights.size),
-        np.zeros((system.state_table.weights.shape[0], 2)),
-        np.zeros((system.output_table.weights.shape[0], 2)),
+    The derivatives of a cubic model need few products, however many monomials it has.
+    """
+    n, variables = system.state.shape[0], system.state_table.limits.size
+    whole = np.concatenate([system.state[:, :n], weights[:, None] * system.output[:, :n]])
+    products: dict[tuple[int, ...], Float] = {}
+    functions: list[Float] = []
+    for first, matrix, table in (
+        (0, system.state, system.state_table),
+        (n, weights[:, None] * system.output, system.output_table),
+    ):
+        here = slice(first, first + len(matrix))
+        for index, row in enumerate(table.factors):
+            factors = [int(j) for j in row if j >= 0]
+            for position, j in enumerate(factors):
+                if j >= n:
+                    continue
+                rest = tuple(factors[:position] + factors[position + 1 :])
+                products.setdefault(rest, np.zeros(whole.shape))[here, j] += matrix[:, variables + index]
+        for index, row in enumerate(table.weights):
+            functions.append(np.zeros(whole.shape))
+            functions[-1][here] = np.outer(matrix[:, variables + len(table.factors) + index], row[:n])
+    degree = max((len(rest) for rest in products), default=0)
+    padded = [(*rest, *[-1] * (degree - len(rest))) for rest in products]
+    table = Table(
+        np.array(padded, dtype=np.int64).reshape(len(products), degree),
+        np.minimum(system.state_table.limits, system.output_table.limits),
+        np.zeros((0, variables + 1)),
+        np.zeros(0),
+        np.zeros(0, dtype=np.int64),
+    )
+    return Slopes(
+        whole.ravel(),
+        table,
+        np.array(list(products.values())).reshape(-1, whole.size),
+        np.array(functions).reshape(-1, whole.size),
     )

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from identification.pnlss.fitting.normal_equations import NormalEquations
 from identification.pnlss.fitting.problem import Problem
 from identification.pnlss.fitting.result import FitHistory
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
+from identification.pnlss.fitting.threads import threads
 
 __all__ = ["Iterates", "Steps", "iterate"]
 
@@ -23,11 +23,6 @@ Float = NDArray[np.float64]
 _FACTOR = 10.0
 _SMALLEST, _LARGEST = 1e-16, 1e8
 """Range of dampings that are tried."""
-_NEAR = 1e-4
-"""Once an iteration gains less than this share, all samples enter the Hessian, so that a minimum is reached in few steps.
-
-Before that, a subset of the samples progresses as fast.
-"""
 _WORTH = 0.01
 """A smaller damping is tried if its predicted gain exceeds the gain achieved by more than this share."""
 _STALLED = 5
@@ -51,7 +46,7 @@ class Steps:
         diagonal = np.sqrt(np.diag(equations.hessian))
         self._scale = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
         scaled = equations.hessian * self._scale * self._scale[:, None]
-        values, vectors = scipy.linalg.eigh(scaled, driver="evd", overwrite_a=True, check_finite=False)
+        values, vectors = np.linalg.eigh(scaled)
         self._kept = values > max(truncation, np.finfo(float).tiny) * values[-1]
         self._values = values[self._kept]
         self._vectors = vectors[:, self._kept]
@@ -113,12 +108,6 @@ class Iterates:
             seconds=np.array(self.seconds),
         )
 
-    def every(self, problem: Problem) -> int:
-        """Return n such that the next Hessian uses one of n samples; 1 once the training error has nearly stalled."""
-        errors, near = np.array(self.training), max(_NEAR, problem.settings.tolerance)
-        far = np.all(np.diff(errors) < -near * errors[:-1])
-        return problem.every if far else 1
-
     def add(self, problem: Problem, vector: Float, training: float, damping: float) -> None:
         """Append an iterate."""
         validation = problem.validation_error(vector)
@@ -136,16 +125,14 @@ def iterate(problem: Problem, iterates: Iterates, progress: Callable[[FitProgres
     settings = problem.settings
     try:
         while (reason := _reason(iterates, settings)) is None:
-            equations = problem.equations(iterates.vector, every := iterates.every(problem))
-            if not (np.all(np.isfinite(equations.hessian)) and np.all(np.isfinite(equations.gradient))):
-                return "the sensitivities of the last iterate leave all bounds", False
-            found = _descend(problem, Steps(equations, settings.truncation), iterates)
-            if found is None and every > 1:
-                equations = problem.equations(iterates.vector)
+            with threads() as count:
+                equations = problem.equations(iterates.vector, count)
+                if not (np.all(np.isfinite(equations.hessian)) and np.all(np.isfinite(equations.gradient))):
+                    return "the sensitivities of the last iterate leave all bounds", False
                 found = _descend(problem, Steps(equations, settings.truncation), iterates)
-            if found is None:
-                return "no step of any damping fits better", False
-            iterates.add(problem, *found)
+                if found is None:
+                    return "no step of any damping fits better", False
+                iterates.add(problem, *found)
             if progress is not None:
                 progress(_told(iterates, settings))
     except KeyboardInterrupt:

@@ -1,31 +1,29 @@
-"""Normal equations of all parameters, summed block by block, so that memory does not grow with the number of samples.
+"""Normal equations of all parameters over all experiments.
 
-J denotes the derivatives of the weighted errors with respect to the shared parameters, Q the rows q = (x, u, chi). The own
-parameters of output l have the Jacobian ``w_l Q``, so that only ``J_l' Q`` and ``Q' Q`` are needed, never the columns
-themselves.
+The samples are cut into as many pieces as there are threads. The state at the begin of a piece counts as a parameter of the
+piece; by its derivatives, which are the sensitivities at the end of the piece before, the pieces are joined.
 """
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-from identification.pnlss.fitting.frequency_lines import transformed
-from identification.pnlss.fitting.kernels import sensitivities
-from identification.pnlss.fitting.layout import System, room
-from identification.pnlss.fitting.parameters import Parameters, slopes_of
-from identification.pnlss.fitting.records import BOUND, Record
+from identification.pnlss.fitting.blocks import Blocks, Derivatives
+from identification.pnlss.fitting.parameters import Parameters
+from identification.pnlss.fitting.records import Record
+from identification.pnlss.fitting.sums import Sums, summed
 
-__all__ = ["BLOCK", "Blocks", "NormalEquations", "jacobian", "kept_samples", "normal_equations"]
+__all__ = ["NormalEquations", "jacobian", "normal_equations"]
 
 Float = NDArray[np.float64]
+Piece = tuple[Record, tuple[int, int]]
 
-BLOCK = 256
-"""Samples per block: few enough for its Jacobian to stay in the cache between the recursion and the products."""
-_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+_SHORTEST = 1000
+"""Number of samples below which a piece is not worth a thread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,168 +34,63 @@ class NormalEquations:
     gradient: Float
 
 
-def kept_samples(samples: int, every: int) -> NDArray[np.int64]:
-    """Return indices of one sample in every ``every``, at positions that follow the golden ratio.
-
-    A fixed stride would sample a vibration whose period is a few strides always at the same few phases, and miss part of its
-    harmonics.
-    """
-    begins = np.arange(0, samples, every)
-    widths = np.minimum(every, samples - begins)
-    return np.asarray(begins + np.floor(widths * (_GOLDEN * np.arange(begins.size) % 1.0)), dtype=np.int64)
-
-
-class Blocks:
-    """Iterator over the blocks of an experiment.
-
-    It yields the Jacobian float[n_outputs, n, n_columns] and rows float[n, n_own] at one counted sample in every ``every``,
-    and the weighted errors float[n_errors, n_outputs] of all counted samples. Arrays are reused. After the iteration the
-    products of derivatives and errors are complete. Iteration ends early, with NaN, if the run is unbounded.
-    """
-
-    def __init__(
-        self, parameters: Parameters, system: System, record: Record, begin: Float, weights: Float, every: int = 1
-    ) -> None:
-        n = system.state.shape[0]
-        self._system, self._record, self._weights, self._every = system, record, weights, every
-        self._linear, self._slopes = parameters.linear, slopes_of(system)
-        self._room = room(system, self._slopes, parameters.ends[1] + (0 if record.place is None else n))
-        self._room.x[:] = begin
-        if record.place is not None:
-            self._room.s[0, :, parameters.ends[1] :] = np.eye(n)
-
-    @property
-    def gradient(self) -> Float:
-        """float[n_columns]: gradient with respect to the parameters that outputs share."""
-        return self._room.gradient
-
-    @property
-    def own_gradient(self) -> Float:
-        """float[n_outputs, n_own]: gradient with respect to the own parameters of each output."""
-        return self._room.own_gradient
-
-    def __iter__(self) -> Iterator[tuple[Float, Float, Float]]:
-        """Yield the blocks; possible only once."""
-        record, every, outputs = self._record, self._every, len(self._weights)
-        edges = [*range(0, record.counted_from, BLOCK * every), *_edges(record, BLOCK * every), len(record.u)]
-        columns, own = self.gradient.size, self.own_gradient.shape[1]
-        samples = kept_samples(0, every)
-        into = np.zeros((outputs, 0, columns)), np.zeros((0, own)), np.zeros((0, outputs))
-        for begin, end in pairwise(edges):
-            counted = begin >= record.counted_from
-            if counted and end - begin != len(into[2]):
-                samples = kept_samples(end - begin, every)
-                n = samples.size
-                into = np.zeros((outputs, n, columns)), np.zeros((n, own)), np.zeros((end - begin, outputs))
-            u, y = record.u[begin:end], record.y[begin:end]
-            how = (BOUND, self._weights, self._linear, counted, samples)
-            if sensitivities(self._system, self._slopes, u, y, *how, self._room, *into) < end - begin:
-                into[0][:] = np.nan
-                self.gradient[:] = np.nan
-                yield into
-                return
-            if counted:
-                yield into
-
-
-def _edges(record: Record, size: int) -> Iterator[int]:
-    """First sample of each block. Blocks hold only samples that enter the fit; no block extends into the next period."""
-    period = record.period or len(record.u)
-    for begin in range(record.counted_from, len(record.u), period):
-        yield from range(begin, min(begin + period, len(record.u)), size)
-
-
-class _Sums:
-    """Products summed over the blocks of one experiment; only the upper half of symmetric ones."""
-
-    def __init__(self, columns: int, own: int, outputs: int) -> None:
-        self.shared = np.zeros((columns, columns), order="F")
-        self.mixed = [np.zeros((columns, own), order="F") for _ in range(outputs)]
-        self.own = [np.zeros((own, own), order="F")] * outputs
-        self.gradient = np.zeros(columns)
-        self.own_gradient = np.zeros((outputs, own))
-
-    def add(self, blocks: Blocks, every: int) -> None:
-        """Add all blocks in time, where rows are the same for all outputs."""
-        for jacobian, rows, _ in blocks:
-            scipy.linalg.blas.dsyrk(
-                every, jacobian.reshape(-1, jacobian.shape[2]).T, beta=1.0, c=self.shared, overwrite_c=1
-            )
-            for mine, into in zip(jacobian, self.mixed, strict=True):
-                scipy.linalg.blas.dgemm(every, mine.T, rows.T, beta=1.0, c=into, trans_b=1, overwrite_c=1)
-            scipy.linalg.blas.dsyrk(every, rows.T, beta=1.0, c=self.own[0], overwrite_c=1)
-        self.gradient, self.own_gradient = blocks.gradient, blocks.own_gradient
-
-    def add_lines(self, record: Record, lines: Float, blocks: Blocks, weights: Float) -> None:
-        """Add all frequency lines."""
-        for output, (jacobian, rows, errors) in enumerate(transformed(record, lines, blocks)):
-            self.shared += jacobian.T @ jacobian
-            self.mixed[output] = jacobian.T @ rows
-            self.own[output] = rows.T @ rows
-            self.gradient += jacobian.T @ errors[:, output]
-            self.own_gradient[output] = weights[output] * rows.T @ errors[:, output]
-
-
 def normal_equations(
-    parameters: Parameters, vector: Float, records: list[Record], weights: Float, every: int = 1
+    parameters: Parameters, vector: Float, records: list[Record], weights: Float, threads: int = 1
 ) -> NormalEquations:
     """Sum the normal equations over all experiments at ``vector``.
 
-    Errors are weighted by output (``weights``, float[n_outputs]) and by the weights of each record. The gradient uses all
-    samples; the Hessian uses one in every ``every``, except for errors by frequency line. The result is not finite if a run
-    is unbounded.
+    Errors are weighted by output (``weights``, float[n_outputs]) and by the weights of each record. The result is not finite
+    if a run is unbounded. With several ``threads``, the linear algebra must keep to one.
     """
     system, begins = parameters.system(vector), parameters.initial_states(vector)
     hessian, gradient = np.zeros((parameters.count, parameters.count)), np.zeros(parameters.count)
-    outputs, own = system.output.shape
-    for record in records:
-        begin = np.zeros(system.state.shape[0]) if record.place is None else begins[record.place]
-        places = parameters.columns(record.place)
-        sums = _Sums(len(places), own, outputs)
-        if record.lines is None:
-            sums.add(Blocks(parameters, system, record, begin, weights, every), every)
-        else:
-            sums.add_lines(record, record.lines, Blocks(parameters, system, record, begin, weights), weights)
-        _scatter(parameters, record.weight, places, weights, sums, hessian, gradient)
+    shared, derivatives = slice(parameters.shared), np.zeros(())
+
+    def of(piece: Piece) -> Sums | None:
+        record, span = piece
+        x = np.zeros(parameters.start.states) if record.place is None else begins[record.place]
+        return summed(system, record, x, weights, span)
+
+    with ThreadPoolExecutor(threads) as pool:
+        pieces = [(record, span) for record in records for span in _spans(record, -(-threads // len(records)))]
+        for (record, span), sums in zip(pieces, pool.map(of, pieces) if threads > 1 else map(of, pieces), strict=True):
+            if sums is None:
+                return NormalEquations(np.full_like(hessian, np.nan), np.full_like(gradient, np.nan))
+            onto = parameters.onto(derivatives if span[0] else parameters.begin_derivatives(record.place))
+            derivatives = sums.after @ onto[: sums.after.shape[1]]
+            whole = onto.T @ (np.triu(sums.shared) + np.triu(sums.shared, 1).T) @ onto
+            hessian[shared, shared] += record.weight * whole[:-1, :-1]
+            gradient[shared] += record.weight * whole[:-1, -1]
+            for output, by in enumerate(weights):
+                mine, mixed = parameters.own(output), record.weight * by * sums.mixed[:, output] @ onto
+                hessian[mine, shared] += mixed[:, :-1]
+                hessian[shared, mine] += mixed[:, :-1].T
+                hessian[mine, mine] += record.weight * by**2 * sums.own[output % len(sums.own)]
+                gradient[mine] += mixed[:, -1]
     return NormalEquations(hessian, gradient)
 
 
-def _scatter(
-    parameters: Parameters,
-    weight: float,
-    places: NDArray[np.int64],
-    weights: Float,
-    sums: _Sums,
-    hessian: Float,
-    gradient: Float,
-) -> None:
-    """Add the products of an experiment at the places of its parameters."""
-    hessian[np.ix_(places, places)] += weight * _whole(sums.shared)
-    gradient[places] += weight * sums.gradient
-    for output, (mixed, by, own) in enumerate(zip(sums.mixed, weights, sums.own, strict=True)):
-        mine = parameters.own(output)
-        hessian[places, mine] += weight * by * mixed
-        hessian[mine, places] += weight * by * mixed.T
-        hessian[mine, mine] += weight * by**2 * _whole(own)
-        gradient[mine] += weight * sums.own_gradient[output]
-
-
-def _whole(upper: Float) -> Float:
-    """Return a symmetric matrix from its upper half."""
-    return np.asarray(np.triu(upper) + np.triu(upper, 1).T)
+def _spans(record: Record, most: int) -> Iterator[tuple[int, int]]:
+    """Yield the pieces of a record: its counted samples in equal parts, those before them with the first."""
+    counted = len(record.u) - record.counted_from
+    count = 1 if record.lines is not None else max(1, min(most, counted // _SHORTEST))
+    edges = [0, *(record.counted_from + counted * i // count for i in range(1, count)), len(record.u)]
+    yield from pairwise(edges)
 
 
 def jacobian(parameters: Parameters, vector: Float, record: Record, weights: Float) -> Float:
     """float[n_outputs, counted, n_parameters]: full Jacobian of one experiment in time, for small problems and checks."""
     system, begins = parameters.system(vector), parameters.initial_states(vector)
-    begin = np.zeros(system.state.shape[0]) if record.place is None else begins[record.place]
-    places = parameters.columns(record.place)
+    n, own = len(system.state), system.output.shape[1]
+    x, at = np.zeros(n) if record.place is None else begins[record.place], 0
+    onto = parameters.onto(parameters.begin_derivatives(record.place))
     whole = np.zeros((len(weights), len(record.u) - record.counted_from, parameters.count))
-    at = 0
-    for filled, rows, _ in Blocks(parameters, system, record, begin, weights):
-        part = whole[:, at : at + len(rows)]
-        part[:, :, places] = filled
+    of: Derivatives = "parameters" if record.place is None else "all"
+    blocks = Blocks(system, record, weights, x, (0, len(record.u)), of)
+    for _ in blocks:
+        part = whole[:, at : at + len(blocks.rows)]
+        at += len(blocks.rows)
+        part[:, :, : parameters.shared] = np.moveaxis(blocks.rows[:, n:] @ onto[:, :-1], 1, 0)
         for output, by in enumerate(weights):
-            part[output, :, parameters.own(output)] = by * rows
-        at += len(rows)
+            part[output, :, parameters.own(output)] = by * blocks.q[:, :own]
     return whole

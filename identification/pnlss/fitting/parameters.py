@@ -1,4 +1,4 @@
-"""Convert a model to one parameter vector and back; derivatives of its monomials for the kernels of the fit."""
+"""Convert a model to one parameter vector and back."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.pnlss.features import with_weights
-from identification.pnlss.fitting.layout import Slopes, System
+from identification.pnlss.fitting.layout import System
 from identification.pnlss.kernels import Matrices, Table
 from identification.pnlss.model import PnlssModel
 
-__all__ = ["Parameters", "matrices_of", "slopes_of"]
+__all__ = ["Parameters", "matrices_of"]
 
 Float = NDArray[np.float64]
 
@@ -76,15 +76,24 @@ class Parameters:
         marks[self.shared :].reshape(len(self.start.outputs), -1)[:, variables:] = 1.0
         return marks
 
-    def columns(self, place: int | None) -> NDArray[np.int64]:
-        """Return the index of the shared parameter for each column of an experiment's Jacobian.
+    def onto(self, begin: Float) -> Float:
+        """Return the derivatives of an experiment's columns with respect to the shared parameters, and one column for errors.
 
-        ``place`` is the position of the experiment among those with an estimated initial state, None if it has none.
+        float[n_columns, shared + 1], for columns as in `identification.pnlss.fitting.blocks.Blocks`. ``begin`` (float[n_states,
+        shared + 1]) are the derivatives of the state with which its samples begin; without rows if that is constant.
         """
-        linear, inner_state, inner_output, _ = (np.arange(self.ends[i - 1] if i else 0, self.ends[i]) for i in range(4))
+        inner_state, inner_output, n = self.ends[1], self.ends[2] - self.ends[1], len(begin)
+        found = np.zeros((inner_state + n + inner_output + 1, self.shared + 1))
+        found[:inner_state, :inner_state] = np.eye(inner_state)
+        found[inner_state : inner_state + n] = begin
+        found[inner_state + n : -1, inner_state : self.ends[2]] = np.eye(inner_output)
+        found[-1, -1] = 1.0
+        return found
+
+    def begin_derivatives(self, place: int | None) -> Float:
+        """float[n_states, shared + 1]: derivatives of the initial state of the experiment at ``place``; no rows for None."""
         n = self.start.states
-        begin = np.arange(0) if place is None else self.ends[2] + np.arange(place * n, (place + 1) * n)
-        return np.concatenate([linear, inner_state, begin, inner_output])
+        return np.zeros((0, self.shared + 1)) if place is None else np.eye(n, self.shared + 1, self.ends[2] + place * n)
 
     def own(self, output: int) -> slice:
         """Return the slice of the parameters of one output."""
@@ -137,32 +146,3 @@ def matrices_of(system: System) -> Matrices:
         for begin, end in ((0, n), (n, variables), (variables, None))
     ]
     return Matrices(*(np.ascontiguousarray(part) for part in parts))
-
-
-def slopes_of(system: System) -> Slopes:
-    """Return ``E d phi / d x`` and ``F d chi / d x`` of the monomials as combinations of as few products as possible.
-
-    The derivatives of a cubic model need few products, however many monomials it has.
-    """
-    n, outputs = system.state.shape[0], system.output.shape[0]
-    found: dict[tuple[int, ...], Float] = {}
-    for first, matrix, table in ((0, system.state, system.state_table), (n, system.output, system.output_table)):
-        variables = table.limits.size
-        for index, row in enumerate(table.factors):
-            factors = [int(j) for j in row if j >= 0]
-            for position, j in enumerate(factors):
-                if j >= n:
-                    continue
-                rest = tuple(factors[:position] + factors[position + 1 :])
-                shares = found.setdefault(rest, np.zeros((n + outputs, n)))
-                shares[first : first + len(matrix), j] += matrix[:, variables + index]
-    degree = max((len(rest) for rest in found), default=0)
-    padded = [(*rest, *[-1] * (degree - len(rest))) for rest in found]
-    table = Table(
-        np.array(padded, dtype=np.int64).reshape(len(found), degree),
-        np.minimum(system.state_table.limits, system.output_table.limits),
-        np.zeros((0, system.state_table.limits.size + 1)),
-        np.zeros(0),
-        np.zeros(0, dtype=np.int64),
-    )
-    return Slopes(table, np.array(list(found.values())).reshape(len(found), (n + outputs) * n))

@@ -9,20 +9,17 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.frequency_lines import with_lines
+from identification.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
 from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
-from identification.pnlss.fitting.records import PRIOR, Record, fitted_initial_state, records_of, simulated
+from identification.pnlss.fitting.records import Record, records_of, simulated
 from identification.pnlss.fitting.settings import FitSettings
 from identification.pnlss.model import PnlssModel
 
 __all__ = ["Problem", "Scales", "scales_of"]
 
 Float = NDArray[np.float64]
-
-_EVERY = (1, 2, 4, 8)
-_VALUES = 100
-"""Number of output values per parameter with which a Hessian makes as much progress as with all samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +82,6 @@ class Problem:
         if self.validation and not self._validation_total > 0.0:
             raise IdentificationError("validation: its outputs are zero at all frequencies that count")
 
-    @property
-    def every(self) -> int:
-        """Far from the minimum, the Hessian uses one in this many samples."""
-        if self.settings.every is not None:
-            return self.settings.every
-        values = sum(len(r.u) - r.counted_from for r in self.training) * self.weights.size
-        enough = [n for n in _EVERY if values >= _VALUES * n * self.parameters.count]
-        return max(enough, default=1)
-
     def _measured(self, records: list[Record]) -> float:
         return sum(record.weight * float(self.weights**2 @ record.squares(record.y)) for record in records)
 
@@ -133,8 +121,8 @@ class Problem:
             return float(np.inf)
         return error**2 + float(self._ridge @ vector**2)
 
-    def equations(self, vector: Float, every: int = 1) -> NormalEquations:
+    def equations(self, vector: Float, threads: int = 1) -> NormalEquations:
         """Return the normal equations of half of `cost`; a small weight keeps unobservable initial states near zero."""
-        found = normal_equations(self.parameters, vector, self.training, self.weights, every)
+        found = normal_equations(self.parameters, vector, self.training, self.weights, threads)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
         return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)

@@ -1,31 +1,23 @@
-"""Experiments in the scaled units of a fit, their simulation, and initial states from their first samples."""
+"""Experiments in the scaled units of a fit, and their simulation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.pnlss.experiment import Experiment
-from identification.pnlss.fitting.kernels import sensitivities
-from identification.pnlss.fitting.layout import System, room
-from identification.pnlss.fitting.parameters import matrices_of, slopes_of
-from identification.pnlss.kernels import simulate, workspace
+from identification.pnlss.fitting.kernels import run
+from identification.pnlss.fitting.layout import System
 
-__all__ = ["BOUND", "PRIOR", "SAMPLES", "Record", "fitted_initial_state", "records_of", "simulated"]
+__all__ = ["BOUND", "Record", "records_of", "simulated", "state_after"]
 
 Float = NDArray[np.float64]
 
 BOUND = 1e6
 """A state is unbounded beyond this multiple of its RMS in the start."""
-SAMPLES = 600
-"""Number of samples from which an initial state is estimated: a few decay times of lightly damped structures at usual rates."""
-PRIOR = 1e-6
-"""Weight of the squared initial state (states of unit RMS) relative to the squared errors (outputs of unit RMS).
-
-It matters only for unobservable states.
-"""
-_ITERATIONS = 20
+_CHUNK = 1024
+"""Samples simulated at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,55 +71,32 @@ def records_of(
 
 def simulated(system: System, u: Float, initial_state: Float) -> tuple[Float, Float] | None:
     """Return states and outputs, float[n, ...]; None if a run is unbounded."""
-    m = matrices_of(system)
-    x, y = np.empty((len(u), len(m.a))), np.empty((len(u), len(m.c)))
-    bound = np.full(len(m.a), BOUND)
-    begin = np.ascontiguousarray(initial_state)
-    count = simulate(m, system.state_table, system.output_table, u, begin, bound, workspace(m), x, y)
-    return (x, y) if count == len(u) and bool(np.all(np.isfinite(y))) else None
-
-
-def fitted_initial_state(system: System, record: Record, weights: Float, samples: int = SAMPLES) -> Float:
-    """Fit the initial state, float[n_states], to the first ``samples`` counted outputs by Levenberg-Marquardt from rest.
-
-    The result is rest if the run from rest is unbounded.
-    """
-    n, outputs = len(system.state), len(weights)
-    first, end = record.counted_from, min(record.counted_from + samples, len(record.u))
-    u, y = record.u[:end], record.y[:end]
-    jacobian = np.zeros((outputs, end - first, n + system.output_table.weights.size))
-    rows, errors = np.zeros((end - first, system.output.shape[1])), np.zeros((end - first, outputs))
-
-    def error(x: Float) -> float:
-        run = simulated(system, u, x)
+    x, y = np.empty((len(u), len(system.state))), np.empty((len(u), len(system.output)))
+    for chunk, z, q in _chunks(system, u, np.array(initial_state)):
+        x[chunk] = z[:, : x.shape[1]]
         with np.errstate(over="ignore", invalid="ignore"):
-            return (
-                float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2) + PRIOR * x @ x)
-            )
+            y[chunk] = q @ system.output.T
+        if chunk.stop == len(u):
+            return (x, y) if bool(np.all(np.isfinite(y))) else None
+    return None
 
-    slopes, none, all_samples = slopes_of(system), np.arange(0), np.arange(end - first)
-    into = (jacobian, rows, errors)
-    x, damping = np.zeros(n), 1e-6
-    best = error(x)
-    for _ in range(_ITERATIONS):
-        r = room(system, slopes, n)
-        r.x[:] = x
-        r.s[0] = np.eye(n)
-        done = sensitivities(system, slopes, u[:first], y[:first], BOUND, weights, 0, False, none, r, *into)
-        done += sensitivities(system, slopes, u[first:], y[first:], BOUND, weights, 0, True, all_samples, r, *into)
-        stacked = jacobian[:, :, :n].reshape(-1, n)
-        if done < end or not np.all(np.isfinite(stacked)):
-            break
-        values, vectors = np.linalg.eigh(stacked.T @ stacked + PRIOR * np.eye(n))
-        along = vectors.T @ (stacked.T @ errors.T.ravel() + PRIOR * x)
-        before = best
-        while damping < 1e6:
-            step = -vectors @ (along / (values + damping * values[-1]))
-            tried = error(x + step)
-            if tried < best:
-                x, best, damping = x + step, tried, damping / 100.0
-                break
-            damping *= 10.0
-        if best > before * (1.0 - 1e-10):
-            break
-    return x
+
+def state_after(system: System, u: Float, initial_state: Float) -> Float:
+    """float[n_states]: state after the last sample; not a number if a run is unbounded."""
+    x, done = np.array(initial_state), 0
+    for chunk, _, _ in _chunks(system, u, x):
+        done = chunk.stop
+    return x if done == len(u) else np.full_like(x, np.nan)
+
+
+def _chunks(system: System, u: Float, x: Float) -> Iterator[tuple[slice, Float, Float]]:
+    """Yield samples, (x, u, phi) and (x, u, chi), moving ``x`` on, until the end or the first chunk that is unbounded."""
+    alike, size = system.alike, min(len(u), _CHUNK)
+    z = np.empty((size, system.state.shape[1]))
+    q = z if alike else np.empty((size, system.output.shape[1]))
+    for begin in range(0, len(u), _CHUNK):
+        chunk = slice(begin, min(begin + _CHUNK, len(u)))
+        n = chunk.stop - begin
+        if run(system, u[chunk], BOUND, x, alike, z, q) < n:
+            return
+        yield chunk, z[:n], q[:n]

@@ -136,6 +136,7 @@ class PnlssFit:
                 models[name] = None if of_model is None else PnlssModel.from_arrays(inside, of_model)
             parts = {k.removeprefix("history/"): v for k, v in arrays.items() if k.startswith("history/")}
             given = dict(attributes["settings"])
+            given.pop("every", None)  # of files from before Hessians were always of all samples
             given["line_weights"] = tuple(tuple(row) for row in given["line_weights"])
             given["band_hz"] = None if given["band_hz"] is None else tuple(given["band_hz"])
             return cls(

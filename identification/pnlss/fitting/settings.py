@@ -35,11 +35,6 @@ class FitSettings:
     line_weights
         Rows of a frequency in Hz and the weights of errors there, one for all outputs or one for each. Weights are linear in
         between and 0 beyond. Needs periodic experiments.
-    every
-        The Hessian of a step uses one in every ``every`` samples, because neighbouring samples are nearly redundant in finely
-        sampled records. The gradient always uses all samples. Once the training error falls slowly, or no step reduces the
-        cost, the Hessian uses all samples too, so that the fit ends at the same minimum as with 1. None: 2, 4 or 8 if about a
-        hundred output values remain per parameter, else 1.
     damping
         Damping of the first step, relative to the largest eigenvalue of the scaled normal equations.
     truncation
@@ -59,7 +54,6 @@ class FitSettings:
     ridge: float = 0.0
     band_hz: tuple[float, float] | None = None
     line_weights: tuple[tuple[float, ...], ...] = ()
-    every: int | None = None
     damping: float = 1e-3
     truncation: float = 1e-13
 
@@ -71,7 +65,6 @@ class FitSettings:
             ("tolerance", "0 and above, below 1", 0.0 <= self.tolerance < 1.0),
             ("outputs", ", ".join(get_args(OutputWeighting)), self.outputs in get_args(OutputWeighting)),
             ("ridge", "0 and above, finite", 0.0 <= self.ridge < float("inf")),
-            ("every", "None, or 1 and above", self.every is None or self.every >= 1),
             ("damping", "above 0, finite", 0.0 < self.damping < float("inf")),
             ("truncation", "0 and above, below 1", 0.0 <= self.truncation < 1.0),
         ):

@@ -90,7 +90,6 @@ def test_data_and_models_that_cannot_be_used_are_named(
         ({"outputs": "peak"}, "outputs: is peak, allowed are rms, none"),
         ({"ridge": float("nan")}, "ridge: is nan"),
         ({"damping": 0.0}, "damping: is 0.0"),
-        ({"every": 0}, "every: is 0, allowed are None, or 1 and above"),
         ({"truncation": 2.0}, "truncation: is 2.0"),
         ({"band_hz": (20.0, 10.0)}, "band_hz: is 20 to 10 Hz"),
         ({"line_weights": ((2.0, 1.0), (1.0, 1.0))}, "line_weights: need rows"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identification import FitProgress, FitSettings, IdentificationError, PnlssFit, fit_pnlss, pnlss_errors
 from identification.pnlss.fitting import checks
 from identification.pnlss.fitting.checks import needed_bytes
-from identification.pnlss.fitting.normal_equations import NormalEquations, normal_equations
+from identification.pnlss.fitting.normal_equations import normal_equations
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.problem import Problem
 from identification.pnlss.fitting.records import records_of
@@ -99,28 +99,6 @@ def test_validation_runs_begin_where_their_first_samples_say() -> None:
     fit = fit_pnlss(disturbed(system), [experiment(system, 900)], validation=[running])
     assert fit.history.validation_error[0] > 1e-2
     assert fit.validation_error < 1e-5
-
-
-@pytest.mark.parametrize(("every", "begun"), [(None, 2), (1, 1), (16, 16)])
-def test_a_hessian_of_fewer_samples_leads_to_the_same_parameters(
-    every: int | None, begun: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    system = nonlinear_system(2, 1, 1, degrees=(3,))
-    experiments = [experiment(system, 9000, noise=0.05)]  # 230 values for each parameter
-    taken: list[int] = []
-    equations = Problem.equations
-
-    def seen(problem: Problem, vector: NDArray[np.float64], every: int = 1) -> NormalEquations:
-        taken.append(every)
-        return equations(problem, vector, every)
-
-    whole = fit_pnlss(disturbed(system), experiments, settings=FitSettings(every=1))
-    monkeypatch.setattr(Problem, "equations", seen)
-    thinned = fit_pnlss(disturbed(system), experiments, settings=FitSettings(every=every))
-    assert (taken[0], taken[-1]) == (begun, 1)
-    assert thinned.training_error == pytest.approx(whole.training_error, rel=1e-6)
-    outputs = [fit.model.simulate(experiments[0].inputs).outputs for fit in (whole, thinned)]
-    assert np.max(np.abs(outputs[1] - outputs[0])) < 1e-3 * np.max(np.abs(outputs[0]))
 
 
 def test_a_resumed_fit_goes_on_as_if_it_had_not_stopped() -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from identification import Experiment, PnlssModel
 from identification.pnlss.features import FUNCTIONS
 from identification.pnlss.fitting.frequency_lines import with_lines
-from identification.pnlss.fitting.normal_equations import jacobian, kept_samples, normal_equations
+from identification.pnlss.fitting.normal_equations import jacobian, normal_equations
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record, records_of, simulated
 from identification.pnlss.fitting.settings import FitSettings
@@ -88,35 +88,6 @@ def test_normal_equations_are_products_of_the_jacobian_whatever_the_block() -> N
         gradient += one.weight * rows.T @ (weights * (run[1] - one.y)).T.ravel()
     np.testing.assert_allclose(found.hessian, hessian, rtol=0.0, atol=1e-12 * np.max(np.abs(hessian)))
     np.testing.assert_allclose(found.gradient, gradient, rtol=0.0, atol=1e-12 * np.max(np.abs(gradient)))
-
-
-def test_a_few_of_the_samples_make_the_hessian_and_all_make_the_gradient() -> None:
-    system = nonlinear_system(2, 1, 2, saturating=1)
-    records = records_of([replace(experiment(system, 500, noise=0.1), counted_from=31)], np.ones(1), np.ones(2))
-    parameters, weights = Parameters(system), np.array([1.0, 2.0])
-    vector = parameters.vector(system, np.zeros((0, 2)))
-    kept = kept_samples(469, 3)
-    np.testing.assert_array_equal(kept // 3, np.arange(157))
-    rows = jacobian(parameters, vector, records[0], weights)[:, kept].reshape(-1, parameters.count)
-    whole, thinned = (normal_equations(parameters, vector, records, weights, every) for every in (1, 3))
-    np.testing.assert_allclose(thinned.hessian, 3.0 * rows.T @ rows, rtol=0.0, atol=1e-12 * np.max(whole.hessian))
-    np.testing.assert_array_equal(thinned.gradient, whole.gradient)
-
-
-def test_what_is_kept_of_a_vibration_of_a_few_strides_a_period_tells_of_its_harmonics() -> None:
-    """A steady sine of 32 samples a period: each eighth sample is at one of four phases, over which a cube aliases."""
-    system = nonlinear_system(2, 1, 1)
-    inputs = np.sin(2.0 * np.pi * np.arange(8192)[None] / 32.0)
-    record = records_of([replace(experiment(system, 8192), inputs=inputs, counted_from=4096)], np.ones(1), np.ones(1))
-    parameters = Parameters(system)
-    rows = jacobian(parameters, parameters.vector(system, np.zeros((0, 2))), record[0], np.ones(1))[0]
-    rows = rows / np.linalg.norm(rows, axis=0)
-
-    def off(kept: NDArray[np.int64]) -> float:
-        return float(np.linalg.norm(8.0 * rows[kept].T @ rows[kept] - rows.T @ rows) / np.linalg.norm(rows.T @ rows))
-
-    assert off(np.arange(0, 4096, 8)) > 0.1
-    assert off(kept_samples(4096, 8)) < 0.03
 
 
 def test_lines_of_all_frequencies_make_the_same_normal_equations_as_samples() -> None:
