@@ -26,7 +26,16 @@ from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 
-__all__ = ["Record", "content_digest", "inner_kernel", "kernel", "kernel_cache_folder", "note_use", "on_compiling"]
+__all__ = [
+    "Record",
+    "content_digest",
+    "inner_kernel",
+    "kernel",
+    "kernel_cache_folder",
+    "note_use",
+    "on_compiling",
+    "unlocked_kernel",
+]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -49,6 +58,11 @@ _DAY_S = 86400.0
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a kernel with numba, cached on disk."""
     return _compiled(function, OPTIONS)
+
+
+def unlocked_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a kernel that lets other threads of Python run while it does."""
+    return _compiled(function, {**OPTIONS, "nogil": True})
 
 
 def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.pnlss.fitting.layout import Slopes, System
 from identification.pnlss.kernels import Table, feature_values, function_slope, weighted_sum
-from vibrolock.compiled import inner_kernel, kernel
+from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 __all__ = ["adjoint", "linearise", "run", "sensitivities"]
 
@@ -69,7 +69,7 @@ def _product(matrix: np.ndarray, z: np.ndarray, x: np.ndarray) -> None:
         x[i] = a
 
 
-@kernel
+@unlocked_kernel
 def run(system: System, u: np.ndarray, bound: float, x: np.ndarray, alike: bool, z: np.ndarray, q: np.ndarray) -> int:
     """Simulate from ``x`` under ``u`` (float[n, n_inputs]); ``x`` becomes the state after the last sample.
 
@@ -93,7 +93,7 @@ def run(system: System, u: np.ndarray, bound: float, x: np.ndarray, alike: bool,
     return int(u.shape[0])
 
 
-@kernel
+@unlocked_kernel
 def linearise(
     system: System,
     slopes: Slopes,
@@ -154,7 +154,7 @@ def _slopes(table: Table, v: np.ndarray, features: np.ndarray, steep: np.ndarray
         steep[f, 1] = function_slope(code, table.weights[f, v.size], at_rest)
 
 
-@kernel
+@unlocked_kernel
 def sensitivities(
     effective: np.ndarray,
     linear: int,
@@ -187,7 +187,7 @@ def sensitivities(
         _copy(s[1], s[0])
 
 
-@kernel
+@unlocked_kernel
 def adjoint(effective: np.ndarray, rows: np.ndarray, back: np.ndarray) -> None:
     """Carry the derivatives of the outputs, in ``rows`` below those of the states, back over a block.
 
@@ -199,7 +199,3 @@ def adjoint(effective: np.ndarray, rows: np.ndarray, back: np.ndarray) -> None:
     for k in range(end, 0, -1):
         _combine(effective[k].T, rows[k], rows[k - 1])
     _combine(effective[0].T, rows[0], back)
-
-
-for _kernel in (run, linearise, sensitivities, adjoint):  # pieces of a record run in threads
-    getattr(_kernel, "targetoptions", {})["nogil"] = True
