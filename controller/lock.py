@@ -28,6 +28,8 @@ class LockState(IntEnum):
 
 SEARCHING, ACQUIRING, LOCKED, LOST = (int(state) for state in LockState)
 
+SWINGING = 3  # times as many far periods, less close ones, lose a lock whose phase swings to and fro
+
 THRESHOLDS = np.dtype(
     [
         ("locked_rad", "f8"),
@@ -65,7 +67,7 @@ class LockRule(Settings):
     lost_deg: float = Field(30.0, gt=0, le=180)
     """Mean phase error of a period above which the period counts as far, deg."""
     lost_periods: int = Field(20, ge=1, le=1000)
-    """Far periods less close ones, at a held level, that lose a lock."""
+    """Far periods in a row, at a held level, that lose a lock; or three times as many, less the close ones between them."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -90,9 +92,9 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     """Advance the lock state by one oscillator period, given the period's mean phase error (rad).
 
     ``present``: force and response exceed the smallest amplitudes whose phase can be read.
-    ``held``: the level is not being ramped; only then does a large error count towards a lost lock. Far periods need not follow
-    one another: a phase that swings through zero, and is far most of the time, is lost too, also where a ramp has shaken the
-    lock off before.
+    ``held``: the level is not being ramped; only then does a large error count towards a lost lock. A phase that swings through
+    zero and is far most of the time is lost too, after three times as many periods, for a knock makes it swing as well; also
+    where a ramp has shaken the lock off before.
     """
     size = abs(error)
     if not present:
@@ -126,7 +128,9 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
         lock.gained = 1
         lock.far_periods = 0
         lock.astray_periods = 0
-    elif lock.gained == 1 and lock.astray_periods >= thresholds.lost_periods:
+    elif lock.state == LOCKED and lock.far_periods >= thresholds.lost_periods:
+        lock.state = LOST
+    elif lock.gained == 1 and lock.astray_periods >= SWINGING * thresholds.lost_periods:
         lock.state = LOST
 
 

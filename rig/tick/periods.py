@@ -52,8 +52,7 @@ def close_period(t: TickArrays) -> None:
         period.error_rad = math.nan
     open_loop = loop.drive == TONE
     if not open_loop:
-        held = loop.held == 1 or t.progress[0].waits == 1
-        next_lock_state(lock, t.law[0].lock, present, held, period.error_rad)
+        next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad)
     # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
     behind = amplitude.output.behind != 0 and amplitude.law == VOLTAGE
     locked = (open_loop or lock.state == LOCKED) and not behind

@@ -193,6 +193,13 @@ def must_wait(progress: Record, segment: Record, lock: Record) -> bool:
 
 
 @kernel
+def is_held_by_window(progress: Record, segment: Record, settling: Record) -> bool:
+    """Return whether the frequency stands at an end of its window during a ramp before the first lock, or one that waits."""
+    watched = progress.unlocked == 1 or progress.waited_cycles > 0.0
+    return bool(watched and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE)
+
+
+@kernel
 def has_returned(progress: Record, cycle: float) -> bool:
     """Lower the level to where a lock was last held; return whether it is there, where the ramp then begins."""
     done = min((cycle - progress.start_cycle) / RETURN_PERIODS, 1.0)
@@ -218,8 +225,7 @@ def advance(
     """Run the sequencer for one sample: set level, lag and frequency, move on after a segment, end the run after the last.
 
     The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached or the phase of a
-    loop that has been locked is off, an upward ramp waits; that is a held level to the lock. After a lost lock the next ramp
-    begins where a lock was last held.
+    loop that has been locked is off, an upward ramp waits. After a lost lock the next ramp begins where a lock was last held.
     """
     if progress.finished:
         return
@@ -247,8 +253,7 @@ def advance(
     climbs = is_ramp(segment.kind) and segment.level > progress.level
     if climbs and progress.unreached == 1:
         progress.frozen_cycles += passed
-    progress.waits = 1 if climbs and must_wait(progress, segment, lock) else 0
-    if progress.waits == 1:
+    if climbs and must_wait(progress, segment, lock):
         progress.waited_cycles += passed
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
@@ -261,11 +266,11 @@ def advance(
             if lock.state == LOCKED and segment.kind == LEVEL_SWEEP:
                 progress.kept_level = segment.level
             close_segment(progress, outcomes, settling, DONE)
-        elif progress.unlocked == 1 and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE:
+        elif is_held_by_window(progress, segment, settling):
             give_up(progress, segments, outcomes, settling, lock, guard, OUTSIDE_WINDOW)
         elif progress.frozen_cycles >= SATURATED_PERIODS:
             give_up(progress, segments, outcomes, settling, lock, guard, UNREACHABLE)
-        elif progress.waits == 1 and (lock.state == LOST or progress.waited_cycles >= LONGEST_WAIT):
+        elif progress.waited_cycles >= LONGEST_WAIT:
             give_up(progress, segments, outcomes, settling, lock, guard, LOST_LOCK)
         return
     progress.level = segment.level
