@@ -11,6 +11,8 @@ is unknown, harmonic h has an error of variance ``sum_n (q/(pi n))^2 exp(-4 (pi 
 of it in each of its two parts. With noise above about half a step the error vanishes.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,7 +44,7 @@ def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) 
     """
     out = np.zeros(harmonics.shape)
     orders = np.arange(harmonics.shape[1])
-    turns = np.exp(2j * np.pi * np.outer(np.arange(_INSTANTS) / _INSTANTS, orders[1:]))
+    turns = _turns(orders.size - 1)
     for row in np.flatnonzero(resolution > 0.0):
         step = resolution[row]
         position = np.real(turns @ harmonics[row, 1:]) / step
@@ -57,3 +59,11 @@ def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) 
         variance[0] *= 0.5
         out[row] = np.sqrt(variance)
     return out
+
+
+@lru_cache(maxsize=4)
+def _turns(harmonics: int) -> Complex:
+    """complex[_INSTANTS, H]: the harmonics 1..H over one period, of size 1."""
+    turns = np.exp(2j * np.pi * np.outer(np.arange(_INSTANTS) / _INSTANTS, np.arange(1, harmonics + 1)))
+    turns.setflags(write=False)
+    return turns

@@ -105,7 +105,8 @@ def modal_part(vibration: PeriodicVibration, shape: DriveShape) -> Modal:
     The standard error of the damping is given if that of the mode shape is known. Raises `identification.IdentificationError`
     if there are no such properties.
     """
-    mode = nonlinear_mode(shape.backbone((vibration,)))
+    backbone = shape.backbone((vibration,))
+    mode = nonlinear_mode(backbone) if shape.std is not None else nonlinear_mode(backbone, draws=0)  # no error is used
     damping, std = float(mode.damping_ratio[0]), float(mode.damping_ratio_std[0])
     return Modal(
         modal_frequency_hz=float(mode.modal_frequency_hz[0]),
